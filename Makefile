@@ -1,0 +1,33 @@
+# Two commands for a fresh machine (Python 3.11+ and a C compiler): `make demo` and `make test`.
+# Both install into .venv once and work offline from then on.
+PYTHON ?= python3
+PY = .venv/bin/python
+
+.PHONY: demo test check bench clean
+
+.venv/bin/python:
+	$(PYTHON) -m venv .venv
+
+# Reinstalled only when pyproject.toml changes; the sources are used in place.
+.venv/.demo: pyproject.toml | .venv/bin/python
+	$(PY) -m pip install --quiet --disable-pip-version-check -e .
+	touch $@
+
+.venv/.test: pyproject.toml | .venv/bin/python
+	$(PY) -m pip install --quiet --disable-pip-version-check -e ".[dev,jpl]"
+	touch $@ .venv/.demo
+
+demo: .venv/.demo
+	mkdir -p out
+	$(PY) -m flybystab flyby Apophis --output out/apophis.png
+
+test: .venv/.test
+	$(PY) -m pytest -n 2
+
+check: .venv/.test
+	$(PY) -m ruff check .
+	$(PY) -m ruff format --check .
+	$(PY) -m mypy
+
+clean:
+	rm -rf .venv out build dist src/*.egg-info

@@ -1,0 +1,80 @@
+"""Named errors. Each one says what was wrong, shows the offending value and what would be right.
+
+Every error derives from :class:`FlybystabError`; those caused by an argument are also ``ValueError``
+(or ``KeyError`` and so on), so that code that knows nothing of this package still catches them.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+
+class FlybystabError(Exception):
+    """Base of every error that the package raises on purpose."""
+
+
+class InvalidInput(FlybystabError, ValueError):
+    """An argument is outside its domain.
+
+    Attributes
+    ----------
+    name : str
+        The argument.
+    value : object
+        What was given.
+    expected : str
+        What would be right.
+    """
+
+    def __init__(self, name: str, value: Any, expected: str) -> None:
+        self.name, self.value, self.expected = name, value, expected
+        super().__init__(f"{name} = {value!s}: expected {expected}")
+
+
+class UnitMismatch(InvalidInput):
+    """A quantity has the wrong physical dimension, or a bare number was given where a unit is needed."""
+
+
+class UnknownName(FlybystabError, KeyError):
+    """A name (asteroid, planet, yield surface, TOML key) is not known; near matches are offered.
+
+    Attributes
+    ----------
+    kind, name : str
+        What was looked for.
+    suggestions : list of str
+        Near matches, best first.
+    """
+
+    def __init__(self, kind: str, name: str, suggestions: list[str], known: str = "") -> None:
+        self.kind, self.name, self.suggestions = kind, name, list(suggestions)
+        hint = f"; did you mean {', '.join(suggestions)}?" if suggestions else ""
+        self.message = f"unknown {kind} {name!r}{hint}{' ' + known if known else ''}"
+        super().__init__(self.message)
+
+    def __str__(self) -> str:  # KeyError would print the repr
+        return self.message
+
+
+class OutOfSpan(FlybystabError, ValueError):
+    """A date lies outside the time span of the ephemeris (or of a table)."""
+
+    def __init__(self, what: str, value: str, start: str, stop: str, remedy: str = "") -> None:
+        self.what, self.value, self.start, self.stop = what, value, start, stop
+        super().__init__(f"{value} is outside the span of {what}: {start} to {stop}{'. ' + remedy if remedy else ''}")
+
+
+class NoEncounter(FlybystabError, LookupError):
+    """The orbit has no close approach to the planet near the requested time."""
+
+
+class NotConverged(FlybystabError, ArithmeticError):
+    """A numerical method gave up; the message says where and with what state."""
+
+
+class MissingExtra(FlybystabError, ImportError):
+    """An optional package is needed for what was asked."""
+
+    def __init__(self, package: str, extra: str, purpose: str) -> None:
+        self.package, self.extra = package, extra
+        super().__init__(f"{purpose} needs the package {package}: pip install 'flybystab[{extra}]'")

@@ -1,0 +1,1 @@
+"""Where the asteroid goes: ephemeris, forces, orbit, encounter."""

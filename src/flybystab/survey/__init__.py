@@ -1,0 +1,1 @@
+"""Many asteroids: the catalogue, screening and its tables."""

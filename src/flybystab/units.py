@@ -1,0 +1,72 @@
+"""Quantity <-> SI floats, converted once, at the boundary of the package."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import astropy.units as u
+import numpy as np
+from astropy.units import Quantity
+
+from flybystab.errors import InvalidInput, UnitMismatch
+
+
+def to_si(
+    value: Any,
+    unit: u.UnitBase,
+    name: str,
+    *,
+    shape: tuple[int, ...] | None = (),
+    low: float = -np.inf,
+    high: float = np.inf,
+    open_low: bool = False,
+    open_high: bool = False,
+) -> Any:
+    """SI value of a quantity after checks.
+
+    Parameters
+    ----------
+    value : Quantity
+        What the user gave; a bare number is refused unless `unit` is dimensionless.
+    unit : Unit
+        The SI unit to convert to.
+    name : str
+        Name used in error messages.
+    shape : tuple of int or None
+        Required shape; ``()`` for a scalar, None for any.
+    low, high : float
+        Allowed range in `unit`, closed unless `open_low` or `open_high`.
+
+    Returns
+    -------
+    float or ndarray
+        A float for ``shape=()``, else an array of float64.
+
+    Raises
+    ------
+    UnitMismatch
+        Wrong dimension, or no unit at all.
+    InvalidInput
+        Wrong shape, not finite, or out of range.
+    """
+    if not isinstance(value, Quantity):
+        if unit != u.dimensionless_unscaled:
+            raise UnitMismatch(name, value, f"a Quantity in {unit} or equivalent, e.g. {name}=1*u.Unit('{unit}')")
+        try:
+            value = np.asarray(value, dtype=float) * u.dimensionless_unscaled
+        except (TypeError, ValueError):
+            raise InvalidInput(name, value, "a number") from None
+    try:
+        array = np.asarray(value.to_value(unit), dtype=float)
+    except u.UnitConversionError:
+        raise UnitMismatch(name, value, f"a unit that converts to {unit}") from None
+    if shape is not None and array.shape != shape:
+        raise InvalidInput(name, value, "a scalar" if shape == () else f"an array of shape {shape}")
+    if not np.all(np.isfinite(array)):
+        raise InvalidInput(name, value, "finite numbers")
+    too_low = array <= low if open_low else array < low
+    too_high = array >= high if open_high else array > high
+    if np.any(too_low) or np.any(too_high):
+        span = f"{'(' if open_low else '['}{low:g}, {high:g}{')' if open_high else ']'}"
+        raise InvalidInput(name, value, f"a value in {span} {unit}".rstrip())
+    return float(array) if shape == () else array
