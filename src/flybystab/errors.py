@@ -61,7 +61,9 @@ class OutOfSpan(FlybystabError, ValueError):
 
     def __init__(self, what: str, value: str, start: str, stop: str, remedy: str = "") -> None:
         self.what, self.value, self.start, self.stop = what, value, start, stop
-        super().__init__(f"{value} is outside the span of {what}: {start} to {stop}{'. ' + remedy if remedy else ''}")
+        super().__init__(
+            f"{value} is outside the span of {what}: {start} to {stop}{'. ' + remedy if remedy else ''}"
+        )
 
 
 class NoEncounter(FlybystabError, LookupError):
