@@ -51,9 +51,7 @@ def to_si(
     """
     if not isinstance(value, Quantity):
         if unit != u.dimensionless_unscaled:
-            raise UnitMismatch(
-                name, value, f"a Quantity in {unit} or equivalent, e.g. {name}=1*u.Unit('{unit}')"
-            )
+            raise UnitMismatch(name, value, f"a Quantity in {unit}, e.g. {name} = 1 * u.Unit('{unit}')")
         try:
             value = np.asarray(value, dtype=float) * u.dimensionless_unscaled
         except (TypeError, ValueError):

@@ -49,7 +49,7 @@ class TidePanels(NamedTuple):
 
 
 @kernel
-def tide_point(gm, x, y, z, out):
+def tide_point(gm: float, x: float, y: float, z: float, out: Array) -> None:
     """Add to ``out[6]`` the tide of a point mass ``gm`` (m3/s2) at ``(x, y, z)`` (m) from the body, s^-2."""
     r2 = x * x + y * y + z * z
     c = gm / (r2 * np.sqrt(r2))
@@ -63,7 +63,18 @@ def tide_point(gm, x, y, z, out):
 
 
 @kernel
-def tide_j2(gm, j2, radius, px, py, pz, x, y, z, out):
+def tide_j2(
+    gm: float,
+    j2: float,
+    radius: float,
+    px: float,
+    py: float,
+    pz: float,
+    x: float,
+    y: float,
+    z: float,
+    out: Array,
+) -> None:
     """Add to ``out[6]`` the tide of the J2 of a planet at ``(x, y, z)`` (m) from the body, s^-2.
 
     ``(px, py, pz)`` is the unit vector of the planet's pole. With the field point at ``r`` from the
@@ -79,7 +90,7 @@ def tide_j2(gm, j2, radius, px, py, pz, x, y, z, out):
     i9 = i7 / r2
     rx, ry, rz = -x, -y, -z
     # d_i d_j (r^-3) = 15 r_i r_j / r^7 - 3 d_ij / r^5
-    # d_i d_j (s^2 r^-5) = 2 p_i p_j / r^5 - 10 s (p_i r_j + r_i p_j)/r^7 - 5 s^2 d_ij/r^7 + 35 s^2 r_i r_j/r^9
+    # d_i d_j (s^2/r^5) = 2 p_i p_j/r^5 - 10 s (p_i r_j + r_i p_j)/r^7 - 5 s^2 d_ij/r^7 + 35 s^2 r_i r_j/r^9
     a = 15.0 * i7 - 105.0 * s * s * i9
     b = -3.0 * i5 + 15.0 * s * s * i7
     d = -6.0 * i5
@@ -93,7 +104,7 @@ def tide_j2(gm, j2, radius, px, py, pz, x, y, z, out):
 
 
 @kernel
-def tide_at(tau, start, width, coefficients, t, out):
+def tide_at(tau: float, start: float, width: float, coefficients: Array, t: float, out: Array) -> None:
     """Write into ``out[6]`` the tide at time ``t`` (s from closest approach); zero where there are no panels.
 
     Times outside the panels use the nearest panel's end value, so that a rounding error in ``t`` is harmless;

@@ -1,0 +1,154 @@
+"""Yield surfaces ``|s| <= k(theta) (p + Y cot phi)`` of a granular material (theory, section 3).
+
+Stress is positive in tension, ``p = -tr(sigma)/3``, ``s`` the deviator, ``|s|^2 = s:s``. The Lode angle
+``theta = asin(-3 sqrt6 det(s/|s|))/3`` runs from -30 deg (triaxial extension) to +30 deg (compression).
+
+============  ============================  =============================================================
+code          name                          slope k
+============  ============================  =============================================================
+0             drucker-prager                ``2 sqrt6 sin/(3 - sin)``, meets Mohr-Coulomb in compression
+1             drucker-prager-extension      ``2 sqrt6 sin/(3 + sin)``, meets it in extension
+2             mohr-coulomb                  ``sqrt2 sin/(cos theta - sin theta sin/sqrt3)``
+3             matsuoka-nakai                smallest positive root of
+                                            ``eta d k^3 + (eta-3)/2 k^2 - (eta-9) = 0``, d = det(s/|s|),
+                                            ``eta = I1 I2/I3 = 9 + 8 tan^2``; meets it at both ends
+============  ============================  =============================================================
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flybystab.core.jit import kernel
+
+SQRT2 = np.sqrt(2.0)
+SQRT3 = np.sqrt(3.0)
+SQRT6 = np.sqrt(6.0)
+
+DRUCKER_PRAGER = 0
+EXTENSION_CONE = 1
+MOHR_COULOMB = 2
+MATSUOKA_NAKAI = 3
+
+
+@kernel
+def lode_angle(det: float) -> float:
+    """Lode angle, rad, from the determinant of the unit deviator."""
+    return np.arcsin(min(1.0, max(-1.0, -3.0 * SQRT6 * det))) / 3.0
+
+
+@kernel
+def slope_over_sine(code: int, sin_phi: float, det: float) -> float:
+    """``k / sin(phi)`` in the direction of a unit deviator with determinant `det`; finite at ``phi = 0``."""
+    if code == DRUCKER_PRAGER:
+        return 2.0 * SQRT6 / (3.0 - sin_phi)
+    if code == EXTENSION_CONE:
+        return 2.0 * SQRT6 / (3.0 + sin_phi)
+    if code == MOHR_COULOMB:
+        theta = lode_angle(det)
+        return SQRT2 / (np.cos(theta) - np.sin(theta) * sin_phi / SQRT3)
+    # x = 1/k solves x^3 - x (eta-3)/(2(eta-9)) - eta det/(eta-9) = 0; with t = tan phi and
+    # eta - 9 = 8 t^2 the largest root is 2 sqrt(a/3) cos(acos(b)/3), a = (eta-3)/(2(eta-9)).
+    t2 = sin_phi * sin_phi / (1.0 - sin_phi * sin_phi)
+    eta = 9.0 + 8.0 * t2
+    half = 0.5 * (eta - 3.0)
+    # b = (3 eta det / (2 (eta-9))) / (a sqrt(a/3))  written without dividing by t2
+    b = 1.5 * eta * det * np.sqrt(8.0 * t2) / (half * np.sqrt(half / 3.0))
+    largest = 2.0 * np.sqrt(half / 3.0) * np.cos(np.arccos(min(1.0, max(-1.0, b))) / 3.0)
+    # k = sqrt(8) tan(phi) / largest
+    return np.sqrt(8.0 / (1.0 - sin_phi * sin_phi)) / largest
+
+
+@kernel
+def slope(code: int, sin_phi: float, det: float) -> float:
+    """Slope ``k(theta)`` of the yield surface in the direction of a unit deviator."""
+    return sin_phi * slope_over_sine(code, sin_phi, det)
+
+
+@kernel
+def least_slope(code: int, sin_phi: float) -> float:
+    """Smallest ``k`` over the Lode angle: the largest dilatancy that creates no energy."""
+    if code == DRUCKER_PRAGER:
+        return 2.0 * SQRT6 * sin_phi / (3.0 - sin_phi)
+    if code == MOHR_COULOMB:  # at tan(theta) = -sin(phi)/sqrt3
+        return SQRT2 * sin_phi / np.sqrt(1.0 + sin_phi * sin_phi / 3.0)
+    return 2.0 * SQRT6 * sin_phi / (3.0 + sin_phi)
+
+
+@kernel
+def required_friction(code: int, cohesion: float, s: float, p: float, det: float) -> float:
+    """Mobilised friction angle, rad: the least ``phi`` that bears a stress; inf where none does.
+
+    Parameters
+    ----------
+    code : int
+        Yield surface.
+    cohesion : float
+        Mohr-Coulomb cohesion ``Y``, in the unit of `s` and `p`.
+    s, p : float
+        Norm of the deviator and pressure.
+    det : float
+        Determinant of the unit deviator (0 where ``s = 0``).
+
+    Notes
+    -----
+    The first three surfaces read ``A sin(phi) + B cos(phi) = C``; Matsuoka-Nakai without cohesion is
+    ``tan^2(phi) = (I1 I2/I3 - 9)/8`` and is bisected with it.
+    """
+    if s == 0.0:
+        return 0.0 if p + cohesion >= 0.0 else np.inf
+    if code == MATSUOKA_NAKAI:
+        if cohesion == 0.0:
+            if p <= 0.0:
+                return np.inf
+            k = s / p
+            i3 = 1.0 - 0.5 * k * k - det * k * k * k
+            # all principal stresses compressive: I2 > 0 and I3 > 0
+            if i3 <= 0.0 or 3.0 - 0.5 * k * k <= 0.0:
+                return np.inf
+            tan2 = (9.0 - 1.5 * k * k - 9.0 * i3) / (8.0 * i3)
+            return np.arctan(np.sqrt(max(0.0, tan2)))
+        low = 0.0
+        high = 0.5 * np.pi * (1.0 - 1e-7)  # tan^2 must stay finite
+        if not _bears(code, high, cohesion, s, p, det):
+            return np.inf
+        for _ in range(100):
+            mid = 0.5 * (low + high)
+            if mid in (low, high):
+                break
+            if _bears(code, mid, cohesion, s, p, det):
+                high = mid
+            else:
+                low = mid
+        return high
+    if code == MOHR_COULOMB:
+        theta = lode_angle(det)
+        a = SQRT2 * p + s * np.sin(theta) / SQRT3
+        b = SQRT2 * cohesion
+        c = s * np.cos(theta)
+    else:
+        sign = 1.0 if code == DRUCKER_PRAGER else -1.0
+        a = 2.0 * SQRT6 * p + sign * s
+        b = 2.0 * SQRT6 * cohesion
+        c = 3.0 * s
+    if c <= b:
+        return 0.0
+    r = np.hypot(a, b)
+    if c > r:
+        return np.inf
+    # r sin(phi + psi) = c, psi = atan2(b, a): the smaller root
+    phi = np.arcsin(c / r) - np.arctan2(b, a)
+    return phi if phi < 0.5 * np.pi else np.inf
+
+
+@kernel
+def _bears(code: int, phi: float, cohesion: float, s: float, p: float, det: float) -> bool:
+    g = slope_over_sine(code, np.sin(phi), det)
+    return s <= g * (p * np.sin(phi) + cohesion * np.cos(phi))
+
+
+@kernel
+def required_cohesion(code: int, phi: float, s: float, p: float, det: float) -> float:
+    """Least cohesion ``Y = tan(phi) max(0, |s|/k - p)`` that bears a stress, in the unit of `s` and `p`."""
+    g = slope_over_sine(code, np.sin(phi), det)
+    return max(0.0, (s / g - p * np.sin(phi)) / np.cos(phi))
