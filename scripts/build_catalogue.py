@@ -41,16 +41,85 @@ DENSITY = {"S": (2300.0, 500.0), "C": (1300.0, 300.0), "X": (2000.0, 700.0), "?"
 #: Taxonomic letter -> complex. Q, V, K, L, A, O are stony and take the S value.
 COMPLEX = dict.fromkeys("SQVKLAOR", "S") | dict.fromkeys("CBFGDT", "C") | dict.fromkeys("XEMP", "X")
 
-COLUMNS = ["number", "name", "designation", "aliases", "orbit_class", "pha", "H_mag", "taxonomic_class", "taxonomic_source", "binary", "shape_kind", "semi_axis_a_m", "semi_axis_a_sigma_m", "semi_axis_b_m", "semi_axis_b_sigma_m", "semi_axis_c_m", "semi_axis_c_sigma_m", "semi_axes_source", "diameter_m", "diameter_sigma_m", "diameter_source", "spin_state", "spin_period_h", "spin_period_sigma_h", "spin_source", "amplitude_mag", "amplitude_source", "pole_ecl_lon_deg", "pole_ecl_lat_deg", "pole_source", "tumbling_mode", "precession_period_h", "precession_period_sigma_h", "rotation_period_h", "rotation_period_sigma_h", "inertia_a_over_c", "inertia_b_over_c", "tumbling_source", "density_kg_m3", "density_sigma_kg_m3", "density_assumed", "density_source", "frame", "epoch_jd_tdb", "a_au", "e", "i_deg", "node_deg", "peri_deg", "M_deg", "sigma_a_au", "sigma_e", "sigma_i_deg", "sigma_node_deg", "sigma_peri_deg", "sigma_M_deg", "sigma_source", "A1_au_d2", "A2_au_d2", "A3_au_d2", "nongrav_source", "orbit_solution", "condition_code", "condition_code_source", "orbit_source", "assumed", "unchecked", "notes"]
+COLUMNS = [
+    "number",
+    "name",
+    "designation",
+    "aliases",
+    "orbit_class",
+    "pha",
+    "H_mag",
+    "taxonomic_class",
+    "taxonomic_source",
+    "binary",
+    "shape_kind",
+    "semi_axis_a_m",
+    "semi_axis_a_sigma_m",
+    "semi_axis_b_m",
+    "semi_axis_b_sigma_m",
+    "semi_axis_c_m",
+    "semi_axis_c_sigma_m",
+    "semi_axes_source",
+    "diameter_m",
+    "diameter_sigma_m",
+    "diameter_source",
+    "spin_state",
+    "spin_period_h",
+    "spin_period_sigma_h",
+    "spin_source",
+    "amplitude_mag",
+    "amplitude_source",
+    "pole_ecl_lon_deg",
+    "pole_ecl_lat_deg",
+    "pole_source",
+    "tumbling_mode",
+    "precession_period_h",
+    "precession_period_sigma_h",
+    "rotation_period_h",
+    "rotation_period_sigma_h",
+    "inertia_a_over_c",
+    "inertia_b_over_c",
+    "tumbling_source",
+    "density_kg_m3",
+    "density_sigma_kg_m3",
+    "density_assumed",
+    "density_source",
+    "frame",
+    "epoch_jd_tdb",
+    "a_au",
+    "e",
+    "i_deg",
+    "node_deg",
+    "peri_deg",
+    "M_deg",
+    "sigma_a_au",
+    "sigma_e",
+    "sigma_i_deg",
+    "sigma_node_deg",
+    "sigma_peri_deg",
+    "sigma_M_deg",
+    "sigma_source",
+    "A1_au_d2",
+    "A2_au_d2",
+    "A3_au_d2",
+    "nongrav_source",
+    "orbit_solution",
+    "condition_code",
+    "condition_code_source",
+    "orbit_source",
+    "assumed",
+    "unchecked",
+    "notes",
+]
 
 ELEMENTS = {"a_au": "a", "e": "e", "i_deg": "i", "node_deg": "om", "peri_deg": "w", "M_deg": "ma"}
 
 
 def rows(path: Path) -> list[dict[str, str]]:
     """Rows of a CSV file, plain or gzipped."""
-    raw = gzip.open(path, "rb") if path.suffix == ".gz" else path.open("rb")
-    with io.TextIOWrapper(raw, encoding="utf-8", newline="") as stream:
-        return [dict(r) for r in csv.DictReader(stream)]
+    raw = path.read_bytes()
+    data = gzip.decompress(raw) if path.suffix == ".gz" else raw
+    return [dict(r) for r in csv.DictReader(io.StringIO(data.decode(), newline=""))]
 
 
 def number(text: str | None) -> float:
@@ -128,8 +197,8 @@ class Sources:
         self.states = {r["des"]: r for r in rows(directory / "preflyby_states_fitted.csv")}
         self.literature = {r["key"]: r for r in rows(HERE / "literature.csv")}
 
-    def keys(self) -> list[str]:
-        """Every body with a measured size, a trusted period and a full-precision orbit, and the literature ones."""
+    def selection(self) -> list[str]:
+        """Every body with a measured size, a trusted period and a full-precision orbit, and the famous ones."""
         chosen = set(self.literature)
         for key, r in self.lcdb.items():
             trusted = r["U"] in ("2+", "3-", "3") and r["PFlag"] == "-"
@@ -142,7 +211,7 @@ class Sources:
         return sorted(chosen, key=lambda k: (0, int(k), "") if k.isdigit() else (1, 0, k))
 
     def diameter(self, key: str) -> tuple[float, float, str]:
-        """Diameter and its 1-sigma (km; nan where not given) and source: the newest SBDB table that has one."""
+        """Diameter and its 1-sigma (km; nan where not given) and source, from the newest SBDB table."""
         sigma = number(self.old.get(key, {}).get("diameter_sigma"))
         for table, label in ((self.new, "2026-07"), (self.phys, "2023"), (self.old, "2020-09")):
             d = number(table.get(key, {}).get("diameter"))
@@ -246,11 +315,6 @@ def orbit(key: str, s: Sources) -> dict[str, str]:
             "condition_code_source": f"JPL SBDB 2020-09, {old['orbit_id']}",
         }
     return out
-
-
-def quoted(lit: dict[str, str], field: str) -> bool:
-    """Whether a literature value was taken from a quotation and not compared with the cited paper."""
-    return field in lit.get("unchecked", "").split(";")
 
 
 def taxonomy(key: str, s: Sources) -> tuple[str, str, str]:
@@ -371,8 +435,9 @@ def shape(key: str, s: Sources, amplitude: float) -> tuple[dict[str, str], list[
         sigmas = axes * sd / d
         kind = "measured"
         source = (
-            "homogeneous ellipsoid with the inertia ratios of Lee et al. 2022 (0.64 : 0.97 : 1) and the volume of "
-            "the equivalent diameter 340 +- 40 m of Brozovic et al. 2018; the uncertainty is that of the diameter"
+            "homogeneous ellipsoid with the inertia ratios of Lee et al. 2022 (0.64 : 0.97 : 1) and the "
+            "volume of the equivalent diameter 340 +- 40 m of Brozovic et al. 2018; the uncertainty is "
+            "that of the diameter"
         )
     else:
         kind = "size+elongation"
@@ -471,7 +536,8 @@ def summary(table: list[dict[str, str]]) -> None:
     f = float(dm @ np.log10(ab) / (0.4 * dm @ dm))
     residual = np.log10(ab) - 0.4 * AMPLITUDE_FACTOR * dm
     print(
-        f"  a/b against amplitude: best factor {f:.3f}; rms residual of log10(a/b) {residual.std():.3f} of {len(dm)}"
+        f"  a/b against amplitude: best factor {f:.3f}; rms residual of log10(a/b) {residual.std():.3f}"
+        f" of {len(dm)}"
     )
     for group in "SC":
         rho = [
@@ -480,7 +546,8 @@ def summary(table: list[dict[str, str]]) -> None:
             if r["density_assumed"] == "false" and COMPLEX.get(r["taxonomic_class"][:1]) == group
         ]
         print(
-            f"  measured densities, complex {group}: {np.mean(rho):.0f} +- {np.std(rho, ddof=1):.0f} kg/m3 of {len(rho)}"
+            f"  measured densities, complex {group}: {np.mean(rho):.0f} +- {np.std(rho, ddof=1):.0f} kg/m3"
+            f" of {len(rho)}"
         )
 
 
@@ -493,7 +560,7 @@ def main(argv: list[str] | None = None) -> int:
         print(f"{args.source} is not a directory: name the one that holds the source tables", file=sys.stderr)
         return 1
     sources = Sources(args.source)
-    table = [record(key, sources) for key in sources.keys()]
+    table = [record(key, sources) for key in sources.selection()]
     with args.output.open("w", newline="", encoding="utf-8") as stream:
         writer = csv.DictWriter(stream, COLUMNS, lineterminator="\n")
         writer.writeheader()
