@@ -1,0 +1,265 @@
+"""One close passage of an asteroid by a planet, scripted or real: its path and the tide that it feels."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Protocol
+
+import astropy.units as u
+import numpy as np
+from astropy.time import Time
+from astropy.units import Quantity
+from numpy.typing import NDArray
+
+from flybystab.constants import HOUR
+from flybystab.core.jit import kernel
+from flybystab.core.tide import TidePanels, tide_j2, tide_panels, tide_point
+from flybystab.errors import InvalidInput
+from flybystab.sky.kepler import states_at_times, time_at_distance
+from flybystab.sky.planets import PLANETS, Planet, planet
+from flybystab.units import to_si
+
+Array = NDArray[np.float64]
+
+#: Time after the end of the encounter that the tide still covers, s: a body that flows can be followed.
+TAIL = 100.0 * HOUR
+
+
+class Track(Protocol):
+    """Motion of the asteroid relative to the planet."""
+
+    def states(self, t: Array) -> Array:
+        """Position (m) and velocity (m/s), shape (n, 6), at ``t`` s from closest approach, shape (n,)."""
+
+
+@dataclass(frozen=True)
+class KeplerTrack:
+    """Two-body motion in the xy plane with periapsis on +x and angular momentum on +z.
+
+    Attributes
+    ----------
+    gm : float
+        Gravitational parameter, m3/s2.
+    q : float
+        Periapsis distance, m.
+    f : float
+        Eccentricity - 1 = q v_inf^2 / gm.
+    """
+
+    gm: float
+    q: float
+    f: float
+
+    def states(self, t: Array) -> Array:
+        """Position (m) and velocity (m/s), shape (n, 6), at ``t`` s from periapsis, shape (n,)."""
+        s = states_at_times(self.gm, self.q, self.f, np.ascontiguousarray(t, dtype=float))
+        out = np.zeros((s.shape[0], 6))
+        out[:, [0, 1, 3, 4]] = s
+        return out
+
+
+@kernel
+def planet_tide(gm: float, j2: float, radius: float, pole: Array, position: Array, out: Array) -> None:
+    """Add to ``out[n, 6]`` the tide (s^-2) of a planet with J2 on a body ``position[n, 3]`` (m) from it."""
+    for i in range(position.shape[0]):
+        x, y, z = -position[i, 0], -position[i, 1], -position[i, 2]
+        tide_point(gm, x, y, z, out[i])
+        if j2 != 0.0:
+            tide_j2(gm, j2, radius, pole[0], pole[1], pole[2], x, y, z, out[i])
+
+
+@dataclass(frozen=True, eq=False)
+class Encounter:
+    """A close passage by one planet.
+
+    Made by :meth:`hyperbolic` (scripted, frame ``"periapsis"``) or from a real orbit (frame ``"ICRF"``).
+    Times are counted from closest approach.
+
+    Attributes
+    ----------
+    planet : Planet
+        The body encountered.
+    time : Time or None
+        Closest approach, TDB; None for a scripted encounter.
+    distance : Quantity
+        Distance between the centres at closest approach; of the unhindered orbit if it hits the planet.
+    v_inf : Quantity
+        Speed far from the planet, of the two-body orbit at closest approach; 0 for a bound one.
+    v_periapsis : Quantity
+        Relative speed at closest approach.
+    start_distance : Quantity
+        Distance at which the encounter starts, inbound.
+    impact : bool
+        Whether the orbit reaches the atmosphere or the surface.
+    impact_level : str or None
+        ``"surface"``, ``"atmosphere"`` (passes above the surface but below its top) or None.
+    impact_time : float or None
+        First contact with the top of the atmosphere (surface, if there is none), s from closest approach.
+    frame : str
+        ``"periapsis"``: x from the planet's centre toward periapsis, z along the orbital angular momentum;
+        or ``"ICRF"``. The planet is the origin of both.
+    forces : tuple of str
+        What moves the asteroid and what makes its tide.
+    left_out : tuple of (str, float)
+        What was left out, each with its estimated largest share: of the tide, or of the acceleration where
+        the name says "orbit".
+    tide_error : float
+        Largest difference between the stored tide and the exact one at points between the nodes, over the
+        peak of the tide.
+    t_start, t_stop : float
+        Start, and orbit back at `start_distance` plus the time to settle, s from closest approach.
+    t_periapsis : float
+        Zero.
+    tide : TidePanels
+        Tidal tensor in `frame` against s from closest approach, from `t_start` to 100 h after `t_stop`.
+    """
+
+    planet: Planet
+    time: Time | None
+    distance: Quantity
+    v_inf: Quantity
+    v_periapsis: Quantity
+    start_distance: Quantity
+    impact: bool
+    impact_level: str | None
+    impact_time: float | None
+    frame: str
+    forces: tuple[str, ...]
+    left_out: tuple[tuple[str, float], ...]
+    tide_error: float
+    t_start: float
+    t_stop: float
+    tide: TidePanels = field(repr=False)
+    track: Track = field(repr=False)
+    t_periapsis: float = 0.0
+
+    def position(self, t: Array | float) -> Array:
+        """Asteroid from the planet's centre, m, shape (n, 3), in `frame`, ``t`` s from closest approach."""
+        return self.track.states(np.atleast_1d(np.asarray(t, dtype=float)))[:, :3]
+
+    def velocity(self, t: Array | float) -> Array:
+        """Velocity relative to the planet, m/s, shape (n, 3), in `frame`, ``t`` s from closest approach."""
+        return self.track.states(np.atleast_1d(np.asarray(t, dtype=float)))[:, 3:]
+
+    def radius(self, t: Array | float) -> Array:
+        """Distance from the planet's centre, m, shape (n,), at ``t`` s from closest approach."""
+        return np.sqrt(np.sum(self.position(t) ** 2, axis=1))
+
+    @classmethod
+    def hyperbolic(
+        cls,
+        planet: str | Planet,
+        periapsis: Quantity,
+        v_inf: Quantity,
+        start_distance: Quantity | None = None,
+        settle: Quantity = 4 * u.h,
+        j2: bool = False,
+        pole: tuple[float, float, float] = (0.0, 0.0, 1.0),
+    ) -> Encounter:
+        """Scripted encounter on a two-body hyperbola, or parabola if ``v_inf`` is zero.
+
+        Parameters
+        ----------
+        planet : str or Planet
+            The body encountered.
+        periapsis : Quantity
+            Distance of closest approach from the planet's centre; inside the planet it is an impact, not
+            an error.
+        v_inf : Quantity
+            Speed far from the planet, zero or more.
+        start_distance : Quantity, optional
+            Where the encounter starts; 10 planet radii by default, or 10 periapsis distances if larger.
+        settle : Quantity
+            Time added after the orbit is back at `start_distance`.
+        j2 : bool
+            Whether the planet's J2 adds to the tide. The orbit stays a two-body one.
+        pole : tuple of float
+            Direction of the planet's pole in the frame of the encounter, for `j2`; an equatorial prograde
+            orbit by default.
+
+        Raises
+        ------
+        UnitMismatch, InvalidInput, UnknownName
+            For a bad argument, with its value.
+        """
+        body = _planet(planet)
+        q = to_si(periapsis, u.m, "periapsis", low=0.0, open_low=True)
+        v = to_si(v_inf, u.m / u.s, "v_inf", low=0.0)
+        wait = to_si(settle, u.s, "settle", low=0.0)
+        if start_distance is None:
+            start = 10.0 * max(body.radius, q)
+        else:
+            start = to_si(start_distance, u.m, "start_distance")
+            if start <= q:
+                raise InvalidInput("start_distance", start_distance, f"more than the periapsis, {periapsis}")
+        axis = _unit_vector(pole)
+
+        f = q * v * v / body.gm
+        speed = np.sqrt(body.gm * (2.0 + f) / q)
+        track = KeplerTrack(body.gm, q, f)
+        half = time_at_distance(body.gm, q, f, start)
+        level = body.impact_level(q)
+        entry = None
+        if level is not None:
+            entry = -float(time_at_distance(body.gm, q, f, min(body.impact_distance, start)))
+
+        def tide(t: Array) -> Array:
+            out = np.zeros((t.size, 6))
+            planet_tide(body.gm, body.j2 if j2 else 0.0, body.radius, axis, track.states(t)[:, :3], out)
+            return out
+
+        stop = half + wait
+        panels, error = tide_panels(tide, -half, stop + TAIL, q / speed)
+        forces = [f"{body.name} point mass"] + ([f"{body.name} J2 (tide only)"] if j2 else [])
+        return cls(
+            planet=body,
+            time=None,
+            distance=(q * u.m).to(u.km),
+            v_inf=(v * u.m / u.s).to(u.km / u.s),
+            v_periapsis=(speed * u.m / u.s).to(u.km / u.s),
+            start_distance=(start * u.m).to(u.km),
+            impact=level is not None,
+            impact_level=level,
+            impact_time=entry,
+            frame="periapsis",
+            forces=tuple(forces),
+            left_out=_left_out(body, q, j2),
+            tide_error=error,
+            t_start=-float(half),
+            t_stop=float(stop),
+            tide=panels,
+            track=track,
+        )
+
+
+def _planet(name: str | Planet) -> Planet:
+    return planet(name)
+
+
+def _unit_vector(pole: tuple[float, float, float]) -> Array:
+    try:
+        axis = np.asarray(pole, dtype=float)
+        norm = float(np.linalg.norm(axis))
+    except (TypeError, ValueError):
+        norm = 0.0
+    if not (np.isfinite(norm) and norm > 0.0 and axis.shape == (3,)):
+        raise InvalidInput("pole", pole, "a direction: three finite numbers, not all zero")
+    return axis / norm
+
+
+def _left_out(body: Planet, q: float, j2: bool) -> tuple[tuple[str, float], ...]:
+    """What a two-body encounter leaves out, each with its share at periapsis.
+
+    J2: at most 6 J2 (a/q)^2 of the tide (over the pole) and 3 J2 (a/q)^2 of the acceleration. A source GM'
+    at distance d: (GM'/GM) (q/d)^3 of both.
+    """
+    flat = body.j2 * (body.radius / q) ** 2
+    out = [("orbit: " + body.name + " J2", 3.0 * flat)]
+    if not j2:
+        out.append((f"{body.name} J2", 6.0 * flat))
+    if body.orbit_radius > 0.0:
+        out.append(("sun", PLANETS["sun"].gm / body.gm * (q / body.orbit_radius) ** 3))
+    pair = {"earth": "moon", "moon": "earth"}.get(body.name)
+    if pair is not None:
+        out.append((pair, PLANETS[pair].gm / body.gm * (q / 3.844e8) ** 3))
+    return tuple(out)

@@ -1,0 +1,153 @@
+"""The bodies that an asteroid can meet: mass, figure, pole and the height where a passage becomes an impact.
+
+A new body is one new entry in ``_TABLE``.
+
+Sources
+-------
+GM: DE440 (Park et al. 2021), the planet alone, not its system, for Mars outwards (JPL satellite
+ephemerides: MAR097, JUP365, SAT427, URA111, NEP095); Earth: IERS 2010.
+Radius and pole: IAU Working Group on Cartographic Coordinates and Rotational Elements 2009 and 2015
+(Archinal et al. 2011, 2018), equatorial radii, pole at J2000; Earth: WGS 84; Sun: IAU 2015 Resolution B3.
+J2: Mercury: Mazarico et al. 2014; Venus: Konopliv et al. 1999; Earth, Moon, Sun: DE440; Mars: Konopliv et
+al. 2016; Jupiter: Iess et al. 2018; Saturn: Iess et al. 2019; Uranus: Jacobson 2014; Neptune: Jacobson
+2009. Each is scaled to the radius of the table.
+Atmosphere: Earth: Karman line (FAI); Venus, Mars, Jupiter: entry interfaces of the Pioneer Venus
+probes (200 km), of the Mars landers (125 km) and of the Galileo probe (450 km above 1 bar). Saturn,
+Uranus and Neptune have none agreed: the 1-bar radius counts.
+"""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass
+
+import astropy.units as u
+import numpy as np
+from astropy.units import Quantity
+
+from flybystab.constants import AU, GM_EARTH, R_EARTH
+from flybystab.errors import InvalidInput, UnknownName
+
+
+@dataclass(frozen=True)
+class Planet:
+    """A body of the solar system, SI units.
+
+    Attributes
+    ----------
+    name : str
+        Lower-case English name.
+    gm : float
+        Gravitational parameter, m3/s2.
+    radius : float
+        Equatorial radius, m; 1-bar level for the giant planets.
+    j2 : float
+        Second zonal harmonic for `radius`, dimensionless.
+    pole : tuple of float
+        Unit vector of the rotation pole at J2000, ICRF.
+    atmosphere : float
+        Height above `radius` that counts as the top of the atmosphere, m; zero without one.
+    target : int
+        NAIF number of the ephemeris target (a system barycentre from Mars outwards).
+    orbit_radius : float
+        Mean distance from the Sun (Moon: from the Earth's orbit's centre, too), m; zero for the Sun.
+    """
+
+    name: str
+    gm: float
+    radius: float
+    j2: float
+    pole: tuple[float, float, float]
+    atmosphere: float
+    target: int
+    orbit_radius: float
+
+    @property
+    def impact_distance(self) -> float:
+        """Distance from the centre below which a passage is an impact, m: atmosphere or surface."""
+        return self.radius + self.atmosphere
+
+    def impact_level(self, distance: float) -> str | None:
+        """What a passage at `distance` (m) reaches: ``"surface"``, ``"atmosphere"`` or None."""
+        if distance < self.radius:
+            return "surface"
+        return "atmosphere" if distance < self.impact_distance else None
+
+
+def _direction(ra: float, dec: float) -> tuple[float, float, float]:
+    """Unit vector of right ascension and declination in degrees."""
+    a, d = np.radians(ra), np.radians(dec)
+    return float(np.cos(d) * np.cos(a)), float(np.cos(d) * np.sin(a)), float(np.sin(d))
+
+
+# name: GM (km3/s2), radius (km), J2, pole (ra, dec; deg), atmosphere (km), NAIF target, orbit radius (au)
+_TABLE: dict[str, tuple[float, float, float, tuple[float, float], float, int, float]] = {
+    "sun": (132712440041.279419, 695700.0, 2.1961e-7, (286.13, 63.87), 0.0, 10, 0.0),
+    "mercury": (22031.868551, 2440.53, 5.0322e-5, (281.0103, 61.4155), 0.0, 1, 0.387098),
+    "venus": (324858.592, 6051.8, 4.4044e-6, (272.76, 67.16), 200.0, 2, 0.723332),
+    "earth": (GM_EARTH * 1e-9, R_EARTH * 1e-3, 1.08262539e-3, (0.0, 90.0), 100.0, 399, 1.000001),
+    "moon": (
+        4902.800118,
+        1737.4,
+        2.03215685e-4 * (1738.0 / 1737.4) ** 2,
+        (266.93, 65.65),
+        0.0,
+        301,
+        1.000001,
+    ),
+    "mars": (42828.37362, 3396.19, 1.9566e-3, (317.68143, 52.88650), 125.0, 4, 1.523679),
+    "jupiter": (126686531.9, 71492.0, 1.4696572e-2, (268.056595, 64.495303), 450.0, 5, 5.202603),
+    "saturn": (
+        37931206.234,
+        60268.0,
+        1.6290573e-2 * (60330.0 / 60268.0) ** 2,
+        (40.589, 83.537),
+        0.0,
+        6,
+        9.554909,
+    ),
+    "uranus": (5793951.256, 25559.0, 3.51068e-3, (257.311, -15.175), 0.0, 7, 19.218446),
+    "neptune": (
+        6835099.97,
+        24764.0,
+        3.40843e-3 * (25225.0 / 24764.0) ** 2,
+        (299.334, 42.950),
+        0.0,
+        8,
+        30.110387,
+    ),
+}
+
+#: Every body that :func:`planet` knows, by name.
+PLANETS: dict[str, Planet] = {
+    name: Planet(name, gm * 1e9, r * 1e3, j2, _direction(*pole), h * 1e3, target, au * AU)
+    for name, (gm, r, j2, pole, h, target, au) in _TABLE.items()
+}
+
+
+def planet(name: str | Planet) -> Planet:
+    """The body of that name.
+
+    Parameters
+    ----------
+    name : str or Planet
+        English name, any case; a `Planet` is returned as it is, so that a made-up one can be used.
+
+    Raises
+    ------
+    UnknownName
+        With near matches.
+    """
+    if isinstance(name, Planet):
+        return name
+    if not isinstance(name, str):
+        raise InvalidInput("planet", name, "the name of a planet or a Planet")
+    key = name.strip().lower()
+    if key in PLANETS:
+        return PLANETS[key]
+    near = difflib.get_close_matches(key, list(PLANETS), n=3, cutoff=0.5)
+    raise UnknownName("planet", name, near, known=f"(known: {', '.join(PLANETS)})")
+
+
+#: Equatorial radius of the Earth as a Quantity.
+R_earth: Quantity = R_EARTH * u.m
