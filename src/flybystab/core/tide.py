@@ -78,8 +78,8 @@ def tide_j2(
     """Add to ``out[6]`` the tide of the J2 of a planet at ``(x, y, z)`` (m) from the body, s^-2.
 
     ``(px, py, pz)`` is the unit vector of the planet's pole. With the field point at ``r`` from the
-    planet and ``s = r.p``, the potential is ``c (1/r^3 - 3 s^2/r^5)``, ``c = GM J2 a^2 / 2``; this is the
-    Hessian of its negative, the tensor that multiplies a displacement.
+    planet and ``s = r.p``, the force function (minus the potential) is ``c (1/r^3 - 3 s^2/r^5)``,
+    ``c = GM J2 a^2 / 2``; this is its Hessian, the tensor that multiplies a displacement.
     """
     c = 0.5 * gm * j2 * radius * radius
     r2 = x * x + y * y + z * z
@@ -95,12 +95,12 @@ def tide_j2(
     b = -3.0 * i5 + 15.0 * s * s * i7
     d = -6.0 * i5
     e = 30.0 * s * i7
-    out[0] -= c * (a * rx * rx + b + d * px * px + 2.0 * e * px * rx)
-    out[1] -= c * (a * ry * ry + b + d * py * py + 2.0 * e * py * ry)
-    out[2] -= c * (a * rz * rz + b + d * pz * pz + 2.0 * e * pz * rz)
-    out[3] -= c * (a * rx * ry + d * px * py + e * (px * ry + rx * py))
-    out[4] -= c * (a * rx * rz + d * px * pz + e * (px * rz + rx * pz))
-    out[5] -= c * (a * ry * rz + d * py * pz + e * (py * rz + ry * pz))
+    out[0] += c * (a * rx * rx + b + d * px * px + 2.0 * e * px * rx)
+    out[1] += c * (a * ry * ry + b + d * py * py + 2.0 * e * py * ry)
+    out[2] += c * (a * rz * rz + b + d * pz * pz + 2.0 * e * pz * rz)
+    out[3] += c * (a * rx * ry + d * px * py + e * (px * ry + rx * py))
+    out[4] += c * (a * rx * rz + d * px * pz + e * (px * rz + rx * pz))
+    out[5] += c * (a * ry * rz + d * py * pz + e * (py * rz + ry * pz))
 
 
 @kernel
