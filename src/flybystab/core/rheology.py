@@ -109,7 +109,7 @@ def required_friction(code: int, cohesion: float, s: float, p: float, det: float
             tan2 = (9.0 - 1.5 * k * k - 9.0 * i3) / (8.0 * i3)
             return np.arctan(np.sqrt(max(0.0, tan2)))
         low = 0.0
-        high = 0.5 * np.pi * (1.0 - 1e-7)  # tan^2 must stay finite
+        high = 0.5 * np.pi * (1.0 - 1e-4)  # tan^2 must stay finite
         if not _bears(code, high, cohesion, s, p, det):
             return np.inf
         for _ in range(100):

@@ -1,0 +1,344 @@
+"""Equations of motion of the homogeneous ellipsoid in each regime (theory, sections 2 and 3).
+
+Kernels work in the units of the body: length ``a0 = (a1 a2 a3)^(1/3)``, time ``1/sqrt(pi G rho0)`` at the
+initial density, stress in the form ``T = 5 sigma/rho``. Then ``det S = (V/V0)^2`` and self-gravity is
+``K_g = -2 (V0/V) A(S)``. Two states:
+
+RIGID, 7 numbers: unit quaternion (body axes -> fixed frame, scalar first), ``omega`` along the body axes.
+Every other regime, 15 numbers, fixed frame: ``S`` (6 components), ``D = sym L`` (6), ``w`` with ``W x = w x x``.
+
+The parameters of a run are one flat array, see ``SIN_PHI`` and the constants below it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flybystab.core.ellipsoid import gravity_coefficients
+from flybystab.core.jit import kernel
+from flybystab.core.rheology import slope_over_sine
+from flybystab.core.tensors import eigensystem, inverse, multiply, pack, unpack
+from flybystab.core.tide import TidePanels, tide_at
+
+Array = NDArray[np.float64]
+
+RIGID = 0
+FLOWING = 1
+DISPERSED = 2
+FLUID = 3
+
+# Slots of the parameter array.
+SURFACE = 0  # code of the yield surface
+SIN_PHI = 1
+COS_PHI = 2
+BETA = 3  # dilatancy beta (not beta over k)
+COHESION = 4  # 5 Y/rho0 in units of a0^2 pi G rho0
+VISCOSITY = 5  # 5 (2 mu)/rho0 in units of a0^2 sqrt(pi G rho0), FLUID only
+EXPANSION = 6  # V/V0 at which dilation has ended
+S1 = 7  # squared semi-axes of the rigid body, and its gravity K_g,i
+S2 = 8
+S3 = 9
+G1 = 10
+G2 = 11
+G3 = 12
+N_PARAMETERS = 13
+
+# Rows of the (12, 3, 3) work array that `field` fills and the rates read.
+W_SINV = 0
+W_K = 1  # K_g + K_t
+W_L = 2
+W_R = 3  # K_g + K_t - L^2
+W_S = 4
+W_N = 5  # unit deviator of D
+W_A = 6
+W_B = 7
+W_VECTORS = 8
+W_SCRATCH = 9  # row 0: eigenvalues; row 1: V/V0, k (kP + kc), P
+N_WORK = 12
+
+
+@kernel
+def rotation_matrix(q: Array, m: Array) -> None:
+    """Rotation matrix ``m[3, 3]`` (body -> fixed) of a quaternion that need not be normalised."""
+    w, x, y, z = q[0], q[1], q[2], q[3]
+    s = 2.0 / (w * w + x * x + y * y + z * z)
+    m[0, 0] = 1.0 - s * (y * y + z * z)
+    m[1, 1] = 1.0 - s * (x * x + z * z)
+    m[2, 2] = 1.0 - s * (x * x + y * y)
+    m[0, 1] = s * (x * y - w * z)
+    m[1, 0] = s * (x * y + w * z)
+    m[0, 2] = s * (x * z + w * y)
+    m[2, 0] = s * (x * z - w * y)
+    m[1, 2] = s * (y * z - w * x)
+    m[2, 1] = s * (y * z + w * x)
+
+
+@kernel
+def rotated_to_body(q: Array, k: Array, m: Array, out: Array) -> None:
+    """Components ``out[6]`` along the body axes of a fixed-frame tensor ``k[6]``; `m` is scratch (3, 3)."""
+    rotation_matrix(q, m)
+    for a in range(3):
+        # row a of m^T K
+        u0 = m[0, a] * k[0] + m[1, a] * k[3] + m[2, a] * k[4]
+        u1 = m[0, a] * k[3] + m[1, a] * k[1] + m[2, a] * k[5]
+        u2 = m[0, a] * k[4] + m[1, a] * k[5] + m[2, a] * k[2]
+        out[a] = u0 * m[0, a] + u1 * m[1, a] + u2 * m[2, a]
+        if a == 0:
+            out[3] = u0 * m[0, 1] + u1 * m[1, 1] + u2 * m[2, 1]
+            out[4] = u0 * m[0, 2] + u1 * m[1, 2] + u2 * m[2, 2]
+        elif a == 1:
+            out[5] = u0 * m[0, 2] + u1 * m[1, 2] + u2 * m[2, 2]
+
+
+@kernel
+def rigid_rate(t: float, y: Array, dy: Array, par: Array, tide: TidePanels, work: Array) -> None:
+    """Euler's equations with the tidal torque.
+
+    ``Omegadot_ij = (K - Omega^2)_ij (S_j - S_i)/(S_i + S_j)`` along the body axes, the antisymmetric part
+    of ``(Omegadot + Omega^2) S = K S - T``; the quaternion turns at ``qdot = q omega / 2``.
+    """
+    kt = work[W_A, 0:2].reshape(6)
+    kb = work[W_B, 0:2].reshape(6)
+    tide_at(tide.tau, tide.start, tide.width, tide.coefficients, t, kt)
+    rotated_to_body(y, kt, work[W_N], kb)
+    w0, w1, w2 = y[4], y[5], y[6]
+    s1, s2, s3 = par[S1], par[S2], par[S3]
+    # omega_1 = Omega_32, omega_2 = Omega_13, omega_3 = Omega_21, (Omega^2)_ij = omega_i omega_j for i != j
+    dy[4] = (kb[5] - w1 * w2) * (s2 - s3) / (s2 + s3)
+    dy[5] = (kb[4] - w0 * w2) * (s3 - s1) / (s3 + s1)
+    dy[6] = (kb[3] - w0 * w1) * (s1 - s2) / (s1 + s2)
+    dy[0] = 0.5 * (-y[1] * w0 - y[2] * w1 - y[3] * w2)
+    dy[1] = 0.5 * (y[0] * w0 + y[2] * w2 - y[3] * w1)
+    dy[2] = 0.5 * (y[0] * w1 + y[3] * w0 - y[1] * w2)
+    dy[3] = 0.5 * (y[0] * w2 + y[1] * w1 - y[2] * w0)
+
+
+@kernel
+def rigid_stress_components(kb: Array, w: Array, s: Array, g: Array, out: Array) -> None:
+    """Stress ``T[6]`` that rigidity needs, along the body axes.
+
+    ``T_ij = (K - Omega^2)_ij 2 S_i S_j/(S_i + S_j)``: the symmetric part of ``(K - Omegadot - Omega^2) S`` once
+    Omegadot obeys Euler. ``kb[6]`` tide, ``w[3]`` spin, ``s[3]`` squared semi-axes, ``g[3]`` self-gravity.
+    """
+    w2 = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
+    # Omega^2 = w w - w^2 1
+    out[0] = (g[0] + kb[0] - w[0] * w[0] + w2) * s[0]
+    out[1] = (g[1] + kb[1] - w[1] * w[1] + w2) * s[1]
+    out[2] = (g[2] + kb[2] - w[2] * w[2] + w2) * s[2]
+    out[3] = (kb[3] - w[0] * w[1]) * 2.0 * s[0] * s[1] / (s[0] + s[1])
+    out[4] = (kb[4] - w[0] * w[2]) * 2.0 * s[0] * s[2] / (s[0] + s[2])
+    out[5] = (kb[5] - w[1] * w[2]) * 2.0 * s[1] * s[2] / (s[1] + s[2])
+
+
+@kernel
+def invariants(c: Array, unit: Array) -> tuple[float, float, float]:
+    """Pressure, norm of the deviator and determinant of the unit deviator of ``c[6]``; ``unit[6]`` is set."""
+    p = -(c[0] + c[1] + c[2]) / 3.0
+    a, b, d = c[0] + p, c[1] + p, c[2] + p
+    norm = np.sqrt(a * a + b * b + d * d + 2.0 * (c[3] * c[3] + c[4] * c[4] + c[5] * c[5]))
+    if norm == 0.0:
+        unit[:] = 0.0
+        return p, 0.0, 0.0
+    i = 1.0 / norm
+    unit[0], unit[1], unit[2] = a * i, b * i, d * i
+    unit[3], unit[4], unit[5] = c[3] * i, c[4] * i, c[5] * i
+    det = (
+        unit[0] * (unit[1] * unit[2] - unit[5] * unit[5])
+        - unit[3] * (unit[3] * unit[2] - unit[5] * unit[4])
+        + unit[4] * (unit[3] * unit[5] - unit[1] * unit[4])
+    )
+    return p, norm, det
+
+
+@kernel
+def yield_excess(p: float, norm: float, det: float, volume: float, par: Array) -> float:
+    """``|s| - k (p + Y cot phi)`` in the form of ``T``: positive where the rigid stress is not admissible."""
+    g = slope_over_sine(int(par[SURFACE]), par[SIN_PHI], det)
+    return norm - g * (p * par[SIN_PHI] + par[COHESION] * volume * par[COS_PHI])
+
+
+@kernel
+def rigid_excess(
+    t: float, y: Array, par: Array, tide: TidePanels, work: Array, stress: Array
+) -> tuple[float, float, float, float]:
+    """Yield excess, pressure, deviator norm and unit determinant of a RIGID state; sets ``stress[6]`` (body axes)."""
+    kt = work[W_A, 0:2].reshape(6)
+    kb = work[W_B, 0:2].reshape(6)
+    tide_at(tide.tau, tide.start, tide.width, tide.coefficients, t, kt)
+    rotated_to_body(y, kt, work[W_N], kb)
+    rigid_stress_components(kb, y[4:7], par[S1 : S3 + 1], par[G1 : G3 + 1], stress)
+    p, norm, det = invariants(stress, kt)
+    # The rigid body keeps the volume sqrt(s1 s2 s3) that it has.
+    volume = np.sqrt(par[S1] * par[S2] * par[S3])
+    return yield_excess(p, norm, det, volume, par), p, norm, det
+
+
+@kernel
+def set_rigid_shape(s1: float, s2: float, s3: float, par: Array) -> None:
+    """Store the squared semi-axes of the rigid body and its self-gravity ``K_g,i = -2 (V0/V) A_i``."""
+    a1, a2, a3 = gravity_coefficients(s1, s2, s3)
+    c = -2.0 / np.sqrt(s1 * s2 * s3)
+    par[S1], par[S2], par[S3] = s1, s2, s3
+    par[G1], par[G2], par[G3] = c * a1, c * a2, c * a3
+
+
+@kernel
+def field(t: float, y: Array, tide: TidePanels, work: Array) -> None:
+    """Fill the parts of `work` that depend on ``t`` and ``S`` only: ``S``, ``S^-1``, ``K_g + K_t``, volume."""
+    scratch = work[W_SCRATCH]
+    values = scratch[0]
+    vectors = work[W_VECTORS]
+    unpack(y[0:6], work[W_S])
+    det = inverse(y[0:6], work[W_SINV])
+    volume = np.sqrt(det)
+    scratch[1, 0] = volume
+    eigensystem(y[0:6], values, vectors)
+    a1, a2, a3 = gravity_coefficients(values[0], values[1], values[2])
+    c = -2.0 / volume
+    k = work[W_K]
+    for i in range(3):
+        for j in range(i, 3):
+            k[i, j] = k[j, i] = c * (
+                a1 * vectors[i, 0] * vectors[j, 0]
+                + a2 * vectors[i, 1] * vectors[j, 1]
+                + a3 * vectors[i, 2] * vectors[j, 2]
+            )
+    kt = work[W_A, 0:2].reshape(6)
+    tide_at(tide.tau, tide.start, tide.width, tide.coefficients, t, kt)
+    unpack(kt, work[W_B])
+    k += work[W_B]
+
+
+@kernel
+def dilatancy(volume: float, par: Array) -> tuple[float, float]:
+    """``beta`` and ``d beta/dV`` at ``V/V0``: constant, then faded to zero where the material is loosest.
+
+    The fade is a cubic over the last tenth of the allowed expansion: a critical state reached smoothly.
+    """
+    beta = par[BETA]
+    end = par[EXPANSION]
+    begin = end - 0.1 * (end - 1.0)
+    if beta == 0.0 or volume <= begin:
+        return beta, 0.0
+    if volume >= end:
+        return 0.0, 0.0
+    x = (volume - begin) / (end - begin)
+    return beta * (1.0 - x * x * (3.0 - 2.0 * x)), -beta * 6.0 * x * (1.0 - x) / (end - begin)
+
+
+@kernel
+def deformation_rate(regime: int, y: Array, dy: Array, par: Array, work: Array) -> float:
+    """Rate of the 15 numbers, given `field`; returns the denominator of the pressure (FLOWING), else 1.
+
+    ``Ldot = R - T S^-1``, ``R = K - L^2``, ``T = -P 1 + (k P + k c) Dhat``. With ``B = 1 - beta Dhat`` the
+    pressure that keeps ``tr D = beta |D'|`` is
+
+        P = [betadot |D'| - B:R + k c B:(Dhat S^-1)] / [B:((1 - k Dhat) S^-1)].
+    """
+    d = y[6:12]
+    w0, w1, w2 = y[12], y[13], y[14]
+    big_l = work[W_L]
+    unpack(d, big_l)
+    big_l[0, 1] -= w2
+    big_l[1, 0] += w2
+    big_l[0, 2] += w1
+    big_l[2, 0] -= w1
+    big_l[1, 2] -= w0
+    big_l[2, 1] += w0
+    r = work[W_R]
+    multiply(big_l, big_l, r)
+    for i in range(3):
+        for j in range(3):
+            r[i, j] = work[W_K, i, j] - r[i, j]
+    s = work[W_S]
+    a = work[W_A]
+    multiply(big_l, s, a)
+    # Sdot = L S + S L^T
+    dy[0] = 2.0 * a[0, 0]
+    dy[1] = 2.0 * a[1, 1]
+    dy[2] = 2.0 * a[2, 2]
+    dy[3] = a[0, 1] + a[1, 0]
+    dy[4] = a[0, 2] + a[2, 0]
+    dy[5] = a[1, 2] + a[2, 1]
+    sinv = work[W_SINV]
+    volume = work[W_SCRATCH, 1, 0]
+    trace_sinv = sinv[0, 0] + sinv[1, 1] + sinv[2, 2]
+    trace_d = d[0] + d[1] + d[2]
+    trace_r = r[0, 0] + r[1, 1] + r[2, 2]
+    n = work[W_N]
+    b = work[W_B]
+    denominator = 1.0
+    pressure = 0.0
+    strength = 0.0  # k P + k c: norm of the deviatoric stress
+    if regime == FLOWING:
+        unit = work[W_SCRATCH + 1, 0:2].reshape(6)
+        _, norm, det = invariants(d, unit)
+        unpack(unit, n)
+        g = slope_over_sine(int(par[SURFACE]), par[SIN_PHI], det)
+        k = g * par[SIN_PHI]
+        kc = g * par[COS_PHI] * par[COHESION] * volume
+        beta, dbeta = dilatancy(volume, par)
+        multiply(n, sinv, b)
+        n_sinv = b[0, 0] + b[1, 1] + b[2, 2]
+        nn_sinv = 0.0
+        n_r = 0.0
+        for i in range(3):
+            for j in range(3):
+                nn_sinv += n[i, j] * b[i, j]
+                n_r += n[i, j] * r[i, j]
+        denominator = trace_sinv - (k + beta) * n_sinv + k * beta * nn_sinv
+        numerator = dbeta * volume * trace_d * norm - trace_r + beta * n_r + kc * (n_sinv - beta * nn_sinv)
+        pressure = numerator / denominator
+        strength = k * pressure + kc
+        for i in range(3):
+            for j in range(3):
+                r[i, j] += pressure * sinv[i, j] - strength * b[i, j]
+    elif regime == FLUID:
+        mu = par[VISCOSITY] * volume
+        unpack(d, n)
+        for i in range(3):
+            n[i, i] -= trace_d / 3.0
+        multiply(n, sinv, b)
+        pressure = (mu * (b[0, 0] + b[1, 1] + b[2, 2]) - trace_r) / trace_sinv
+        strength = mu
+        for i in range(3):
+            for j in range(3):
+                r[i, j] += pressure * sinv[i, j] - mu * b[i, j]
+    pack(r, dy[6:12])
+    dy[12] = 0.5 * (r[2, 1] - r[1, 2])
+    dy[13] = 0.5 * (r[0, 2] - r[2, 0])
+    dy[14] = 0.5 * (r[1, 0] - r[0, 1])
+    work[W_SCRATCH, 1, 1] = strength
+    work[W_SCRATCH, 1, 2] = pressure
+    return denominator
+
+
+@kernel
+def rate(regime: int, t: float, y: Array, dy: Array, par: Array, tide: TidePanels, work: Array) -> float:
+    """Rate of the state in any regime; returns the denominator of the pressure where there is one."""
+    if regime == RIGID:
+        rigid_rate(t, y, dy, par, tide, work)
+        return 1.0
+    field(t, y, tide, work)
+    return deformation_rate(regime, y, dy, par, work)
+
+
+@kernel
+def angular_momentum(y: Array, work: Array, h: Array) -> None:
+    """Angular momentum ``H = axial(L S - S L^T)`` about the centre, per ``m/5``, of a 15-number state."""
+    big_l = work[W_L]
+    unpack(y[6:12], big_l)
+    big_l[0, 1] -= y[14]
+    big_l[1, 0] += y[14]
+    big_l[0, 2] += y[13]
+    big_l[2, 0] -= y[13]
+    big_l[1, 2] -= y[12]
+    big_l[2, 1] += y[12]
+    unpack(y[0:6], work[W_S])
+    multiply(big_l, work[W_S], work[W_A])
+    a = work[W_A]
+    # H = int rho x x (L x) = axial vector of (L I) - (L I)^T
+    h[0] = a[2, 1] - a[1, 2]
+    h[1] = a[0, 2] - a[2, 0]
+    h[2] = a[1, 0] - a[0, 1]
