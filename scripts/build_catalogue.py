@@ -198,7 +198,7 @@ class Sources:
         self.literature = {r["key"]: r for r in rows(HERE / "literature.csv")}
 
     def selection(self) -> list[str]:
-        """Every body with a measured size, a trusted period and a full-precision orbit, and the famous ones."""
+        """Bodies with a measured size, a trusted period and a full-precision orbit, and the famous ones."""
         chosen = set(self.literature)
         for key, r in self.lcdb.items():
             trusted = r["U"] in ("2+", "3-", "3") and r["PFlag"] == "-"
