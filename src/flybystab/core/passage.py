@@ -96,6 +96,7 @@ def passage(
     t_stop: float,
     tide: TidePanels,
     *,
+    t_rest: float | None = None,
     phi: float,
     cohesion: float = 0.0,
     dilatancy: float = 0.0,
@@ -118,6 +119,8 @@ def passage(
         Rotation matrix, body axes -> frame of the tide.
     t_start, t_stop : float
         Span, s, on the clock of the tide.
+    t_rest : float, optional
+        A body that is rigid at or after this time ends the run; `t_stop` by default.
     tide : TidePanels
         SI.
     phi, cohesion, dilatancy, surface, brittle, expansion
@@ -146,6 +149,7 @@ def passage(
     reason, t, regime = regimes.follow(
         t_start / t0,
         t_stop / t0,
+        (t_stop if t_rest is None else t_rest) / t0,
         motion.RIGID,
         y,
         par,

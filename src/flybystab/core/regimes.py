@@ -693,6 +693,7 @@ def quaternion(m: Array, q: Array) -> None:
 def follow(
     t: float,
     t1: float,
+    t_rest: float,
     regime: int,
     y: Array,
     par: Array,
@@ -711,8 +712,9 @@ def follow(
 
     Parameters
     ----------
-    t, t1 : float
-        Start and end, in dynamical times, on the clock of the tide.
+    t, t1, t_rest : float
+        Start and end, in dynamical times, on the clock of the tide; a body that is rigid at or after `t_rest`
+        ends the run there.
     regime : int
         RIGID (``y[:7]``), FLOWING, DISPERSED or FLUID (``y[:15]``) at the start.
     y : ndarray (15,)
@@ -749,7 +751,7 @@ def follow(
             reason = STUCK
             break
         if regime == RIGID:
-            reason, t = follow_rigid(t, t1, par, tide, tol, unyielding, max_steps, ws, hist, count)
+            reason, t = follow_rigid(t, min(t1, t_rest), par, tide, tol, unyielding, max_steps, ws, hist, count)
             if reason != ONSET:
                 break
             if brittle:
