@@ -108,10 +108,17 @@ def required_friction(code: int, cohesion: float, s: float, p: float, det: float
                 return np.inf
             tan2 = (9.0 - 1.5 * k * k - 9.0 * i3) / (8.0 * i3)
             return np.arctan(np.sqrt(max(0.0, tan2)))
-        low = 0.0
-        high = 0.5 * np.pi * (1.0 - 1e-4)  # tan^2 must stay finite
-        if not _bears(code, high, cohesion, s, p, det):
+        # Cohesion counts for less as phi grows, so that a stress may be borne on an interval of phi only.
+        if _bears(code, 0.0, cohesion, s, p, det):
+            return 0.0
+        step = 0.5 * np.pi * (1.0 - 1e-4) / 128.0  # tan^2 must stay finite
+        n = 1
+        while n <= 128 and not _bears(code, n * step, cohesion, s, p, det):
+            n += 1
+        if n > 128:
             return np.inf
+        low = (n - 1) * step
+        high = n * step
         for _ in range(100):
             mid = 0.5 * (low + high)
             if mid in (low, high):
@@ -134,7 +141,7 @@ def required_friction(code: int, cohesion: float, s: float, p: float, det: float
     if c <= b:
         return 0.0
     r = np.hypot(a, b)
-    if c > r:
+    if a <= 0.0 or c > r:  # a <= 0: the left side falls from b < c as phi grows
         return np.inf
     # r sin(phi + psi) = c, psi = atan2(b, a): the smaller root
     phi = np.arcsin(c / r) - np.arctan2(b, a)
