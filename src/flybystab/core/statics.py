@@ -1,8 +1,8 @@
 """Stress of a rigidly turning ellipsoid, and how much of a load a granular material bears.
 
-The volume-averaged stress that rigidity needs is ``sigma V = (K - Omegadot - Omega^2) I`` with ``K`` the sum of
-self-gravity ``-2 pi G rho A`` and any tide. It is symmetric once ``Omegadot`` obeys Euler's equations; in
-principal axes, with ``S = 5 I/m``,
+The volume-averaged stress that rigidity needs is ``sigma V = (K - Omegadot - Omega^2) I`` with ``K`` the
+sum of self-gravity ``-2 pi G rho A`` and any tide. It is symmetric once ``Omegadot`` obeys Euler's equations;
+in principal axes, with ``S = 5 I/m``,
 
     sigma_ij = (rho/5) (K - Omega^2)_ij 2 S_i S_j/(S_i + S_j)
 
@@ -26,9 +26,10 @@ Array = NDArray[np.float64]
 def rigid_stress(
     s1: float, s2: float, s3: float, rho: float, pi_g_rho: float, omega: Array, tide: Array, out: Array
 ) -> None:
-    """Write the stress ``out[6]`` (Pa) of a rigid ellipsoid turning at ``omega[3]`` (rad/s) in a ``tide[6]`` (s^-2).
+    """Write the stress ``out[6]`` (Pa) that rigidity needs at a spin ``omega[3]`` in a tide ``tide[6]``.
 
-    Everything is in principal axes; ``s_i`` are squared semi-axes (m2), `rho` the density (kg/m3) and
+    Everything is in principal axes: ``s_i`` squared semi-axes (m2), spin (rad/s), tide (s^-2), density `rho`
+    (kg/m3) and
     `pi_g_rho` is ``pi G rho`` (s^-2). Any other consistent units do as well.
     """
     a1, a2, a3 = gravity_coefficients(s1, s2, s3)
@@ -78,7 +79,7 @@ def overload(code: int, phi: float, cohesion: float, stress: Array) -> float:
 
 @kernel
 def demand(code: int, phi: float, cohesion: float, stress: Array) -> tuple[float, float]:
-    """Least friction angle (rad, at this `cohesion`) and least cohesion (at this `phi`) that bear a stress."""
+    """Least friction angle (rad, at `cohesion`) and least cohesion (at `phi`) that bear a stress."""
     p, s, det = invariants(stress)
     return required_friction(code, cohesion, s, p, det), required_cohesion(code, phi, s, p, det)
 
