@@ -125,6 +125,10 @@ class Asteroid:
         """The same asteroid of another material (None: unchanged)."""
         return self if material is None else replace(self, material=material)
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Without what was built from the row: it is rebuilt where it is needed.
+        return Asteroid, (dict(self.row), self.material, self.file)
+
     def __repr__(self) -> str:
         return f"<Asteroid {self.label}>"
 
@@ -280,8 +284,10 @@ class Asteroid:
         """Moments of inertia per mass (m2) of the ellipsoid, angular momentum per mass, L^2/(2E) per mass."""
         squares = self.semi_axes.value**2
         moments = (squares.sum() - squares) / 5.0
-        periods = [self._number(c) * 3600.0 for c in ("precession_period_h", "rotation_period_h")]
-        return moments, *tumbling_state(moments, *periods, self.row["tumbling_mode"])
+        precession, rotation = (
+            self._number(c) * 3600.0 for c in ("precession_period_h", "rotation_period_h")
+        )
+        return moments, *tumbling_state(moments, precession, rotation, self.row["tumbling_mode"])
 
     @property
     def pole(self) -> np.ndarray | None:
@@ -342,7 +348,7 @@ class Asteroid:
 
 def _find(asteroids: Sequence[Asteroid], name: str | int, where: str) -> Asteroid:
     """The asteroid with this name, or UnknownName with near matches."""
-    index = {}
+    index: dict[str, Asteroid] = {}
     for a in asteroids:
         for n in a.names:
             index.setdefault(key_of(n), a)
