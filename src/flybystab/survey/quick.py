@@ -10,8 +10,8 @@ tide of norm ``|K|`` changes ``T`` by at most ``S_1 |K|`` in any direction. It a
   ``d sqrt(X)/dt <= tau sqrt((J_3 - J_1)/J_1)``, which bounds the wobble.
 
 Both bound the change of ``w w``. If every stress within that distance ``d`` of the undisturbed one is inside
-the yield surface, ``|s| + d sqrt(1 + k^2/3) <= k (p + c)`` with the least ``k``, the body cannot yield: INTACT
-is proved without integrating anything. Where the test fails nothing is said, and the dynamics decides.
+the yield surface, ``|s| + d sqrt(1 + k^2/3) <= k (p + c)`` with the least ``k``, the body cannot yield:
+INTACT is proved without integrating anything. Where the test fails nothing is said; the dynamics decides.
 
 The unwanted opposite is proved the same way: a free body whose stress is outside the yield surface by more
 than the tide at the start can mend is not in equilibrium.
