@@ -1,8 +1,8 @@
 """The inelastic impulse with which a dispersed body comes back into contact (theory, section 3).
 
 ``Delta L = -That S^-1`` with ``That = Phat (-1 + k Dhat)``, ``Phat >= 0`` and ``Dhat`` along the deviatoric
-rate of strain afterwards, such that ``tr D = beta |D'|`` then. A symmetric ``That`` keeps the angular momentum; being
-opposed to the motion that it leaves, it never raises the kinetic energy.
+rate of strain afterwards, such that ``tr D = beta |D'|`` then. A symmetric ``That`` keeps the angular momentum;
+being opposed to the motion that it leaves, it never raises the kinetic energy.
 """
 
 from __future__ import annotations
@@ -14,14 +14,13 @@ from flybystab.core.jit import kernel
 from flybystab.core.motion import (
     SIN_PHI,
     SURFACE,
-    W_A,
     W_B,
     W_L,
     W_N,
     W_R,
     W_S,
-    W_SCRATCH,
     W_SINV,
+    Buffers,
     dilatancy,
     invariants,
 )
@@ -32,18 +31,18 @@ Array = NDArray[np.float64]
 
 
 @kernel
-def contact_impulse(y: Array, par: Array, work: Array) -> bool:
+def contact_impulse(y: Array, par: Array, work: Buffers) -> bool:
     """Apply the impulse to the state ``y[15]``; False if it brings the body to rest (``D = 0``).
 
     The direction ``Dhat`` and ``Phat`` are found together by a damped fixed point on ``Dhat``, whose pressure
     follows from the trace condition at every turn. Where the fixed point has no rate of strain left, friction
     holds the body.
     """
-    s = work[W_S]
-    sinv = work[W_SINV]
+    s = work.m[W_S]
+    sinv = work.m[W_SINV]
     unpack(y[0:6], s)
     volume = np.sqrt(inverse(y[0:6], sinv))
-    before = work[W_L]
+    before = work.m[W_L]
     unpack(y[6:12], before)
     before[0, 1] -= y[14]
     before[1, 0] += y[14]
@@ -54,11 +53,12 @@ def contact_impulse(y: Array, par: Array, work: Array) -> bool:
     beta, _ = dilatancy(volume, par)
     trace_sinv = sinv[0, 0] + sinv[1, 1] + sinv[2, 2]
     trace_l = y[6] + y[7] + y[8]
-    unit = work[W_SCRATCH, 0:2].reshape(6)
-    after = work[W_R]
-    n = work[W_N]
-    b = work[W_B]
-    d = work[W_A, 0:2].reshape(6)
+    unit = work.c[2]
+    after = work.m[W_R]
+    n = work.m[W_N]
+    b = work.m[W_B]
+    d = work.c[0]
+    old = work.c[1]
     _, start, det = invariants(y[6:12], unit)
     if start == 0.0:
         return False
@@ -82,7 +82,8 @@ def contact_impulse(y: Array, par: Array, work: Array) -> bool:
             for j in range(3):
                 after[i, j] = before[i, j] + p * (sinv[i, j] - k * b[i, j])
         pack(after, d)
-        old = unit.copy()
+        for i in range(6):
+            old[i] = unit[i]
         _, total, det = invariants(d, unit)
         change = 0.0
         if total < 1e-12 * start:
@@ -90,9 +91,10 @@ def contact_impulse(y: Array, par: Array, work: Array) -> bool:
         for i in range(6):
             change += (unit[i] - old[i]) ** 2
             unit[i] = 0.5 * (unit[i] + old[i])
-        _, _, det = invariants(unit.copy(), unit)
+        _, _, det = invariants(unit, unit)
         if change < 1e-28:
-            y[6:12] = d
+            for i in range(6):
+                y[6 + i] = d[i]
             y[12] = 0.5 * (after[2, 1] - after[1, 2])
             y[13] = 0.5 * (after[0, 2] - after[2, 0])
             y[14] = 0.5 * (after[1, 0] - after[0, 1])

@@ -12,6 +12,8 @@ The parameters of a run are one flat array, see ``SIN_PHI`` and the constants be
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -23,10 +25,15 @@ from flybystab.core.tide import TidePanels, tide_at
 
 Array = NDArray[np.float64]
 
-RIGID = 0
-FLOWING = 1
-DISPERSED = 2
-FLUID = 3
+# numpy integers: numba would compile every kernel anew for each literal.
+RIGID = np.int64(0)
+FLOWING = np.int64(1)
+DISPERSED = np.int64(2)
+FLUID = np.int64(3)
+
+# Numbers in a state.
+N_RIGID = np.int64(7)
+N_FULL = np.int64(15)
 
 # Slots of the parameter array.
 SURFACE = 0  # code of the yield surface
@@ -44,7 +51,7 @@ G2 = 11
 G3 = 12
 N_PARAMETERS = 13
 
-# Rows of the (12, 3, 3) work array that `field` fills and the rates read.
+# Matrices of `Buffers.m` that `field` fills and the rates read.
 W_SINV = 0
 W_K = 1  # K_g + K_t
 W_L = 2
@@ -55,7 +62,14 @@ W_A = 6
 W_B = 7
 W_VECTORS = 8
 W_SCRATCH = 9  # row 0: eigenvalues; row 1: V/V0, k (kP + kc), P
-N_WORK = 12
+N_WORK = 11
+
+
+class Buffers(NamedTuple):
+    """Scratch of the rates: matrices ``m[N_WORK, 3, 3]`` and components ``c[3, 6]``."""
+
+    m: Array
+    c: Array
 
 
 @kernel
@@ -92,16 +106,16 @@ def rotated_to_body(q: Array, k: Array, m: Array, out: Array) -> None:
 
 
 @kernel
-def rigid_rate(t: float, y: Array, dy: Array, par: Array, tide: TidePanels, work: Array) -> None:
+def rigid_rate(t: float, y: Array, dy: Array, par: Array, tide: TidePanels, work: Buffers) -> None:
     """Euler's equations with the tidal torque.
 
     ``Omegadot_ij = (K - Omega^2)_ij (S_j - S_i)/(S_i + S_j)`` along the body axes, the antisymmetric part
     of ``(Omegadot + Omega^2) S = K S - T``; the quaternion turns at ``qdot = q omega / 2``.
     """
-    kt = work[W_A, 0:2].reshape(6)
-    kb = work[W_B, 0:2].reshape(6)
+    kt = work.c[0]
+    kb = work.c[1]
     tide_at(tide.tau, tide.start, tide.width, tide.coefficients, t, kt)
-    rotated_to_body(y, kt, work[W_N], kb)
+    rotated_to_body(y, kt, work.m[W_N], kb)
     w0, w1, w2 = y[4], y[5], y[6]
     s1, s2, s3 = par[S1], par[S2], par[S3]
     # omega_1 = Omega_32, omega_2 = Omega_13, omega_3 = Omega_21, (Omega^2)_ij = omega_i omega_j for i != j
@@ -138,11 +152,12 @@ def invariants(c: Array, unit: Array) -> tuple[float, float, float]:
     a, b, d = c[0] + p, c[1] + p, c[2] + p
     norm = np.sqrt(a * a + b * b + d * d + 2.0 * (c[3] * c[3] + c[4] * c[4] + c[5] * c[5]))
     if norm == 0.0:
-        unit[:] = 0.0
+        for i in range(6):
+            unit[i] = 0.0
         return p, 0.0, 0.0
-    i = 1.0 / norm
-    unit[0], unit[1], unit[2] = a * i, b * i, d * i
-    unit[3], unit[4], unit[5] = c[3] * i, c[4] * i, c[5] * i
+    f = 1.0 / norm
+    unit[0], unit[1], unit[2] = a * f, b * f, d * f
+    unit[3], unit[4], unit[5] = c[3] * f, c[4] * f, c[5] * f
     det = (
         unit[0] * (unit[1] * unit[2] - unit[5] * unit[5])
         - unit[3] * (unit[3] * unit[2] - unit[5] * unit[4])
@@ -160,13 +175,13 @@ def yield_excess(p: float, norm: float, det: float, volume: float, par: Array) -
 
 @kernel
 def rigid_excess(
-    t: float, y: Array, par: Array, tide: TidePanels, work: Array, stress: Array
+    t: float, y: Array, par: Array, tide: TidePanels, work: Buffers, stress: Array
 ) -> tuple[float, float, float, float]:
     """Yield excess, pressure, deviator norm and unit determinant of a RIGID state; sets ``stress[6]`` (body axes)."""
-    kt = work[W_A, 0:2].reshape(6)
-    kb = work[W_B, 0:2].reshape(6)
+    kt = work.c[0]
+    kb = work.c[1]
     tide_at(tide.tau, tide.start, tide.width, tide.coefficients, t, kt)
-    rotated_to_body(y, kt, work[W_N], kb)
+    rotated_to_body(y, kt, work.m[W_N], kb)
     rigid_stress_components(kb, y[4:7], par[S1 : S3 + 1], par[G1 : G3 + 1], stress)
     p, norm, det = invariants(stress, kt)
     # The rigid body keeps the volume sqrt(s1 s2 s3) that it has.
@@ -184,19 +199,19 @@ def set_rigid_shape(s1: float, s2: float, s3: float, par: Array) -> None:
 
 
 @kernel
-def field(t: float, y: Array, tide: TidePanels, work: Array) -> None:
+def field(t: float, y: Array, tide: TidePanels, work: Buffers) -> None:
     """Fill the parts of `work` that depend on ``t`` and ``S`` only: ``S``, ``S^-1``, ``K_g + K_t``, volume."""
-    scratch = work[W_SCRATCH]
+    scratch = work.m[W_SCRATCH]
     values = scratch[0]
-    vectors = work[W_VECTORS]
-    unpack(y[0:6], work[W_S])
-    det = inverse(y[0:6], work[W_SINV])
+    vectors = work.m[W_VECTORS]
+    unpack(y[0:6], work.m[W_S])
+    det = inverse(y[0:6], work.m[W_SINV])
     volume = np.sqrt(det)
     scratch[1, 0] = volume
     eigensystem(y[0:6], values, vectors)
     a1, a2, a3 = gravity_coefficients(values[0], values[1], values[2])
     c = -2.0 / volume
-    k = work[W_K]
+    k = work.m[W_K]
     for i in range(3):
         for j in range(i, 3):
             k[i, j] = k[j, i] = c * (
@@ -204,10 +219,17 @@ def field(t: float, y: Array, tide: TidePanels, work: Array) -> None:
                 + a2 * vectors[i, 1] * vectors[j, 1]
                 + a3 * vectors[i, 2] * vectors[j, 2]
             )
-    kt = work[W_A, 0:2].reshape(6)
+    kt = work.c[0]
     tide_at(tide.tau, tide.start, tide.width, tide.coefficients, t, kt)
-    unpack(kt, work[W_B])
-    k += work[W_B]
+    k[0, 0] += kt[0]
+    k[1, 1] += kt[1]
+    k[2, 2] += kt[2]
+    k[0, 1] += kt[3]
+    k[1, 0] += kt[3]
+    k[0, 2] += kt[4]
+    k[2, 0] += kt[4]
+    k[1, 2] += kt[5]
+    k[2, 1] += kt[5]
 
 
 @kernel
@@ -228,7 +250,7 @@ def dilatancy(volume: float, par: Array) -> tuple[float, float]:
 
 
 @kernel
-def deformation_rate(regime: int, y: Array, dy: Array, par: Array, work: Array) -> float:
+def deformation_rate(regime: int, y: Array, dy: Array, par: Array, work: Buffers) -> float:
     """Rate of the 15 numbers, given `field`; returns the denominator of the pressure (FLOWING), else 1.
 
     ``Ldot = R - T S^-1``, ``R = K - L^2``, ``T = -P 1 + (k P + k c) Dhat``. With ``B = 1 - beta Dhat`` the
@@ -238,7 +260,7 @@ def deformation_rate(regime: int, y: Array, dy: Array, par: Array, work: Array) 
     """
     d = y[6:12]
     w0, w1, w2 = y[12], y[13], y[14]
-    big_l = work[W_L]
+    big_l = work.m[W_L]
     unpack(d, big_l)
     big_l[0, 1] -= w2
     big_l[1, 0] += w2
@@ -246,13 +268,13 @@ def deformation_rate(regime: int, y: Array, dy: Array, par: Array, work: Array) 
     big_l[2, 0] -= w1
     big_l[1, 2] -= w0
     big_l[2, 1] += w0
-    r = work[W_R]
+    r = work.m[W_R]
     multiply(big_l, big_l, r)
     for i in range(3):
         for j in range(3):
-            r[i, j] = work[W_K, i, j] - r[i, j]
-    s = work[W_S]
-    a = work[W_A]
+            r[i, j] = work.m[W_K, i, j] - r[i, j]
+    s = work.m[W_S]
+    a = work.m[W_A]
     multiply(big_l, s, a)
     # Sdot = L S + S L^T
     dy[0] = 2.0 * a[0, 0]
@@ -261,18 +283,18 @@ def deformation_rate(regime: int, y: Array, dy: Array, par: Array, work: Array) 
     dy[3] = a[0, 1] + a[1, 0]
     dy[4] = a[0, 2] + a[2, 0]
     dy[5] = a[1, 2] + a[2, 1]
-    sinv = work[W_SINV]
-    volume = work[W_SCRATCH, 1, 0]
+    sinv = work.m[W_SINV]
+    volume = work.m[W_SCRATCH, 1, 0]
     trace_sinv = sinv[0, 0] + sinv[1, 1] + sinv[2, 2]
     trace_d = d[0] + d[1] + d[2]
     trace_r = r[0, 0] + r[1, 1] + r[2, 2]
-    n = work[W_N]
-    b = work[W_B]
+    n = work.m[W_N]
+    b = work.m[W_B]
     denominator = 1.0
     pressure = 0.0
     strength = 0.0  # k P + k c: norm of the deviatoric stress
     if regime == FLOWING:
-        unit = work[W_SCRATCH + 1, 0:2].reshape(6)
+        unit = work.c[2]
         _, norm, det = invariants(d, unit)
         unpack(unit, n)
         g = slope_over_sine(int(par[SURFACE]), par[SIN_PHI], det)
@@ -309,13 +331,13 @@ def deformation_rate(regime: int, y: Array, dy: Array, par: Array, work: Array) 
     dy[12] = 0.5 * (r[2, 1] - r[1, 2])
     dy[13] = 0.5 * (r[0, 2] - r[2, 0])
     dy[14] = 0.5 * (r[1, 0] - r[0, 1])
-    work[W_SCRATCH, 1, 1] = strength
-    work[W_SCRATCH, 1, 2] = pressure
+    work.m[W_SCRATCH, 1, 1] = strength
+    work.m[W_SCRATCH, 1, 2] = pressure
     return denominator
 
 
 @kernel
-def rate(regime: int, t: float, y: Array, dy: Array, par: Array, tide: TidePanels, work: Array) -> float:
+def rate(regime: int, t: float, y: Array, dy: Array, par: Array, tide: TidePanels, work: Buffers) -> float:
     """Rate of the state in any regime; returns the denominator of the pressure where there is one."""
     if regime == RIGID:
         rigid_rate(t, y, dy, par, tide, work)
@@ -325,9 +347,9 @@ def rate(regime: int, t: float, y: Array, dy: Array, par: Array, tide: TidePanel
 
 
 @kernel
-def angular_momentum(y: Array, work: Array, h: Array) -> None:
+def angular_momentum(y: Array, work: Buffers, h: Array) -> None:
     """Angular momentum ``H = axial(L S - S L^T)`` about the centre, per ``m/5``, of a 15-number state."""
-    big_l = work[W_L]
+    big_l = work.m[W_L]
     unpack(y[6:12], big_l)
     big_l[0, 1] -= y[14]
     big_l[1, 0] += y[14]
@@ -335,9 +357,9 @@ def angular_momentum(y: Array, work: Array, h: Array) -> None:
     big_l[2, 0] -= y[13]
     big_l[1, 2] -= y[12]
     big_l[2, 1] += y[12]
-    unpack(y[0:6], work[W_S])
-    multiply(big_l, work[W_S], work[W_A])
-    a = work[W_A]
+    unpack(y[0:6], work.m[W_S])
+    multiply(big_l, work.m[W_S], work.m[W_A])
+    a = work.m[W_A]
     # H = int rho x x (L x) = axial vector of (L I) - (L I)^T
     h[0] = a[2, 1] - a[1, 2]
     h[1] = a[0, 2] - a[2, 0]

@@ -33,6 +33,8 @@ from flybystab.core.motion import (
     DISPERSED,
     FLOWING,
     FLUID,
+    N_FULL,
+    N_RIGID,
     N_WORK,
     RIGID,
     S1,
@@ -41,6 +43,7 @@ from flybystab.core.motion import (
     SIN_PHI,
     SURFACE,
     W_SCRATCH,
+    Buffers,
     angular_momentum,
     invariants,
     rate,
@@ -67,14 +70,14 @@ Array = NDArray[np.float64]
 D_REST = 1e-10
 
 # Why a regime (or the run) ended; the same codes head the rows of the event log.
-DONE = 0
-ONSET = 1
-ARREST = 2
-LOSS = 3
-CONTACT = 4
-BEYOND = 5
-JAM = 6
-STUCK = 7  # more steps or switches than allowed
+DONE = np.int64(0)
+ONSET = np.int64(1)
+ARREST = np.int64(2)
+LOSS = np.int64(3)
+CONTACT = np.int64(4)
+BEYOND = np.int64(5)
+JAM = np.int64(6)
+STUCK = np.int64(7)  # more steps or switches than allowed
 
 #: Columns of the history: time, regime, S (6), D (6), w (3), pressure, deviator norm, unit determinant.
 N_HISTORY = 20
@@ -83,13 +86,20 @@ N_EVENT = 4
 #: Samples in each step: history rows, and the grid on which extrema of the yield function are looked for.
 N_SAMPLE = 4
 
+# What the functions `_rigid_values` and `_flow_ends` return.
+_ONSET = np.int64(0)
+_FRICTION = np.int64(1)
+_STRENGTH = np.int64(0)
+_DENOMINATOR = np.int64(1)
+_RATIO = np.int64(2)
+
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
 
 class Workspace(NamedTuple):
     """Buffers of a run, allocated once."""
 
-    work: Array
+    work: Buffers
     k: Array
     jac: Array
     ft: Array
@@ -106,10 +116,17 @@ class Workspace(NamedTuple):
 
 
 @kernel
+def copy(a: Array, b: Array, n: int) -> None:
+    """``b[:n] = a[:n]``."""
+    for i in range(n):
+        b[i] = a[i]
+
+
+@kernel
 def workspace() -> Workspace:
     """Fresh buffers."""
     return Workspace(
-        np.zeros((N_WORK, 3, 3)),
+        Buffers(np.zeros((N_WORK, 3, 3)), np.zeros((3, 6))),
         np.zeros((N_STAGES, 15)),
         np.zeros((15, 15)),
         np.zeros(15),
@@ -146,24 +163,27 @@ def record(
     if n == hist.shape[0]:
         m = n // 2
         for i in range(m):
-            hist[i] = hist[2 * i]
+            for j in range(N_HISTORY):
+                hist[i, j] = hist[2 * i, j]
         n = m
     row = hist[n]
     row[0] = t
     row[1] = regime
     if regime == RIGID:
-        m = ws.work[W_SCRATCH]
+        m = ws.work.m[W_SCRATCH]
         rotation_matrix(y, m)
         s1, s2, s3 = par[S1], par[S2], par[S3]
         c = 2
         for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)):
             row[c] = s1 * m[i, 0] * m[j, 0] + s2 * m[i, 1] * m[j, 1] + s3 * m[i, 2] * m[j, 2]
             c += 1
-        row[8:14] = 0.0
+        for i in range(6):
+            row[8 + i] = 0.0
         for i in range(3):
             row[14 + i] = m[i, 0] * y[4] + m[i, 1] * y[5] + m[i, 2] * y[6]
     else:
-        row[2:17] = y
+        for i in range(15):
+            row[2 + i] = y[i]
     row[17] = p
     row[18] = s
     row[19] = det
@@ -212,7 +232,7 @@ def onset_denominator(p: float, norm: float, det: float, par: Array, stress: Arr
 @kernel
 def _rigid_values(t: float, y: Array, par: Array, tide: TidePanels, ws: Workspace, which: int) -> float:
     """Onset function (`which` 0) or mobilised friction angle (1) of a RIGID state."""
-    if which == 0:
+    if which == _ONSET:
         return yields(t, y, par, tide, ws)
     _, p, norm, det = rigid_excess(t, y, par, tide, ws.work, ws.stress)
     volume = np.sqrt(par[S1] * par[S2] * par[S3])
@@ -226,22 +246,22 @@ def _largest(
     """Golden-section maximum over the fractions [a, b] of a rigid step: where, and how large."""
     x1 = b - _GOLDEN * (b - a)
     x2 = a + _GOLDEN * (b - a)
-    explicit_at(x1, ws.y, 7, ws.dense, ws.ys)
+    explicit_at(x1, ws.y, N_RIGID, ws.dense, ws.ys)
     f1 = _rigid_values(t + x1 * h, ws.ys, par, tide, ws, which)
-    explicit_at(x2, ws.y, 7, ws.dense, ws.ys)
+    explicit_at(x2, ws.y, N_RIGID, ws.dense, ws.ys)
     f2 = _rigid_values(t + x2 * h, ws.ys, par, tide, ws, which)
     for _ in range(36):
         if f1 < f2:
             a = x1
             x1, f1 = x2, f2
             x2 = a + _GOLDEN * (b - a)
-            explicit_at(x2, ws.y, 7, ws.dense, ws.ys)
+            explicit_at(x2, ws.y, N_RIGID, ws.dense, ws.ys)
             f2 = _rigid_values(t + x2 * h, ws.ys, par, tide, ws, which)
         else:
             b = x2
             x2, f2 = x1, f1
             x1 = b - _GOLDEN * (b - a)
-            explicit_at(x1, ws.y, 7, ws.dense, ws.ys)
+            explicit_at(x1, ws.y, N_RIGID, ws.dense, ws.ys)
             f1 = _rigid_values(t + x1 * h, ws.ys, par, tide, ws, which)
     return (x1, f1) if f1 > f2 else (x2, f2)
 
@@ -291,18 +311,18 @@ def follow_rigid(
         spin = np.sqrt(y[4] ** 2 + y[5] ** 2 + y[6] ** 2)
         for i in range(7):
             ws.scale[i] = tol if i < 4 else tol * max(spin, 0.1)
-        error = explicit_step(RIGID, t, y, 7, h, par, tide, ws.work, k, ws.scale, ws.y1)
+        error = explicit_step(RIGID, t, y, N_RIGID, h, par, tide, ws.work, k, ws.scale, ws.y1)
         count[2] += 1
         if not error <= 1.0:
             count[3] += 1
             h *= max(0.2, 0.9 * error ** (-0.125)) if np.isfinite(error) else 0.2
             continue
-        explicit_dense(RIGID, t, y, 7, h, par, tide, ws.work, k, ws.y1, ws.ys, ws.dense)
+        explicit_dense(RIGID, t, y, N_RIGID, h, par, tide, ws.work, k, ws.y1, ws.ys, ws.dense)
         f[0, 0], f[1, 0] = f[0, N_SAMPLE], f[1, N_SAMPLE]
         end = 2.0  # fraction at which the body yields
         for j in range(1, N_SAMPLE + 1):
             x = j / N_SAMPLE
-            explicit_at(x, y, 7, ws.dense, ws.ys)
+            explicit_at(x, y, N_RIGID, ws.dense, ws.ys)
             excess, p, norm, det = rigid_excess(t + x * h, ws.ys, par, tide, ws.work, ws.stress)
             f[0, j] = (
                 excess if excess <= 0.0 else min(excess, onset_denominator(p, norm, det, par, ws.stress))
@@ -321,7 +341,7 @@ def follow_rigid(
                 and _vertex_inside(f[1, j - 1], f[1, j], f[1, j + 1])
                 and f[1, j] + abs(f[1, j + 1] - f[1, j - 1]) > ws.mark[0]
             ):
-                x, value = _largest(a, b, t, h, par, tide, ws, 1)
+                x, value = _largest(a, b, t, h, par, tide, ws, _FRICTION)
                 if value > ws.mark[0]:
                     ws.mark[0], ws.mark[1] = value, t + x * h
             if (
@@ -330,7 +350,7 @@ def follow_rigid(
                 and _vertex_inside(f[0, j - 1], f[0, j], f[0, j + 1])
                 and f[0, j] + abs(f[0, j + 1] - f[0, j - 1]) + 0.02 * norm > 0.0
             ):
-                x, value = _largest(a, b, t, h, par, tide, ws, 0)
+                x, value = _largest(a, b, t, h, par, tide, ws, _ONSET)
                 if value > 0.0:
                     end = x
                     n = j - 1
@@ -341,26 +361,26 @@ def follow_rigid(
             low, high = n / N_SAMPLE, end
             for _ in range(60):
                 mid = 0.5 * (low + high)
-                explicit_at(mid, y, 7, ws.dense, ws.ys)
+                explicit_at(mid, y, N_RIGID, ws.dense, ws.ys)
                 if yields(t + mid * h, ws.ys, par, tide, ws) > 0.0:
                     high = mid
                 else:
                     low = mid
                 if (high - low) * h < 1e-14 * max(1.0, abs(t)):
                     break
-            explicit_at(high, y, 7, ws.dense, ws.ys)
+            explicit_at(high, y, N_RIGID, ws.dense, ws.ys)
             # Repeat the step up to the root: order 8 instead of the order of the interpolant.
-            explicit_step(RIGID, t, y, 7, high * h, par, tide, ws.work, k, ws.scale, ws.y1)
+            explicit_step(RIGID, t, y, N_RIGID, high * h, par, tide, ws.work, k, ws.scale, ws.y1)
             t += high * h
-            y[:7] = ws.y1[:7]
+            copy(ws.y1, y, N_RIGID)
             _normalise(y)
             ws.mark[2] = h
-            value = _rigid_values(t, y, par, tide, ws, 1)
+            value = _rigid_values(t, y, par, tide, ws, _FRICTION)
             if value > ws.mark[0]:
                 ws.mark[0], ws.mark[1] = value, t
             return ONSET, t
         t = t1 if last else t + h
-        y[:7] = ws.y1[:7]
+        copy(ws.y1, y, N_RIGID)
         _normalise(y)
         k[0] = k[12]
         h *= min(5.0, max(0.3, 0.9 * error ** (-0.125))) if error > 0.0 else 5.0
@@ -389,8 +409,8 @@ def strain_rate(y: Array) -> float:
 @kernel
 def _axis_ratio2(y: Array, ws: Workspace) -> float:
     """Square of the largest over the least semi-axis."""
-    values = ws.work[W_SCRATCH, 0]
-    eigensystem(y[0:6], values, ws.work[W_SCRATCH + 1])
+    values = ws.work.m[W_SCRATCH, 0]
+    eigensystem(y[0:6], values, ws.work.m[W_SCRATCH + 1])
     return max(values[0], max(values[1], values[2])) / min(values[0], min(values[1], values[2]))
 
 
@@ -399,14 +419,14 @@ def _flow_ends(
     which: int, t: float, y: Array, par: Array, tide: TidePanels, ws: Workspace, limit2: float
 ) -> float:
     """Event functions of flow, negative once over: 0 strength, 1 denominator, 2 axis ratio."""
-    if which == 2:
+    if which == _RATIO:
         return limit2 - _axis_ratio2(y, ws)
     denominator = rate(FLOWING, t, y, ws.k[9], par, tide, ws.work)
-    if which == 1:
+    if which == _DENOMINATOR:
         return denominator
-    strength = ws.work[W_SCRATCH, 1, 1]
+    strength = ws.work.m[W_SCRATCH, 1, 1]
     if par[SIN_PHI] == 0.0 and par[COHESION] == 0.0:
-        strength = ws.work[W_SCRATCH, 1, 2]  # a fluid parts where its pressure vanishes
+        strength = ws.work.m[W_SCRATCH, 1, 2]  # a fluid parts where its pressure vanishes
     return strength
 
 
@@ -431,12 +451,12 @@ def follow_flow(
     denominator = rate(FLOWING, t, y, f0, par, tide, ws.work)
     if denominator <= 0.0:
         return JAM, t
-    if _flow_ends(0, t, y, par, tide, ws, limit2) < 0.0:
+    if _flow_ends(_STRENGTH, t, y, par, tide, ws, limit2) < 0.0:
         return LOSS, t
     while t < t1:
         denominator = rate(FLOWING, t, y, f0, par, tide, ws.work)
-        p = ws.work[W_SCRATCH, 1, 2]
-        strength = ws.work[W_SCRATCH, 1, 1]
+        p = ws.work.m[W_SCRATCH, 1, 2]
+        strength = ws.work.m[W_SCRATCH, 1, 1]
         _, _, det = invariants(y[6:12], ws.stress)
         if hist.shape[0] > 1:
             record(t, FLOWING, y, par, p, strength, det, ws, hist, count)
@@ -477,9 +497,9 @@ def follow_flow(
             low = 0.0
             for j in range(1, N_SAMPLE + 1):
                 x = j / N_SAMPLE
-                if which == 2 and j < N_SAMPLE:
+                if which == _RATIO and j < N_SAMPLE:
                     continue
-                implicit_at(x, y, 15, ws.dense, ws.y1, ws.ys)
+                implicit_at(x, y, N_FULL, ws.dense, ws.y1, ws.ys)
                 if _flow_ends(which, t + x * h, ws.ys, par, tide, ws, limit2) < 0.0:
                     found = x
                     break
@@ -488,14 +508,14 @@ def follow_flow(
                 high = found
                 for _ in range(50):
                     mid = 0.5 * (low + high)
-                    implicit_at(mid, y, 15, ws.dense, ws.y1, ws.ys)
+                    implicit_at(mid, y, N_FULL, ws.dense, ws.y1, ws.ys)
                     if _flow_ends(which, t + mid * h, ws.ys, par, tide, ws, limit2) < 0.0:
                         high = mid
                     else:
                         low = mid
                 if reason == DONE or high < x_end:
                     x_end = high
-                    reason = LOSS if which == 0 else (JAM if which == 1 else BEYOND)
+                    reason = LOSS if which == _STRENGTH else (JAM if which == _DENOMINATOR else BEYOND)
         if reason != DONE:
             # Repeat the step up to the root: the order of the method instead of that of the interpolant.
             last = False
@@ -506,14 +526,14 @@ def follow_flow(
         elif hist.shape[0] > 1:
             for j in range(1, N_SAMPLE):
                 x = j / N_SAMPLE
-                implicit_at(x, y, 15, ws.dense, ws.y1, ws.ys)
+                implicit_at(x, y, N_FULL, ws.dense, ws.y1, ws.ys)
                 rate(FLOWING, t + x * h, ws.ys, ws.k[9], par, tide, ws.work)
-                p = ws.work[W_SCRATCH, 1, 2]
-                strength = ws.work[W_SCRATCH, 1, 1]
+                p = ws.work.m[W_SCRATCH, 1, 2]
+                strength = ws.work.m[W_SCRATCH, 1, 1]
                 _, _, det = invariants(ws.ys[6:12], ws.stress)
                 record(t + x * h, FLOWING, ws.ys, par, p, strength, det, ws, hist, count)
         t = t1 if last else t + h
-        y[:] = ws.y1
+        copy(ws.y1, y, N_FULL)
         if reason != DONE:
             return reason, t
         if strain_rate(y) < D_REST:
@@ -549,7 +569,7 @@ def follow_free(
                 regime,
                 y,
                 par,
-                ws.work[W_SCRATCH, 1, 2] if regime == FLUID else 0.0,
+                ws.work.m[W_SCRATCH, 1, 2] if regime == FLUID else 0.0,
                 0.0,
                 0.0,
                 ws,
@@ -563,7 +583,7 @@ def follow_free(
             h = t1 - t
         for i in range(15):
             ws.scale[i] = tol * max(1.0, abs(y[i]))
-        error = explicit_step(regime, t, y, 15, h, par, tide, ws.work, k, ws.scale, ws.y1)
+        error = explicit_step(regime, t, y, N_FULL, h, par, tide, ws.work, k, ws.scale, ws.y1)
         count[2] += 1
         if not error <= 1.0:
             count[3] += 1
@@ -571,13 +591,13 @@ def follow_free(
             if h < 1e-14 * max(1.0, abs(t)):
                 return STUCK, t
             continue
-        explicit_dense(regime, t, y, 15, h, par, tide, ws.work, k, ws.y1, ws.ys, ws.dense)
+        explicit_dense(regime, t, y, N_FULL, h, par, tide, ws.work, k, ws.y1, ws.ys, ws.dense)
         found = 2.0
         low = 0.0
         reason = DONE
         for j in range(1, 2 * N_SAMPLE + 1):
             x = 0.5 * j / N_SAMPLE
-            explicit_at(x, y, 15, ws.dense, ws.ys)
+            explicit_at(x, y, N_FULL, ws.dense, ws.ys)
             if _axis_ratio2(ws.ys, ws) > limit * limit:
                 found, reason = x, BEYOND
                 break
@@ -589,18 +609,18 @@ def follow_free(
             high = found
             for _ in range(55):
                 mid = 0.5 * (low + high)
-                explicit_at(mid, y, 15, ws.dense, ws.ys)
+                explicit_at(mid, y, N_FULL, ws.dense, ws.ys)
                 if (reason == BEYOND and _axis_ratio2(ws.ys, ws) > limit * limit) or (
                     reason == CONTACT and determinant(ws.ys[0:6]) < lost
                 ):
                     high = mid
                 else:
                     low = mid
-            explicit_step(regime, t, y, 15, high * h, par, tide, ws.work, k, ws.scale, ws.y1)
-            y[:] = ws.y1
+            explicit_step(regime, t, y, N_FULL, high * h, par, tide, ws.work, k, ws.scale, ws.y1)
+            copy(ws.y1, y, N_FULL)
             return reason, t + high * h
         t = t1 if last else t + h
-        y[:] = ws.y1
+        copy(ws.y1, y, N_FULL)
         k[0] = k[12]
         h *= min(5.0, max(0.3, 0.9 * error ** (-0.125))) if error > 0.0 else 5.0
         if tide.coefficients.shape[0] > 0:
@@ -611,7 +631,7 @@ def follow_free(
 @kernel
 def loosen(y: Array, par: Array, ws: Workspace, det: float) -> None:
     """Turn the RIGID state ``y[:7]`` into one that flows at `D_REST` along the deviator ``ws.stress`` (body axes)."""
-    m = ws.work[0]
+    m = ws.work.m[0]
     rotation_matrix(y, m)
     p, _, _ = invariants(ws.stress, ws.ys[:6])
     s = (par[S1], par[S2], par[S3])
@@ -635,7 +655,7 @@ def loosen(y: Array, par: Array, ws: Workspace, det: float) -> None:
         out[6 + c] = 2.0 * D_REST * (flow + (beta / 3.0 if i == j else 0.0))
         c += 1
     out[12], out[13], out[14] = w0, w1, w2
-    y[:] = out
+    copy(out, y, N_FULL)
 
 
 @kernel
@@ -643,8 +663,8 @@ def stiffen(y: Array, par: Array, ws: Workspace) -> None:
     """Turn a 15-number state into the RIGID one with the same shape and angular momentum."""
     h = ws.ys
     angular_momentum(y, ws.work, h)
-    values = ws.work[W_SCRATCH, 0]
-    v = ws.work[0]
+    values = ws.work.m[W_SCRATCH, 0]
+    v = ws.work.m[0]
     eigensystem(y[0:6], values, v)
     det = (
         v[0, 0] * (v[1, 1] * v[2, 2] - v[1, 2] * v[2, 1])
@@ -740,7 +760,7 @@ def follow(
         DONE, BEYOND or STUCK; the time reached; the regime there.
     """
     ws = workspace()
-    ws.y[:] = y
+    copy(y, ws.y, N_FULL)
     ws.mark[0] = -1.0
     reason = DONE
     det = 0.0
@@ -751,7 +771,9 @@ def follow(
             reason = STUCK
             break
         if regime == RIGID:
-            reason, t = follow_rigid(t, min(t1, t_rest), par, tide, tol, unyielding, max_steps, ws, hist, count)
+            reason, t = follow_rigid(
+                t, min(t1, t_rest), par, tide, tol, unyielding, max_steps, ws, hist, count
+            )
             if reason != ONSET:
                 break
             if brittle:
@@ -789,7 +811,8 @@ def follow(
     if regime == RIGID:
         rigid_excess(t, ws.y, par, tide, ws.work, ws.stress)
         loosen(ws.y, par, ws, det)
-        ws.y[6:12] = 0.0
-    y[:] = ws.y
+        for i in range(6, 12):
+            ws.y[i] = 0.0
+    copy(ws.y, y, N_FULL)
     mark[0], mark[1] = ws.mark[0], ws.mark[1]
     return reason, t, regime

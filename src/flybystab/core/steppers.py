@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.integrate._ivp import dop853_coefficients as _dop853
 
 from flybystab.core.jit import kernel
-from flybystab.core.motion import FLOWING, deformation_rate, field, rate
+from flybystab.core.motion import FLOWING, Buffers, deformation_rate, field, rate
 from flybystab.core.tide import TidePanels
 
 Array = NDArray[np.float64]
@@ -130,7 +130,7 @@ def explicit_step(
     h: float,
     par: Array,
     tide: TidePanels,
-    work: Array,
+    work: Buffers,
     k: Array,
     scale: Array,
     y1: Array,
@@ -178,7 +178,7 @@ def explicit_dense(
     h: float,
     par: Array,
     tide: TidePanels,
-    work: Array,
+    work: Buffers,
     k: Array,
     y1: Array,
     scratch: Array,
@@ -232,7 +232,7 @@ def flow_jacobian(
     dt: float,
     par: Array,
     tide: TidePanels,
-    work: Array,
+    work: Buffers,
     jac: Array,
     ft: Array,
     s: Array,
@@ -322,7 +322,7 @@ def implicit_step(
     h: float,
     par: Array,
     tide: TidePanels,
-    work: Array,
+    work: Buffers,
     jac: Array,
     ft: Array,
     lu: Array,
