@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -12,12 +14,12 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.aggregate.body import YIELD_SURFACES, Body
+from flybystab.constants import G
 from flybystab.core.ellipsoid import gravity_coefficients
 from flybystab.core.motion import invariants, rigid_stress_components
 from flybystab.core.passage import Passage, passage
 from flybystab.core.rheology import required_cohesion, required_friction
-from flybystab.errors import InvalidInput, NotConverged
-from flybystab.constants import G
+from flybystab.errors import FlybystabError, InvalidInput, NotConverged
 from flybystab.outcome import Verdict, bound_fraction, classed
 from flybystab.sky.encounter import TAIL, Encounter
 
@@ -223,37 +225,9 @@ def flyby(
     if not 1e-13 <= tolerance <= 1e-3:
         raise InvalidInput("tolerance", tolerance, "a number in [1e-13, 1e-3]")
     rotation = periapsis_axes(encounter).T @ _rotation(attitude)
-    stop, limit = encounter.t_stop, encounter.t_stop + TAIL
-    if encounter.impact and encounter.impact_time is not None:
-        stop = limit = max(encounter.impact_time, encounter.t_start)
 
     def run(surface: str, tol: float, keep: int = 0, unyielding: bool = False) -> Passage:
-        material = body.material
-        result = passage(
-            body.axes,
-            body.rho,
-            body.omega,
-            rotation,
-            encounter.t_start,
-            limit,
-            encounter.tide,
-            t_rest=stop,
-            phi=material.phi,
-            cohesion=material.c_pa,
-            dilatancy=material.dilatancy,
-            surface=YIELD_SURFACES.index(surface),
-            brittle=material.brittle,
-            unyielding=unyielding,
-            tolerance=tol,
-            max_axis_ratio=max(max_axis_ratio, 1.001 * body.axes[0] / body.axes[2]),
-            keep=keep,
-        )
-        if result.reason == "stuck":
-            raise NotConverged(
-                f"the integration stopped {result.time - encounter.t_start:.1f} s after the start in the "
-                f"{result.regime} regime after {result.steps} steps (tolerance {tol:g})"
-            )
-        return result
+        return _run(body, encounter, rotation, surface, tol, max_axis_ratio, keep, unyielding)
 
     surface = body.material.yield_surface
     friction, cohesion = _free_requirements(body)
@@ -280,7 +254,8 @@ def flyby(
             semi_axes=float(np.max(np.abs(_axes(loose.shape) / _axes(main.shape) - 1.0))),
             spin=_relative(_spin(loose.velocity_gradient), _spin(main.velocity_gradient)),
             bound_fraction=abs(loose_verdict[2] - bound),
-            required_friction_angle=np.rad2deg(_difference(demand.max_friction, loose_demand.max_friction)) * u.deg,
+            required_friction_angle=np.rad2deg(_difference(demand.max_friction, loose_demand.max_friction))
+            * u.deg,
             event_times=_event_difference(main, loose) * u.s,
             verdict_agrees=loose_verdict[0] == verdict,
             tide=encounter.tide_error,
@@ -290,8 +265,7 @@ def flyby(
     arrests = [t for name, t, _ in main.events if name in ("arrest", "jam")]
     lode = next((angle for name, _, angle in main.events if name == "onset"), None)
     margin = body.material.phi - demand.max_friction
-    momentum = [_momentum(rotation @ np.diag(body.axes**2) @ rotation.T, _cross(rotation @ body.omega))]
-    momentum.append(_momentum(main.shape, main.velocity_gradient))
+    spin_ratio, pole_change = _spin_change(body, rotation, main)
     return FlybyResult(
         verdict=verdict,
         verdict_class=letter,
@@ -307,8 +281,8 @@ def flyby(
         margin=np.rad2deg(margin) * u.deg,
         required_cohesion=(0.0 if holds else cohesion) * u.Pa,
         lode_angle=None if lode is None else np.rad2deg(lode) * u.deg,
-        spin_ratio=_ratio(momentum[1][1], momentum[0][1]),
-        pole_change=_angle(momentum[0][0], momentum[1][0]) * u.deg,
+        spin_ratio=spin_ratio,
+        pole_change=pole_change * u.deg,
         error=measured,
         verdict_by_surface=verdicts,
         robust=None if len(verdicts) == 1 else len(set(verdicts.values())) == 1,
@@ -321,10 +295,160 @@ def flyby(
     )
 
 
+def _run(
+    body: Body,
+    encounter: Encounter,
+    rotation: Array,
+    surface: str,
+    tolerance: float,
+    max_axis_ratio: float,
+    keep: int = 0,
+    unyielding: bool = False,
+) -> Passage:
+    """One run of the dynamics; `rotation` takes body axes to the frame of the encounter."""
+    stop, limit = encounter.t_stop, encounter.t_stop + TAIL
+    if encounter.impact and encounter.impact_time is not None:
+        stop = limit = max(encounter.impact_time, encounter.t_start)
+    material = body.material
+    result = passage(
+        body.axes,
+        body.rho,
+        body.omega,
+        rotation,
+        encounter.t_start,
+        limit,
+        encounter.tide,
+        t_rest=stop,
+        phi=material.phi,
+        cohesion=material.c_pa,
+        dilatancy=material.dilatancy,
+        surface=YIELD_SURFACES.index(surface),
+        brittle=material.brittle,
+        unyielding=unyielding,
+        tolerance=tolerance,
+        max_axis_ratio=max(max_axis_ratio, 1.001 * body.axes[0] / body.axes[2]),
+        keep=keep,
+    )
+    if result.reason == "stuck":
+        raise NotConverged(
+            f"the integration stopped {result.time - encounter.t_start:.1f} s after the start in the "
+            f"{result.regime} regime after {result.steps} steps (tolerance {tolerance:g})"
+        )
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class FlybyTable:
+    """Results of many encounters as arrays; attributes as in :class:`FlybyResult`, first dimension n.
+
+    A row that could not be computed has the verdict "FAILED", its reason in `failure` and nan elsewhere.
+    """
+
+    verdict: NDArray[np.str_]
+    bound_fraction: Array
+    semi_axes: Quantity
+    spin: Quantity
+    max_required_friction_angle: Quantity
+    margin: Quantity
+    spin_ratio: Array
+    pole_change: Quantity
+    failure: NDArray[np.str_]
+
+    def __len__(self) -> int:
+        return len(self.verdict)
+
+
+def flyby_many(
+    bodies: Sequence[Body],
+    encounters: Sequence[Encounter],
+    attitudes: Sequence[Any] | None = None,
+    *,
+    tolerance: float = TOLERANCE,
+    max_axis_ratio: float = 6.0,
+    workers: int | None = None,
+) -> FlybyTable:
+    """Carry bodies through encounters, row by row, on all cores.
+
+    Parameters
+    ----------
+    bodies, encounters : sequences of equal length n
+    attitudes : sequence of rotations, optional
+        As in :func:`flyby`; identity by default.
+    tolerance, max_axis_ratio
+        As in :func:`flyby`.
+    workers : int, optional
+        Threads (kernels release the interpreter lock), one a core by default; no result depends on it.
+
+    Returns
+    -------
+    FlybyTable
+
+    Raises
+    ------
+    InvalidInput
+        If the lengths differ.
+    """
+    n = len(bodies)
+    if len(encounters) != n or (attitudes is not None and len(attitudes) != n):
+        raise InvalidInput("encounters", len(encounters), f"as many encounters and attitudes as bodies, {n}")
+    columns = np.full((n, 8), np.nan)
+    verdicts = np.full(n, "FAILED", dtype="U20")
+    failures = np.full(n, "", dtype=object)
+
+    def rows(indices: range) -> None:
+        for i in indices:
+            try:
+                verdicts[i], columns[i] = _row(
+                    bodies[i],
+                    encounters[i],
+                    None if attitudes is None else attitudes[i],
+                    tolerance,
+                    max_axis_ratio,
+                )
+            except FlybystabError as reason:
+                failures[i] = str(reason)
+
+    threads = workers or os.cpu_count() or 1
+    if threads == 1 or n == 1:
+        rows(range(n))
+    else:
+        with ThreadPoolExecutor(threads) as pool:
+            list(pool.map(rows, [range(k, n, 4 * threads) for k in range(4 * threads)]))
+    return FlybyTable(
+        verdict=verdicts,
+        bound_fraction=columns[:, 0],
+        semi_axes=columns[:, 1:4] * u.m,
+        spin=columns[:, 4] * u.rad / u.s,
+        max_required_friction_angle=columns[:, 5] * u.deg,
+        margin=np.array([np.rad2deg(b.material.phi) for b in bodies]) * u.deg - columns[:, 5] * u.deg,
+        spin_ratio=columns[:, 6],
+        pole_change=columns[:, 7] * u.deg,
+        failure=failures.astype(str),
+    )
+
+
+def _row(
+    body: Body, encounter: Encounter, attitude: Any, tolerance: float, max_axis_ratio: float
+) -> tuple[str, Array]:
+    rotation = periapsis_axes(encounter).T @ _rotation(attitude)
+    surface = body.material.yield_surface
+    holds = _free_requirements(body)[0] <= body.material.phi * (1.0 + 1e-12)
+    run = _run(body, encounter, rotation, surface, tolerance, max_axis_ratio, unyielding=not holds)
+    demand = run.max_friction
+    if any(name == "onset" for name, _, _ in run.events):
+        demand = _run(
+            body, encounter, rotation, surface, tolerance, max_axis_ratio, unyielding=True
+        ).max_friction
+    verdict, _, bound = _verdict(run, encounter, body, holds)
+    ratio, turn = _spin_change(body, rotation, run)
+    spin = float(np.linalg.norm(_spin(run.velocity_gradient)))
+    return str(verdict), np.array([bound, *_axes(run.shape), spin, np.rad2deg(demand), ratio, turn])
+
+
 def periapsis_axes(encounter: Encounter) -> Array:
     """Rotation matrix, frame of the encounter -> periapsis frame (x periapsis, z angular momentum).
 
-    An attitude ``A`` (body axes -> ICRF) for a real encounter is ``periapsis_axes(encounter) @ A`` for `flyby`.
+    An attitude ``A`` (body axes -> ICRF) of a real encounter is ``periapsis_axes(encounter) @ A`` to `flyby`.
     """
     r = encounter.position(0.0)[0]
     h = np.cross(r, encounter.velocity(0.0)[0])
@@ -400,13 +524,22 @@ def _cross(w: Array) -> Array:
 
 
 def _momentum(shape: Array, gradient: Array) -> tuple[Array, float]:
-    """Angular momentum per ``m/5`` and effective spin rate ``2 E/H`` of the rigid rotation that carries it."""
+    """Angular momentum per ``m/5``, and effective spin rate ``2 E/H`` of the rigid rotation with it."""
     flow = gradient @ shape
     h = 2.0 * _spin(flow)
     inertia = np.trace(shape) * np.eye(3) - shape
     omega = np.linalg.solve(inertia, h)
     norm = float(np.linalg.norm(h))
     return h, float(omega @ h) / norm if norm > 0.0 else 0.0
+
+
+def _spin_change(body: Body, rotation: Array, run: Passage) -> tuple[float, float]:
+    """Ratio of the effective spin rates and angle between the angular momenta (deg), after and before."""
+    before, rate_before = _momentum(
+        rotation @ np.diag(body.axes**2) @ rotation.T, _cross(rotation @ body.omega)
+    )
+    after, rate_after = _momentum(run.shape, run.velocity_gradient)
+    return _ratio(rate_after, rate_before), _angle(before, after)
 
 
 def _ratio(a: float, b: float) -> float:
@@ -457,7 +590,9 @@ def _modelled(body: Body) -> tuple[str, ...]:
         "homogeneous ellipsoid, self-gravity",
         f"{m.yield_surface}, friction {np.rad2deg(m.phi):g} deg, cohesion {m.c_pa:g} Pa"
         + (" (brittle)" if m.brittle and m.c_pa > 0.0 else ""),
-        "volume-preserving flow" if m.dilatancy == 0.0 else f"dilatancy {m.dilatancy:g} of the largest, up to V/V0 = 1.5",
+        "volume-preserving flow"
+        if m.dilatancy == 0.0
+        else f"dilatancy {m.dilatancy:g} of the largest, fading out before V/V0 = 1.5",
     ]
     return tuple(text)
 

@@ -39,8 +39,8 @@ ALL_BOUND = 1.0 - 1e-6
 def bound_fraction(shape: Array, velocity_gradient: Array, density: float) -> float:
     """Share of the mass that is gravitationally bound to a homogeneous ellipsoid with velocity ``L x``.
 
-    A point is bound if ``|L x|^2/2 < pi G rho (A_0 - sum A_i x_i^2)``. With ``x = F xi``, ``F F^T = S``, that is
-    ``xi^T (L F)^T (L F) xi / 2 + pi G rho xi^T diag(A_i a_i^2) xi < pi G rho A_0`` on the unit ball, and the share
+    A point is bound if ``|L x|^2/2 < pi G rho (A_0 - sum A_i x_i^2)``. With ``x = F xi``, ``F F^T = S``, that
+    is ``xi^T [(L F)^T (L F)/2 + pi G rho diag(A_i a_i^2)] xi < pi G rho A_0`` on the unit ball, and the share
     is the mean over directions of ``min(1, r^3)``, ``r`` the radius at which the form reaches the bound.
     It is an upper bound: the potential counts the material that is leaving.
 
@@ -68,10 +68,8 @@ def bound_fraction(shape: Array, velocity_gradient: Array, density: float) -> fl
     mu, weight = np.polynomial.legendre.leggauss(128)
     longitude = (np.arange(256) + 0.5) * np.pi / 256
     sine2 = 1.0 - mu**2
-    value = (
-        diagonal[2] * mu[:, None] ** 2
-        + sine2[:, None] * (diagonal[0] * np.cos(longitude) ** 2 + diagonal[1] * np.sin(longitude) ** 2)[None, :]
-    )
+    across = diagonal[0] * np.cos(longitude) ** 2 + diagonal[1] * np.sin(longitude) ** 2
+    value = diagonal[2] * mu[:, None] ** 2 + sine2[:, None] * across[None, :]
     radius3 = np.minimum(1.0, (bound / value) ** 1.5)
     return float(0.5 * weight @ radius3.mean(axis=1))
 

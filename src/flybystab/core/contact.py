@@ -1,8 +1,8 @@
 """The inelastic impulse with which a dispersed body comes back into contact (theory, section 3).
 
 ``Delta L = -That S^-1`` with ``That = Phat (-1 + k Dhat)``, ``Phat >= 0`` and ``Dhat`` along the deviatoric
-rate of strain afterwards, such that ``tr D = beta |D'|`` then. A symmetric ``That`` keeps the angular momentum;
-being opposed to the motion that it leaves, it never raises the kinetic energy.
+rate of strain afterwards, such that ``tr D = beta |D'|`` then. A symmetric ``That`` keeps the angular
+momentum; being opposed to the motion that it leaves, it never raises the kinetic energy.
 """
 
 from __future__ import annotations

@@ -100,7 +100,7 @@ def _rd_series(x: float, y: float, z: float) -> float:
 
 @kernel
 def gravity_coefficients(s1: float, s2: float, s3: float) -> tuple[float, float, float]:
-    """``A_1, A_2, A_3`` (no unit, sum 2) from the squared semi-axes ``s_i = a_i^2``, in any order and unit."""
+    """``A_1, A_2, A_3`` (no unit, sum 2) from squared semi-axes ``s_i = a_i^2``, in any order and unit."""
     # A_i does not depend on the scale: dividing by s1 keeps 1 m and 1000 km bodies alike to the last bit.
     y = s2 / s1
     z = s3 / s1

@@ -7,6 +7,12 @@ divisor gives inf or nan, which the callers test for, instead of an exception in
 
 from __future__ import annotations
 
+import numpy as np
 from numba import njit
 
 kernel = njit(cache=True, nogil=True, error_model="numpy")
+
+
+def code(n: int) -> int:
+    """An integer constant for kernels: numba compiles anew for each literal int, but not for numpy's."""
+    return np.int64(n)  # type: ignore[return-value]

@@ -5,7 +5,7 @@ initial density, stress in the form ``T = 5 sigma/rho``. Then ``det S = (V/V0)^2
 ``K_g = -2 (V0/V) A(S)``. Two states:
 
 RIGID, 7 numbers: unit quaternion (body axes -> fixed frame, scalar first), ``omega`` along the body axes.
-Every other regime, 15 numbers, fixed frame: ``S`` (6 components), ``D = sym L`` (6), ``w`` with ``W x = w x x``.
+Every other regime, 15 numbers, fixed frame: ``S`` (6 components), ``D = sym L`` (6), ``w``: ``W x = w x x``.
 
 The parameters of a run are one flat array, see ``SIN_PHI`` and the constants below it.
 """
@@ -18,22 +18,21 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.core.ellipsoid import gravity_coefficients
-from flybystab.core.jit import kernel
+from flybystab.core.jit import code, kernel
 from flybystab.core.rheology import slope_over_sine
 from flybystab.core.tensors import eigensystem, inverse, multiply, pack, unpack
 from flybystab.core.tide import TidePanels, tide_at
 
 Array = NDArray[np.float64]
 
-# numpy integers: numba would compile every kernel anew for each literal.
-RIGID = np.int64(0)
-FLOWING = np.int64(1)
-DISPERSED = np.int64(2)
-FLUID = np.int64(3)
+RIGID = code(0)
+FLOWING = code(1)
+DISPERSED = code(2)
+FLUID = code(3)
 
 # Numbers in a state.
-N_RIGID = np.int64(7)
-N_FULL = np.int64(15)
+N_RIGID = code(7)
+N_FULL = code(15)
 
 # Slots of the parameter array.
 SURFACE = 0  # code of the yield surface
@@ -132,8 +131,8 @@ def rigid_rate(t: float, y: Array, dy: Array, par: Array, tide: TidePanels, work
 def rigid_stress_components(kb: Array, w: Array, s: Array, g: Array, out: Array) -> None:
     """Stress ``T[6]`` that rigidity needs, along the body axes.
 
-    ``T_ij = (K - Omega^2)_ij 2 S_i S_j/(S_i + S_j)``: the symmetric part of ``(K - Omegadot - Omega^2) S`` once
-    Omegadot obeys Euler. ``kb[6]`` tide, ``w[3]`` spin, ``s[3]`` squared semi-axes, ``g[3]`` self-gravity.
+    ``T_ij = (K - Omega^2)_ij 2 S_i S_j/(S_i + S_j)``: symmetric part of ``(K - Omegadot - Omega^2) S``
+    once Omegadot obeys Euler. ``kb[6]`` tide, ``w[3]`` spin, ``s[3]`` squared semi-axes, ``g[3]`` gravity.
     """
     w2 = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
     # Omega^2 = w w - w^2 1
@@ -177,7 +176,7 @@ def yield_excess(p: float, norm: float, det: float, volume: float, par: Array) -
 def rigid_excess(
     t: float, y: Array, par: Array, tide: TidePanels, work: Buffers, stress: Array
 ) -> tuple[float, float, float, float]:
-    """Yield excess, pressure, deviator norm and unit determinant of a RIGID state; sets ``stress[6]`` (body axes)."""
+    """Yield excess, pressure, deviator norm, unit determinant of a RIGID state; sets ``stress[6]``."""
     kt = work.c[0]
     kb = work.c[1]
     tide_at(tide.tau, tide.start, tide.width, tide.coefficients, t, kt)
@@ -200,7 +199,7 @@ def set_rigid_shape(s1: float, s2: float, s3: float, par: Array) -> None:
 
 @kernel
 def field(t: float, y: Array, tide: TidePanels, work: Buffers) -> None:
-    """Fill the parts of `work` that depend on ``t`` and ``S`` only: ``S``, ``S^-1``, ``K_g + K_t``, volume."""
+    """Fill what depends on ``t`` and ``S`` only: ``S``, ``S^-1``, ``K_g + K_t``, volume."""
     scratch = work.m[W_SCRATCH]
     values = scratch[0]
     vectors = work.m[W_VECTORS]

@@ -15,6 +15,7 @@ from flybystab.constants import G
 from flybystab.core import motion, regimes
 from flybystab.core.rheology import least_slope
 from flybystab.core.tide import TidePanels
+from flybystab.core.workspace import N_EVENT, N_HISTORY
 
 Array = NDArray[np.float64]
 
@@ -124,8 +125,8 @@ def passage(
     tide : TidePanels
         SI.
     phi, cohesion, dilatancy, surface, brittle, expansion
-        Material: rad, Pa, ``beta / min k``, code of the yield surface, loss of cohesion at first yield, ``V/V0``
-        at which dilation ends.
+        Material: rad, Pa, ``beta / min k``, code of the yield surface, loss of cohesion at first yield,
+        ``V/V0`` at which dilation ends.
     unyielding : bool
         Stay rigid whatever the stress, to learn the friction that would be needed.
     tolerance : float
@@ -142,8 +143,8 @@ def passage(
     regimes.quaternion(np.ascontiguousarray(attitude, dtype=float), y)
     y[4:7] = omega * t0
     scaled = TidePanels(tide.tau / t0, tide.start, tide.width, tide.coefficients * t0**2)
-    hist = np.zeros((max(keep, 1), regimes.N_HISTORY))
-    events = np.zeros((64, regimes.N_EVENT))
+    hist = np.zeros((max(keep, 1), N_HISTORY))
+    events = np.zeros((64, N_EVENT))
     count = np.zeros(4, dtype=np.int64)
     mark = np.zeros(2)
     reason, t, regime = regimes.follow(

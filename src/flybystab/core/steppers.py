@@ -1,11 +1,11 @@
 """Two embedded one-step methods with dense output, for the equations of :mod:`flybystab.core.motion`.
 
-``explicit_step``  DOP853 (Hairer, Norsett & Wanner 1993, section II.5), order 8(5,3), dense output of order 7:
-                   the rigid, dispersed and fluid regimes. Coefficients as tabulated in SciPy.
+``explicit_step``  DOP853 (Hairer, Norsett & Wanner 1993, section II.5), order 8(5,3), dense output of
+                   order 7: the rigid, dispersed and fluid regimes. Coefficients as tabulated in SciPy.
 ``implicit_step``  Rodas5P (Steinebach 2023, BIT 63:27), an L-stable, stiffly accurate Rosenbrock method of
-                   order 5(4), dense output of order 4: plastic flow. The direction of flow relaxes at the rate
-                   ``k P/(a^2 |D|)``, which is unbounded at onset and arrest; one linear solve a stage and no
-                   Newton iteration follow it.
+                   order 5(4), dense output of order 4: plastic flow. The direction of flow relaxes at the
+                   rate ``k P/(a^2 |D|)``, which is unbounded at onset and arrest; one linear solve a stage
+                   and no Newton iteration follow it.
 """
 
 from __future__ import annotations
@@ -271,7 +271,7 @@ def flow_jacobian(
 
 
 @kernel
-def factorise(a: Array, n: int, pivots: Array) -> bool:
+def factorise(a: Array, n: int, pivots: NDArray[np.int64]) -> bool:
     """LU factors of ``a[n, n]`` in place with partial pivoting; False if singular."""
     for c in range(n):
         p = c
@@ -297,7 +297,7 @@ def factorise(a: Array, n: int, pivots: Array) -> bool:
 
 
 @kernel
-def solve(a: Array, n: int, pivots: Array, b: Array) -> None:
+def solve(a: Array, n: int, pivots: NDArray[np.int64], b: Array) -> None:
     """Solve ``a x = b`` in place from `factorise`."""
     for c in range(n):
         p = pivots[c]
@@ -326,7 +326,7 @@ def implicit_step(
     jac: Array,
     ft: Array,
     lu: Array,
-    pivots: Array,
+    pivots: NDArray[np.int64],
     k: Array,
     scale: Array,
     y1: Array,

@@ -1,0 +1,165 @@
+"""Plastic flow up to arrest, loss of contact, jam or the limit of the model."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flybystab.core.jit import kernel
+from flybystab.core.motion import COHESION, FLOWING, N_FULL, SIN_PHI, W_SCRATCH, invariants, rate
+from flybystab.core.steppers import flow_jacobian, implicit_at, implicit_step
+from flybystab.core.tensors import eigensystem
+from flybystab.core.tide import TidePanels
+from flybystab.core.workspace import (
+    ARREST,
+    BEYOND,
+    D_REST,
+    DONE,
+    JAM,
+    LOSS,
+    STUCK,
+    Counts,
+    Workspace,
+    copy,
+    record,
+)
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def strain_rate(y: Array) -> float:
+    """``|D'|`` of a 15-number state."""
+    m = (y[6] + y[7] + y[8]) / 3.0
+    return np.sqrt(
+        (y[6] - m) ** 2 + (y[7] - m) ** 2 + (y[8] - m) ** 2 + 2.0 * (y[9] ** 2 + y[10] ** 2 + y[11] ** 2)
+    )
+
+
+@kernel
+def axis_ratio2(y: Array, ws: Workspace) -> float:
+    """Square of the largest over the least semi-axis."""
+    values = ws.work.m[W_SCRATCH, 0]
+    eigensystem(y[0:6], values, ws.work.m[W_SCRATCH + 1])
+    return max(values[0], max(values[1], values[2])) / min(values[0], min(values[1], values[2]))
+
+
+@kernel
+def _health(
+    t: float, y: Array, dy: Array, par: Array, tide: TidePanels, limit2: float, ws: Workspace
+) -> float:
+    """Least of the three event functions of flow; negative once one of them is over. Sets the rate `dy`.
+
+    They are the strength ``k P + k c`` (the pressure of a fluid), the denominator of the pressure, and the
+    distance from the axis ratio where the model is left. ``ws.mark[3]`` keeps the code of the least.
+    """
+    denominator = rate(FLOWING, t, y, dy, par, tide, ws.work)
+    values = ws.work.m[W_SCRATCH, 0]
+    ratio2 = max(values[0], max(values[1], values[2])) / min(values[0], min(values[1], values[2]))
+    strength = ws.work.m[W_SCRATCH, 1, 1]
+    if par[SIN_PHI] == 0.0 and par[COHESION] == 0.0:
+        strength = ws.work.m[W_SCRATCH, 1, 2]
+    least = limit2 - ratio2
+    ws.mark[3] = BEYOND
+    # Past a vanishing denominator the sign of the strength says nothing.
+    if denominator < least:
+        least = denominator
+        ws.mark[3] = JAM
+    if denominator > 0.0 and strength < least:
+        least = strength
+        ws.mark[3] = LOSS
+    return least
+
+
+@kernel
+def follow_flow(
+    t: float,
+    t1: float,
+    par: Array,
+    tide: TidePanels,
+    tol: float,
+    limit: float,
+    max_steps: int,
+    ws: Workspace,
+    hist: Array,
+    count: Counts,
+) -> tuple[int, float]:
+    """Plastic flow of ``ws.y`` up to one of its ends or `t1`; returns (reason, time)."""
+    y = ws.y
+    f0 = ws.k[8]
+    spare = ws.k[9]
+    h = 1e-4
+    limit2 = limit * limit
+    if _health(t, y, f0, par, tide, limit2, ws) < 0.0:
+        return int(ws.mark[3]), t
+    while t < t1:
+        # Here f0 and the stress in `ws.work` belong to (t, y).
+        p, strength = ws.work.m[W_SCRATCH, 1, 2], ws.work.m[W_SCRATCH, 1, 1]
+        _, d, det = invariants(y[6:12], ws.stress)
+        record(t, FLOWING, y, par, p, strength, det, ws, hist, count)
+        flow_jacobian(t, y, f0, 1e-6, par, tide, ws.work, ws.jac, ws.ft, ws.ys)
+        # d|D'|/dt = Dhat : Ddot
+        trend = 0.0
+        for i in range(3):
+            trend += ws.stress[i] * f0[6 + i] + 2.0 * ws.stress[3 + i] * f0[9 + i]
+        if trend < 0.0:
+            # |D| falls linearly to arrest, its direction relaxes as 1/|D|: approach it geometrically.
+            h = min(h, 0.8 * d / -trend)
+        for i in range(6):
+            ws.scale[i] = tol
+            ws.scale[6 + i] = tol * max(d, 1e-4)
+        for i in range(12, 15):
+            ws.scale[i] = tol
+        while True:
+            if count[2] >= max_steps:
+                return STUCK, t
+            last = h >= t1 - t
+            if last:
+                h = t1 - t
+            error = implicit_step(
+                t, y, h, par, tide, ws.work, ws.jac, ws.ft, ws.lu, ws.pivots, ws.k, ws.scale, ws.y1, ws.dense
+            )
+            count[2] += 1
+            if error <= 1.0:
+                break
+            count[3] += 1
+            h *= max(0.1, 0.9 * error ** (-0.2)) if np.isfinite(error) else 0.1
+            if h < 1e-15 * max(1.0, abs(t)):
+                return STUCK, t
+        # Half-way and at the end: has one of the event functions changed its sign?
+        found = 2.0
+        low = 0.0
+        implicit_at(0.5, y, N_FULL, ws.dense, ws.y1, ws.ys)
+        if _health(t + 0.5 * h, ws.ys, spare, par, tide, limit2, ws) < 0.0:
+            found = 0.5
+        else:
+            p, strength = ws.work.m[W_SCRATCH, 1, 2], ws.work.m[W_SCRATCH, 1, 1]
+            _, _, det = invariants(ws.ys[6:12], ws.stress)
+            record(t + 0.5 * h, FLOWING, ws.ys, par, p, strength, det, ws, hist, count)
+            if _health(t + h, ws.y1, f0, par, tide, limit2, ws) < 0.0:
+                low, found = 0.5, 1.0
+        if found <= 1.0:
+            high = found
+            for _ in range(52):
+                mid = 0.5 * (low + high)
+                implicit_at(mid, y, N_FULL, ws.dense, ws.y1, ws.ys)
+                if _health(t + mid * h, ws.ys, spare, par, tide, limit2, ws) < 0.0:
+                    high = mid
+                else:
+                    low = mid
+            implicit_at(high, y, N_FULL, ws.dense, ws.y1, ws.ys)
+            _health(t + high * h, ws.ys, spare, par, tide, limit2, ws)
+            reason = int(ws.mark[3])
+            # Repeat the step up to the root: the order of the method instead of that of the interpolant.
+            h *= high
+            implicit_step(
+                t, y, h, par, tide, ws.work, ws.jac, ws.ft, ws.lu, ws.pivots, ws.k, ws.scale, ws.y1, ws.dense
+            )
+            copy(ws.y1, y, N_FULL)
+            return reason, t + h
+        t = t1 if last else t + h
+        copy(ws.y1, y, N_FULL)
+        if strain_rate(y) < D_REST:
+            return ARREST, t
+        h *= min(6.0, max(0.2, 0.9 * error ** (-0.2))) if error > 0.0 else 6.0
+    return DONE, t

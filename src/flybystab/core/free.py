@@ -1,0 +1,102 @@
+"""Motion without friction: dispersed grains, and the fluid closures."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flybystab.core.flow import axis_ratio2
+from flybystab.core.jit import kernel
+from flybystab.core.motion import DISPERSED, FLUID, N_FULL, W_SCRATCH, rate
+from flybystab.core.steppers import explicit_at, explicit_dense, explicit_step
+from flybystab.core.tensors import determinant
+from flybystab.core.tide import TidePanels
+from flybystab.core.workspace import BEYOND, CONTACT, DONE, N_SAMPLE, STUCK, Counts, Workspace, copy, record
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def follow_free(
+    regime: int,
+    t: float,
+    t1: float,
+    par: Array,
+    tide: TidePanels,
+    tol: float,
+    limit: float,
+    max_steps: int,
+    ws: Workspace,
+    hist: Array,
+    count: Counts,
+) -> tuple[int, float]:
+    """Dispersed or fluid motion of ``ws.y`` up to contact, the axis ratio `limit` or `t1`; (reason, time)."""
+    y = ws.y
+    k = ws.k
+    h = 1e-2
+    lost = determinant(y[0:6])
+    rate(regime, t, y, k[0], par, tide, ws.work)
+    while t < t1:
+        if hist.shape[0] > 1:
+            record(
+                t,
+                regime,
+                y,
+                par,
+                ws.work.m[W_SCRATCH, 1, 2] if regime == FLUID else 0.0,
+                0.0,
+                0.0,
+                ws,
+                hist,
+                count,
+            )
+        if count[2] >= max_steps:
+            return STUCK, t
+        last = h >= t1 - t
+        if last:
+            h = t1 - t
+        for i in range(15):
+            ws.scale[i] = tol * max(1.0, abs(y[i]))
+        error = explicit_step(regime, t, y, N_FULL, h, par, tide, ws.work, k, ws.scale, ws.y1)
+        count[2] += 1
+        if not error <= 1.0:
+            count[3] += 1
+            h *= max(0.2, 0.9 * error ** (-0.125)) if np.isfinite(error) else 0.2
+            if h < 1e-14 * max(1.0, abs(t)):
+                return STUCK, t
+            continue
+        explicit_dense(regime, t, y, N_FULL, h, par, tide, ws.work, k, ws.y1, ws.ys, ws.dense)
+        found = 2.0
+        low = 0.0
+        reason = DONE
+        for j in range(1, 2 * N_SAMPLE + 1):
+            x = 0.5 * j / N_SAMPLE
+            explicit_at(x, y, N_FULL, ws.dense, ws.ys)
+            if axis_ratio2(ws.ys, ws) > limit * limit:
+                found, reason = x, BEYOND
+                break
+            if regime == DISPERSED and determinant(ws.ys[0:6]) < lost:
+                found, reason = x, CONTACT
+                break
+            low = x
+        if found <= 1.0:
+            high = found
+            for _ in range(55):
+                mid = 0.5 * (low + high)
+                explicit_at(mid, y, N_FULL, ws.dense, ws.ys)
+                if (reason == BEYOND and axis_ratio2(ws.ys, ws) > limit * limit) or (
+                    reason == CONTACT and determinant(ws.ys[0:6]) < lost
+                ):
+                    high = mid
+                else:
+                    low = mid
+            explicit_step(regime, t, y, N_FULL, high * h, par, tide, ws.work, k, ws.scale, ws.y1)
+            copy(ws.y1, y, N_FULL)
+            return reason, t + high * h
+        t = t1 if last else t + h
+        copy(ws.y1, y, N_FULL)
+        k[0] = k[12]
+        h *= min(5.0, max(0.3, 0.9 * error ** (-0.125))) if error > 0.0 else 5.0
+        if tide.coefficients.shape[0] > 0:
+            h = min(h, 0.4 * np.sqrt(t * t + tide.tau * tide.tau))
+    return DONE, t

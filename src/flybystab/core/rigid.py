@@ -1,0 +1,231 @@
+"""Rigid motion up to yield: Euler's equations, the yield function on dense output, and its extrema."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flybystab.core.jit import code, kernel
+from flybystab.core.motion import (
+    BETA,
+    COHESION,
+    N_RIGID,
+    RIGID,
+    S1,
+    S2,
+    S3,
+    SIN_PHI,
+    SURFACE,
+    rate,
+    rigid_excess,
+)
+from flybystab.core.rheology import required_friction, slope
+from flybystab.core.steppers import explicit_at, explicit_dense, explicit_step
+from flybystab.core.tide import TidePanels
+from flybystab.core.workspace import DONE, N_SAMPLE, ONSET, STUCK, Counts, Workspace, copy, record
+
+Array = NDArray[np.float64]
+
+# What `_rigid_values` returns.
+_ONSET = code(0)
+_FRICTION = code(1)
+
+_GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
+
+
+@kernel
+def yields(t: float, y: Array, par: Array, tide: TidePanels, ws: Workspace) -> float:
+    """Positive where a RIGID state has yielded and can flow: the smaller of the yield excess and, beyond
+    yield, the denominator of the pressure for flow along the deviator of the rigid stress.
+    """
+    excess, p, norm, det = rigid_excess(t, y, par, tide, ws.work, ws.stress)
+    if excess <= 0.0:
+        return excess
+    return min(excess, onset_denominator(p, norm, det, par, ws.stress))
+
+
+@kernel
+def onset_denominator(p: float, norm: float, det: float, par: Array, stress: Array) -> float:
+    """``B:((1 - k Dhat) S^-1)`` for ``Dhat`` along the deviator of ``stress[6]`` (body axes)."""
+    if norm == 0.0:
+        return 1.0
+    k = slope(int(par[SURFACE]), par[SIN_PHI], det)
+    beta = par[BETA]
+    i1, i2, i3 = 1.0 / par[S1], 1.0 / par[S2], 1.0 / par[S3]
+    n0, n1, n2 = (stress[0] + p) / norm, (stress[1] + p) / norm, (stress[2] + p) / norm
+    n3, n4, n5 = stress[3] / norm, stress[4] / norm, stress[5] / norm
+    n_s = n0 * i1 + n1 * i2 + n2 * i3
+    nn_s = (
+        (n0 * n0 + n3 * n3 + n4 * n4) * i1
+        + (n1 * n1 + n3 * n3 + n5 * n5) * i2
+        + (n2 * n2 + n4 * n4 + n5 * n5) * i3
+    )
+    return i1 + i2 + i3 - (k + beta) * n_s + k * beta * nn_s
+
+
+@kernel
+def _rigid_values(t: float, y: Array, par: Array, tide: TidePanels, ws: Workspace, which: int) -> float:
+    """Onset function (`which` 0) or mobilised friction angle (1) of a RIGID state."""
+    if which == _ONSET:
+        return yields(t, y, par, tide, ws)
+    _, p, norm, det = rigid_excess(t, y, par, tide, ws.work, ws.stress)
+    volume = np.sqrt(par[S1] * par[S2] * par[S3])
+    return required_friction(int(par[SURFACE]), par[COHESION] * volume, norm, p, det)
+
+
+@kernel
+def _largest(
+    a: float, b: float, t: float, h: float, par: Array, tide: TidePanels, ws: Workspace, which: int
+) -> tuple[float, float]:
+    """Golden-section maximum over the fractions [a, b] of a rigid step: where, and how large."""
+    x1 = b - _GOLDEN * (b - a)
+    x2 = a + _GOLDEN * (b - a)
+    explicit_at(x1, ws.y, N_RIGID, ws.dense, ws.ys)
+    f1 = _rigid_values(t + x1 * h, ws.ys, par, tide, ws, which)
+    explicit_at(x2, ws.y, N_RIGID, ws.dense, ws.ys)
+    f2 = _rigid_values(t + x2 * h, ws.ys, par, tide, ws, which)
+    for _ in range(36):
+        if f1 < f2:
+            a = x1
+            x1, f1 = x2, f2
+            x2 = a + _GOLDEN * (b - a)
+            explicit_at(x2, ws.y, N_RIGID, ws.dense, ws.ys)
+            f2 = _rigid_values(t + x2 * h, ws.ys, par, tide, ws, which)
+        else:
+            b = x2
+            x2, f2 = x1, f1
+            x1 = b - _GOLDEN * (b - a)
+            explicit_at(x1, ws.y, N_RIGID, ws.dense, ws.ys)
+            f1 = _rigid_values(t + x1 * h, ws.ys, par, tide, ws, which)
+    return (x1, f1) if f1 > f2 else (x2, f2)
+
+
+@kernel
+def _vertex_inside(f0: float, f1: float, f2: float) -> bool:
+    """Whether the parabola through three equidistant values has its maximum between the outer two."""
+    bend = f0 - 2.0 * f1 + f2
+    return bend < 0.0 and abs(f2 - f0) <= -2.0 * bend
+
+
+@kernel
+def follow_rigid(
+    t: float,
+    t1: float,
+    par: Array,
+    tide: TidePanels,
+    tol: float,
+    unyielding: bool,
+    max_steps: int,
+    ws: Workspace,
+    hist: Array,
+    count: Counts,
+) -> tuple[int, float]:
+    """Rigid motion of ``ws.y[:7]`` up to yield or `t1`; returns (reason, time)."""
+    y = ws.y
+    k = ws.k
+    h = min(0.05, t1 - t) if ws.mark[2] <= 0.0 else min(ws.mark[2], t1 - t)
+    rate(RIGID, t, y, k[0], par, tide, ws.work)
+    excess, p, norm, det = rigid_excess(t, y, par, tide, ws.work, ws.stress)
+    surface = int(par[SURFACE])
+    cohesion = par[COHESION] * np.sqrt(par[S1] * par[S2] * par[S3])
+    record(t, RIGID, y, par, p, norm, det, ws, hist, count)
+    f = ws.sample
+    f[0, N_SAMPLE] = yields(t, y, par, tide, ws)
+    f[1, N_SAMPLE] = required_friction(surface, cohesion, norm, p, det)
+    if f[1, N_SAMPLE] > ws.mark[0]:
+        ws.mark[0], ws.mark[1] = f[1, N_SAMPLE], t
+    if not unyielding and f[0, N_SAMPLE] > 0.0:
+        return ONSET, t
+    while t < t1:
+        if count[2] >= max_steps:
+            return STUCK, t
+        last = h >= t1 - t
+        if last:
+            h = t1 - t
+        spin = np.sqrt(y[4] ** 2 + y[5] ** 2 + y[6] ** 2)
+        for i in range(7):
+            ws.scale[i] = tol if i < 4 else tol * max(spin, 0.1)
+        error = explicit_step(RIGID, t, y, N_RIGID, h, par, tide, ws.work, k, ws.scale, ws.y1)
+        count[2] += 1
+        if not error <= 1.0:
+            count[3] += 1
+            h *= max(0.2, 0.9 * error ** (-0.125)) if np.isfinite(error) else 0.2
+            continue
+        explicit_dense(RIGID, t, y, N_RIGID, h, par, tide, ws.work, k, ws.y1, ws.ys, ws.dense)
+        f[0, 0], f[1, 0] = f[0, N_SAMPLE], f[1, N_SAMPLE]
+        end = 2.0  # fraction at which the body yields
+        for j in range(1, N_SAMPLE + 1):
+            x = j / N_SAMPLE
+            explicit_at(x, y, N_RIGID, ws.dense, ws.ys)
+            excess, p, norm, det = rigid_excess(t + x * h, ws.ys, par, tide, ws.work, ws.stress)
+            f[0, j] = (
+                excess if excess <= 0.0 else min(excess, onset_denominator(p, norm, det, par, ws.stress))
+            )
+            f[1, j] = required_friction(surface, cohesion, norm, p, det)
+            if not unyielding and f[0, j] > 0.0:
+                end = x
+                break
+            record(t + x * h, RIGID, ws.ys, par, p, norm, det, ws, hist, count)
+        n = N_SAMPLE if end > 1.0 else int(np.rint(end * N_SAMPLE)) - 1
+        # Extrema between the samples: of the mobilised friction, and of the yield function near zero.
+        for j in range(1, n):
+            a, b = (j - 1.0) / N_SAMPLE, (j + 1.0) / N_SAMPLE
+            if (
+                f[1, j] < np.inf
+                and _vertex_inside(f[1, j - 1], f[1, j], f[1, j + 1])
+                and f[1, j] + abs(f[1, j + 1] - f[1, j - 1]) > ws.mark[0]
+            ):
+                x, value = _largest(a, b, t, h, par, tide, ws, _FRICTION)
+                if value > ws.mark[0]:
+                    ws.mark[0], ws.mark[1] = value, t + x * h
+            if (
+                not unyielding
+                and end > 1.0
+                and _vertex_inside(f[0, j - 1], f[0, j], f[0, j + 1])
+                and f[0, j] + abs(f[0, j + 1] - f[0, j - 1]) + 0.02 * norm > 0.0
+            ):
+                x, value = _largest(a, b, t, h, par, tide, ws, _ONSET)
+                if value > 0.0:
+                    end = x
+                    n = j - 1
+        for j in range(1, n + 1):
+            if f[1, j] > ws.mark[0]:
+                ws.mark[0], ws.mark[1] = f[1, j], t + h * j / N_SAMPLE
+        if end <= 1.0:
+            low, high = n / N_SAMPLE, end
+            for _ in range(60):
+                mid = 0.5 * (low + high)
+                explicit_at(mid, y, N_RIGID, ws.dense, ws.ys)
+                if yields(t + mid * h, ws.ys, par, tide, ws) > 0.0:
+                    high = mid
+                else:
+                    low = mid
+                if (high - low) * h < 1e-14 * max(1.0, abs(t)):
+                    break
+            explicit_at(high, y, N_RIGID, ws.dense, ws.ys)
+            # Repeat the step up to the root: order 8 instead of the order of the interpolant.
+            explicit_step(RIGID, t, y, N_RIGID, high * h, par, tide, ws.work, k, ws.scale, ws.y1)
+            t += high * h
+            copy(ws.y1, y, N_RIGID)
+            _normalise(y)
+            ws.mark[2] = h
+            value = _rigid_values(t, y, par, tide, ws, _FRICTION)
+            if value > ws.mark[0]:
+                ws.mark[0], ws.mark[1] = value, t
+            return ONSET, t
+        t = t1 if last else t + h
+        copy(ws.y1, y, N_RIGID)
+        _normalise(y)
+        k[0] = k[12]
+        h *= min(5.0, max(0.3, 0.9 * error ** (-0.125))) if error > 0.0 else 5.0
+        # A step never spans more of the change of variable of the tide than its panels resolve.
+        h = min(h, 0.4 * np.sqrt(t * t + tide.tau * tide.tau) if tide.coefficients.shape[0] > 0 else h)
+    ws.mark[2] = 0.0
+    return DONE, t
+
+
+@kernel
+def _normalise(q: Array) -> None:
+    s = 1.0 / np.sqrt(q[0] ** 2 + q[1] ** 2 + q[2] ** 2 + q[3] ** 2)
+    for i in range(4):
+        q[i] *= s

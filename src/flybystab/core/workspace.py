@@ -1,0 +1,137 @@
+"""What the followers of the regimes share: buffers, codes, the history and the event log."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flybystab.core.jit import code, kernel
+from flybystab.core.motion import N_WORK, RIGID, S1, S2, S3, W_SCRATCH, Buffers, rotation_matrix
+from flybystab.core.steppers import N_STAGES
+from flybystab.core.tide import COMPONENTS
+
+Array = NDArray[np.float64]
+Counts = NDArray[np.int64]
+
+# Why a regime (or the run) ended; the same codes head the rows of the event log.
+DONE = code(0)
+ONSET = code(1)
+ARREST = code(2)
+LOSS = code(3)
+CONTACT = code(4)
+BEYOND = code(5)
+JAM = code(6)
+STUCK = code(7)  # more steps or switches than allowed
+
+#: Columns of the history: time, regime, S (6), D (6), w (3), pressure, deviator norm, unit determinant.
+N_HISTORY = 20
+#: Columns of the event log: code, time, Lode determinant, volume.
+N_EVENT = 4
+#: Samples in each step: history rows, and the grid on which extrema of the yield function are looked for.
+N_SAMPLE = 4
+
+#: Rate of strain, in dynamical units, below which the body is at rest.
+D_REST = 1e-10
+
+
+class Workspace(NamedTuple):
+    """Buffers of a run, allocated once."""
+
+    work: Buffers
+    k: Array
+    jac: Array
+    ft: Array
+    lu: Array
+    pivots: NDArray[np.int64]
+    dense: Array
+    y: Array
+    y1: Array
+    ys: Array
+    scale: Array
+    stress: Array
+    sample: Array
+    mark: Array  # largest mobilised friction, its time; step size; |D| peak
+
+
+@kernel
+def copy(a: Array, b: Array, n: int) -> None:
+    """``b[:n] = a[:n]``."""
+    for i in range(n):
+        b[i] = a[i]
+
+
+@kernel
+def workspace() -> Workspace:
+    """Fresh buffers."""
+    return Workspace(
+        Buffers(np.zeros((N_WORK, 3, 3)), np.zeros((3, 6))),
+        np.zeros((N_STAGES, 15)),
+        np.zeros((15, 15)),
+        np.zeros(15),
+        np.zeros((15, 15)),
+        np.zeros(15, dtype=np.int64),
+        np.zeros((7, 15)),
+        np.zeros(15),
+        np.zeros(15),
+        np.zeros(15),
+        np.ones(15),
+        np.zeros(6),
+        np.zeros((2, N_SAMPLE + 1)),
+        np.zeros(4),
+    )
+
+
+@kernel
+def record(
+    t: float,
+    regime: int,
+    y: Array,
+    par: Array,
+    p: float,
+    s: float,
+    det: float,
+    ws: Workspace,
+    hist: Array,
+    count: Counts,
+) -> None:
+    """Append a row to the history; when it is full every second row is dropped first."""
+    if hist.shape[0] < 2:
+        return
+    n = count[0]
+    if n == hist.shape[0]:
+        m = n // 2
+        for i in range(m):
+            for j in range(N_HISTORY):
+                hist[i, j] = hist[2 * i, j]
+        n = m
+    row = hist[n]
+    row[0] = t
+    row[1] = regime
+    if regime == RIGID:
+        m = ws.work.m[W_SCRATCH]
+        rotation_matrix(y, m)
+        s1, s2, s3 = par[S1], par[S2], par[S3]
+        for c, (i, j) in enumerate(COMPONENTS):
+            row[2 + c] = s1 * m[i, 0] * m[j, 0] + s2 * m[i, 1] * m[j, 1] + s3 * m[i, 2] * m[j, 2]
+        for i in range(6):
+            row[8 + i] = 0.0
+        for i in range(3):
+            row[14 + i] = m[i, 0] * y[4] + m[i, 1] * y[5] + m[i, 2] * y[6]
+    else:
+        for i in range(15):
+            row[2 + i] = y[i]
+    row[17] = p
+    row[18] = s
+    row[19] = det
+    count[0] = n + 1
+
+
+@kernel
+def log(what: int, t: float, det: float, volume: float, events: Array, count: Counts) -> None:
+    """Append a row to the event log; a full log keeps its first rows and counts on."""
+    if count[1] < events.shape[0]:
+        row = events[count[1]]
+        row[0], row[1], row[2], row[3] = what, t, det, volume
+    count[1] += 1
