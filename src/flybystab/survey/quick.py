@@ -46,11 +46,12 @@ def _holds(code: int, phi: float, cohesion: float, s: float, p: float, d: float)
 
 
 @kernel
-def _friction_bound(code: int, cohesion: float, s: float, p: float, d: float) -> float:
-    """A friction angle (rad) at which `_holds`, near the least such angle; inf where none was found."""
+def _friction_bound(code: int, phi: float, cohesion: float, s: float, p: float, d: float) -> float:
+    """A friction angle (rad) at which `_holds`, at most `phi` if it holds there; inf where none was found."""
     if _holds(code, 0.0, cohesion, s, p, d):
         return 0.0
-    high = _LARGEST
+    # In tension a larger angle is not better: cohesion counts for less.
+    high = phi if _holds(code, phi, cohesion, s, p, d) else _LARGEST
     if not _holds(code, high, cohesion, s, p, d):
         return np.inf
     low = 0.0
@@ -112,7 +113,7 @@ def quick_margins(
     impulse: float,
     start: float,
     friction: Array,
-    verdict: Array,
+    verdict: NDArray[np.int64],
 ) -> None:
     """Judge many bodies in one tide.
 
@@ -150,7 +151,7 @@ def quick_margins(
         spin[2] = np.sqrt(centre)
         rigid_stress(s1, s2, s3, rho[i], rate2, spin, none, stress)
         p, s, det = invariants(stress)
-        friction[i, 1] = _friction_bound(code, cohesion[i], s, p, scale * d)
+        friction[i, 1] = _friction_bound(code, phi[i], cohesion[i], s, p, scale * d)
         if out > 1e-9 * (abs(p) + cohesion[i]):
             verdict[i] = NOT_IN_EQUILIBRIUM
         elif _holds(code, phi[i], cohesion[i], s, p, scale * d):

@@ -1,0 +1,199 @@
+"""Verdicts on many bodies in one passage: by the bound where it decides, by the dynamics elsewhere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import astropy.units as u
+import numpy as np
+from astropy.time import Time
+from numpy.typing import NDArray
+from scipy.stats import rankdata
+
+from flybystab.aggregate.body import Material
+from flybystab.flyby import LOOSER, flyby_many, periapsis_axes
+from flybystab.outcome import Verdict
+from flybystab.sky.encounter import Encounter
+from flybystab.sky.planets import PLANETS, planet
+from flybystab.survey.catalogue import Asteroid
+from flybystab.survey.population import Attitudes, Draws
+from flybystab.survey.quick import INTACT, UNDECIDED, quick_margins, tide_size
+
+Array = NDArray[np.float64]
+
+#: Beyond this distance (m) from the Earth the Moon can be bounded without knowing where it is.
+FAR_FROM_EARTH = 3 * 3.844e8
+_MOON_APOGEE = 4.067e8
+#: The passage lasts while the planet is nearer than this many closest distances.
+SPAN = 10.0
+_SQRT6 = np.sqrt(6.0)
+
+
+@dataclass
+class Passage:
+    """One encounter of one asteroid during its screening; the tide is made when it is first needed."""
+
+    asteroid: Asteroid
+    planet: str
+    time: Time
+    distance: float
+    v_inf: float
+    encounter: Encounter | None = None
+    size: tuple[float, float, float] = field(default=(np.inf, np.inf, np.inf))
+
+    def bounds(self) -> tuple[float, float, float]:
+        """Bounds on the tide from distance and speed alone; infinite where they say too little."""
+        body = planet(self.planet)
+        far = self.planet != "earth" or self.distance > FAR_FROM_EARTH
+        if not far or self.distance < 3.0 * body.radius or not self.v_inf > 0.0:
+            return np.inf, np.inf, np.inf
+        q, v = self.distance, self.v_inf
+        others = PLANETS["sun"].gm / (0.7 * body.orbit_radius) ** 3
+        if self.planet == "earth":
+            others += PLANETS["moon"].gm / (q - _MOON_APOGEE) ** 3
+        # J2 adds at most 6 J2 (R/q)^2; the point-mass integral is 2 (nu + e sin nu)/(h p) at most.
+        flat = 1.0 + 6.0 * body.j2 * (body.radius / q) ** 2
+        e = 1.0 + q * v * v / body.gm
+        p = q * (1.0 + e)
+        nu = np.arccos(-1.0 / e)
+        peak = body.gm / q**3 * flat
+        impulse = body.gm * flat * 2.0 * (nu + e * np.sin(nu)) / (np.sqrt(body.gm * p) * p)
+        duration = 2.0 * SPAN * q / v
+        # 2 percent covers the other planets and the bending of the orbit by the Sun.
+        size = _SQRT6 * 1.02 * np.array([peak + others, impulse + others * duration, peak + others])
+        return float(size[0]), float(size[1]), float(size[2])
+
+    def meet(self) -> Encounter:
+        """The encounter, followed with all forces."""
+        if self.encounter is None:
+            self.encounter = Encounter.from_orbit(self.asteroid.orbit, self.planet, self.time)
+            e = self.encounter
+            self.size = tide_size(e.tide, e.t_start, e.t_stop)
+        return self.encounter
+
+
+def _quick(draw: Draws, code: int, size: tuple[float, float, float]) -> tuple[Array, NDArray[np.int64]]:
+    n = len(draw.rho)
+    friction, verdict = np.full((n, 2), np.inf), np.zeros(n, dtype=np.int64)
+    quick_margins(
+        np.ascontiguousarray(draw.axes),
+        draw.rho,
+        np.ascontiguousarray(draw.omega),
+        draw.phi,
+        draw.cohesion,
+        code,
+        *size,
+        friction,
+        verdict,
+    )
+    return friction, verdict
+
+
+@dataclass
+class Judged:
+    """Verdicts on the samples of one passage."""
+
+    verdict: list[str]
+    margin: Array
+    rest: Array
+    dynamic: NDArray[np.bool_]
+    error: list[str]
+    numerical: float = np.nan
+
+
+def judge(
+    passage: Passage,
+    draw: Draws,
+    attitudes: Attitudes,
+    material: Material,
+    *,
+    tolerance: float = 1e-7,
+    quick: bool = True,
+    measure: bool = False,
+) -> Judged:
+    """Verdicts on bodies in one passage: by the bound where it decides, else by the dynamics.
+
+    Parameters
+    ----------
+    passage : Passage
+    draw : Draws
+    attitudes : Attitudes
+        Of the same samples.
+    material : Material
+        Yield surface, dilatancy and brittleness; friction and cohesion are those of the draw.
+    quick : bool
+        Whether the bound may decide.
+    measure : bool
+        Measure the numerical error of the first body by a run with a larger step tolerance.
+    """
+    n = len(draw.rho)
+    code = material.surface_code
+    friction, decided = _quick(draw, code, passage.bounds())
+    if not quick:
+        decided[:] = UNDECIDED
+    if np.any(decided == UNDECIDED):
+        encounter = passage.meet()
+        if quick and not encounter.impact:
+            close, sharper = _quick(draw, code, passage.size)
+            fresh = (decided == UNDECIDED) & (sharper != UNDECIDED)
+            friction[fresh], decided[fresh] = close[fresh], sharper[fresh]
+    dynamic = decided == UNDECIDED
+    out = Judged([""] * n, np.full(n, np.nan), friction[:, 0].copy(), dynamic, [""] * n)
+    for i in (int(k) for k in np.flatnonzero(~dynamic)):
+        intact = decided[i] == INTACT
+        out.verdict[i] = Verdict.INTACT if intact else Verdict.NOT_IN_EQUILIBRIUM
+        out.margin[i] = draw.phi[i] - friction[i, 1 if intact else 0]
+    todo = [int(k) for k in np.flatnonzero(dynamic)]
+    if todo:
+        encounter = passage.meet()
+        frame = periapsis_axes(encounter)
+        bodies = [draw.body(i, material) for i in todo]
+        turns = [frame @ attitudes.matrix(i) for i in todo]
+        table = flyby_many(bodies, [encounter] * len(todo), turns, tolerance=tolerance, workers=1)
+        for k, i in enumerate(todo):
+            out.error[i] = str(table.failure[k])
+            out.verdict[i] = "" if out.error[i] else str(table.verdict[k])
+            out.margin[i] = np.radians(table.margin[k].to_value(u.deg))
+        if measure and dynamic[0] and not out.error[0]:
+            looser = flyby_many(bodies[:1], [encounter], turns[:1], tolerance=LOOSER * tolerance, workers=1)
+            out.numerical = float(abs(looser.margin[0] - table.margin[0]).to_value(u.deg))
+    return out
+
+
+def wilson(successes: int, trials: int, z: float = 1.959964) -> tuple[float, float]:
+    """Wilson score interval of a probability; (0, 1) without trials."""
+    if trials == 0:
+        return 0.0, 1.0
+    p = successes / trials
+    centre = p + z * z / (2 * trials)
+    half = z * np.sqrt(p * (1 - p) / trials + z * z / (4 * trials * trials))
+    scale = 1 + z * z / trials
+    return max(0.0, (centre - half) / scale), min(1.0, (centre + half) / scale)
+
+
+def contributors(inputs: dict[str, Array], outcome: Array, most: int = 3) -> str:
+    """Inputs whose ranks follow the outcome most, with Spearman's rank correlation."""
+    good = np.isfinite(outcome)
+    if good.sum() < 8 or np.ptp(outcome[good]) == 0.0:
+        return ""
+    ranks = rankdata(outcome[good])
+    found = []
+    for name, values in inputs.items():
+        x = values[good]
+        if np.ptp(x) > 1e-12 * np.abs(x).max():
+            found.append((float(np.corrcoef(rankdata(x), ranks)[0, 1]), name))
+    found.sort(key=lambda f: -abs(f[0]))
+    return ", ".join(f"{name} {rho:+.2f}" for rho, name in found[:most])
+
+
+def inputs(draw: Draws) -> dict[str, Array]:
+    """The drawn inputs by name."""
+    return {
+        "friction angle": draw.phi,
+        "cohesion": draw.cohesion,
+        "density": draw.rho,
+        "size": np.cbrt(np.prod(draw.axes, axis=1)),
+        "b/a": draw.axes[:, 1] / draw.axes[:, 0],
+        "c/b": draw.axes[:, 2] / draw.axes[:, 1],
+        "spin period": draw.period,
+    }
