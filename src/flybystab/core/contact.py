@@ -1,8 +1,12 @@
-"""The inelastic impulse with which a dispersed body comes back into contact (theory, section 3).
+"""Friction impulse: what a set-valued yield law does to a velocity gradient at one instant.
 
-``Delta L = -That S^-1`` with ``That = Phat (-1 + k Dhat)``, ``Phat >= 0`` and ``Dhat`` along the deviatoric
-rate of strain afterwards, such that ``tr D = beta |D'|`` then. A symmetric ``That`` keeps the angular
-momentum; being opposed to the motion that it leaves, it never raises the kinetic energy.
+``Delta L = -That S^-1`` with ``That = -Phat 1 + (k Phat + chat) Dhat``, ``Dhat`` along the deviatoric rate of
+strain *afterwards* and ``Phat`` such that ``tr D = beta |D'|`` then. If a ``That`` inside the yield surface
+brings the body to rest, it does so; if no pressure is needed, nothing happens. A symmetric ``That`` keeps the
+angular momentum, and it never raises the kinetic energy.
+
+It is the impulse with which a dispersed body comes back into contact (theory, section 3), and one step of the
+time-stepping integrator of :mod:`flybystab.core.stepping`.
 """
 
 from __future__ import annotations
@@ -10,93 +14,256 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flybystab.core.jit import kernel
+from flybystab.core.jit import code, kernel
 from flybystab.core.motion import (
+    COHESION,
+    COS_PHI,
     SIN_PHI,
     SURFACE,
+    W_A,
     W_B,
     W_L,
     W_N,
-    W_R,
     W_S,
     W_SINV,
     Buffers,
     dilatancy,
     invariants,
 )
-from flybystab.core.rheology import slope
+from flybystab.core.rheology import slope_over_sine
+from flybystab.core.steppers import factorise, solve
 from flybystab.core.tensors import inverse, multiply, pack, unpack
+from flybystab.core.tide import COMPONENTS
 
 Array = NDArray[np.float64]
 
+# What an impulse did.
+FREE = code(0)
+REST = code(1)
+SLIDING = code(2)
+FAILED = code(3)
+
+_N = code(7)
+
 
 @kernel
-def contact_impulse(y: Array, par: Array, work: Buffers) -> bool:
-    """Apply the impulse to the state ``y[15]``; False if it brings the body to rest (``D = 0``).
+def gradient(y: Array, out: Array) -> None:
+    """Velocity gradient ``L = D + W`` of a 15-number state."""
+    unpack(y[6:12], out)
+    out[0, 1] -= y[14]
+    out[1, 0] += y[14]
+    out[0, 2] += y[13]
+    out[2, 0] -= y[13]
+    out[1, 2] -= y[12]
+    out[2, 1] += y[12]
 
-    The direction ``Dhat`` and ``Phat`` are found together by a damped fixed point on ``Dhat``, whose pressure
-    follows from the trace condition at every turn. Where the fixed point has no rate of strain left, friction
-    holds the body.
+
+@kernel
+def rest_spin(y: Array, s: Array, big_l: Array, work: Buffers, w: Array) -> None:
+    """Spin ``w[3]`` of the rigid rotation with the angular momentum of ``big_l`` (``J w = H``)."""
+    a = work.m[W_A]
+    multiply(big_l, s, a)
+    h0, h1, h2 = a[2, 1] - a[1, 2], a[0, 2] - a[2, 0], a[1, 0] - a[0, 1]
+    # J = tr S 1 - S
+    c = work.c[2]
+    c[0], c[1], c[2] = y[1] + y[2], y[0] + y[2], y[0] + y[1]
+    c[3], c[4], c[5] = -y[3], -y[4], -y[5]
+    inverse(c, a)
+    for i in range(3):
+        w[i] = a[i, 0] * h0 + a[i, 1] * h1 + a[i, 2] * h2
+
+
+@kernel
+def _residual(
+    x: Array, beta: float, chat: float, par: Array, work: Buffers, d_star: Array, f: Array
+) -> float:
+    """Equations of the sliding impulse for ``x`` = (deviator of D afterwards, Phat); returns ``k``.
+
+    ``D - sym L* - Phat S^-1 + (k Phat + chat) sym(Dhat S^-1) = 0`` and ``tr x = 0``, with
+    ``D = x + beta |x|/3 1``.
     """
-    s = work.m[W_S]
-    sinv = work.m[W_SINV]
+    unit = work.c[2]
+    _, norm, det = invariants(x[0:6], unit)
+    n, b, sinv = work.m[W_N], work.m[W_B], work.m[W_SINV]
+    unpack(unit, n)
+    multiply(n, sinv, b)
+    k = par[SIN_PHI] * slope_over_sine(int(par[SURFACE]), par[SIN_PHI], det)
+    p = x[6]
+    strength = k * p + chat
+    mean = beta * norm / 3.0
+    f[0] = x[0] + mean - d_star[0] - p * sinv[0, 0] + strength * b[0, 0]
+    f[1] = x[1] + mean - d_star[1] - p * sinv[1, 1] + strength * b[1, 1]
+    f[2] = x[2] + mean - d_star[2] - p * sinv[2, 2] + strength * b[2, 2]
+    f[3] = x[3] - d_star[3] - p * sinv[0, 1] + 0.5 * strength * (b[0, 1] + b[1, 0])
+    f[4] = x[4] - d_star[4] - p * sinv[0, 2] + 0.5 * strength * (b[0, 2] + b[2, 0])
+    f[5] = x[5] - d_star[5] - p * sinv[1, 2] + 0.5 * strength * (b[1, 2] + b[2, 1])
+    f[6] = x[0] + x[1] + x[2]
+    return k
+
+
+@kernel
+def friction_impulse(
+    y: Array,
+    par: Array,
+    duration: float,
+    offset: Array,
+    work: Buffers,
+    jac: Array,
+    pivots: NDArray[np.int64],
+    x: Array,
+) -> int:
+    """Apply the impulse to the state ``y[15]``; returns FREE, REST, SLIDING or FAILED.
+
+    Parameters
+    ----------
+    duration : float
+        Time over which cohesion acts, ``chat = duration k c``; 0 for an instant.
+    offset : ndarray (6,)
+        Rate of strain that counts as rest; the friction law holds for ``D`` less this.
+    jac, pivots, x : ndarray
+        Scratch: (15, 15), int (15,), (32,).
+    """
+    s, sinv, before = work.m[W_S], work.m[W_SINV], work.m[W_L]
     unpack(y[0:6], s)
     volume = np.sqrt(inverse(y[0:6], sinv))
-    before = work.m[W_L]
-    unpack(y[6:12], before)
-    before[0, 1] -= y[14]
-    before[1, 0] += y[14]
-    before[0, 2] += y[13]
-    before[2, 0] -= y[13]
-    before[1, 2] -= y[12]
-    before[2, 1] += y[12]
+    gradient(y, before)
+    for c, (i, j) in enumerate(COMPONENTS):
+        before[i, j] -= offset[c]
+        if i != j:
+            before[j, i] -= offset[c]
     beta, _ = dilatancy(volume, par)
-    trace_sinv = sinv[0, 0] + sinv[1, 1] + sinv[2, 2]
-    trace_l = y[6] + y[7] + y[8]
-    unit = work.c[2]
-    after = work.m[W_R]
+    surface = int(par[SURFACE])
+    cos_c = par[COS_PHI] * par[COHESION] * volume * duration  # chat = slope_over_sine * cos_c
+    # Rest needs the impulse That = (L - W) S; inside the yield surface it holds the body.
+    w = x[8:11]
+    rest_spin(y, s, before, work, w)
+    a = work.m[W_A]
     n = work.m[W_N]
+    for i in range(3):
+        for j in range(3):
+            n[i, j] = before[i, j]
+    n[0, 1] += w[2]
+    n[1, 0] -= w[2]
+    n[0, 2] -= w[1]
+    n[2, 0] += w[1]
+    n[1, 2] += w[0]
+    n[2, 1] -= w[0]
+    multiply(n, s, a)
+    that = work.c[0]
+    that[0], that[1], that[2] = a[0, 0], a[1, 1], a[2, 2]
+    that[3], that[4], that[5] = (
+        0.5 * (a[0, 1] + a[1, 0]),
+        0.5 * (a[0, 2] + a[2, 0]),
+        0.5 * (a[1, 2] + a[2, 1]),
+    )
+    p, norm, det = invariants(that, work.c[2])
+    g = slope_over_sine(surface, par[SIN_PHI], det)
+    if norm <= g * (p * par[SIN_PHI] + cos_c):
+        for i in range(6):
+            y[6 + i] = offset[i]
+        y[12], y[13], y[14] = w[0], w[1], w[2]
+        return REST
+    # Sliding. Near rest the strain starts along the deviator of the impulse that rest would need, in
+    # proportion to its excess; far from it the motion before the impulse is the better guess.
+    d_star = work.c[1]
+    for i in range(6):
+        d_star[i] = y[6 + i] - offset[i]
+    trace_sinv = sinv[0, 0] + sinv[1, 1] + sinv[2, 2]
+    mean, start, _ = invariants(d_star, work.c[2])
+    scale = start + abs(mean) + abs(p) * trace_sinv
+    excess = (norm - g * (p * par[SIN_PHI] + cos_c)) * trace_sinv / 3.0
+    for i in range(6):
+        x[i] = (that[i] + (p if i < 3 else 0.0)) * excess / norm
+    x[6] = p
+    found = _newton(x, beta, cos_c, scale, par, work, d_star, jac, pivots)
+    if not found and start > 0.0:
+        for i in range(6):
+            x[i] = d_star[i] + (mean if i < 3 else 0.0)
+        x[6] = max(0.0, 3.0 * mean / trace_sinv)
+        found = _newton(x, beta, cos_c, scale, par, work, d_star, jac, pivots)
+    if not found:
+        return FAILED
+    f = x[18:25]
+    k = _residual(x, beta, _chat(par, cos_c, surface, x, work), par, work, d_star, f)
+    chat = _chat(par, cos_c, surface, x, work)
+    strength = k * x[6] + chat
+    if strength < 0.0 or (par[SIN_PHI] == 0.0 and par[COHESION] == 0.0 and x[6] < 0.0):
+        return FREE
+    # Delta L = Phat S^-1 - (k Phat + chat) Dhat S^-1; b = Dhat S^-1 is left by the residual.
     b = work.m[W_B]
-    d = work.c[0]
-    old = work.c[1]
-    _, start, det = invariants(y[6:12], unit)
-    if start == 0.0:
-        return False
-    total = start
-    for _turn in range(400):
-        unpack(unit, n)
-        k = slope(int(par[SURFACE]), par[SIN_PHI], det)
-        multiply(n, sinv, b)
-        # (1 - beta n) : (L + P (1 - k n) S^-1) = 0, the trace condition along n
-        n_s = b[0, 0] + b[1, 1] + b[2, 2]
-        nn_s = 0.0
-        n_l = 0.0
-        for i in range(3):
-            for j in range(3):
-                nn_s += n[i, j] * b[i, j]
-                n_l += n[i, j] * before[i, j]
-        p = (beta * n_l - trace_l) / (trace_sinv - (k + beta) * n_s + k * beta * nn_s)
-        if not p >= 0.0:
-            p = 0.0
-        for i in range(3):
-            for j in range(3):
-                after[i, j] = before[i, j] + p * (sinv[i, j] - k * b[i, j])
-        pack(after, d)
-        for i in range(6):
-            old[i] = unit[i]
-        _, total, det = invariants(d, unit)
-        change = 0.0
-        if total < 1e-12 * start:
+    for i in range(3):
+        for j in range(3):
+            before[i, j] += x[6] * sinv[i, j] - strength * b[i, j]
+    pack(before, y[6:12])
+    for i in range(6):
+        y[6 + i] += offset[i]
+    y[12] = 0.5 * (before[2, 1] - before[1, 2])
+    y[13] = 0.5 * (before[0, 2] - before[2, 0])
+    y[14] = 0.5 * (before[1, 0] - before[0, 1])
+    return SLIDING
+
+
+@kernel
+def _newton(
+    x: Array,
+    beta: float,
+    cos_c: float,
+    scale: float,
+    par: Array,
+    work: Buffers,
+    d_star: Array,
+    jac: Array,
+    pivots: NDArray[np.int64],
+) -> bool:
+    """Solve `_residual` for ``x[:7]`` from the guess in it; scratch in ``x[11:]``."""
+    surface = int(par[SURFACE])
+    trial, f, moved = x[11:18], x[18:25], x[25:32]
+    for _turn in range(60):
+        _residual(x, beta, _chat(par, cos_c, surface, x, work), par, work, d_star, f)
+        _, size, _ = invariants(x[0:6], work.c[2])
+        if not size > 1e-300:
             return False
+        for j in range(7):
+            delta = 1e-7 * size if j < 6 else 1e-7 * max(abs(x[6]), 1e-6 * scale)
+            saved = x[j]
+            x[j] = saved + delta
+            delta = x[j] - saved
+            _residual(x, beta, _chat(par, cos_c, surface, x, work), par, work, d_star, moved)
+            x[j] = saved
+            for i in range(7):
+                jac[i, j] = (moved[i] - f[i]) / delta
+        for i in range(7):
+            trial[i] = -f[i]
+        if not factorise(jac, _N, pivots):
+            return False
+        solve(jac, _N, pivots, trial)
+        step = 0.0
+        along = 0.0
         for i in range(6):
-            change += (unit[i] - old[i]) ** 2
-            unit[i] = 0.5 * (unit[i] + old[i])
-        _, _, det = invariants(unit, unit)
-        if change < 1e-28:
-            for i in range(6):
-                y[6 + i] = d[i]
-            y[12] = 0.5 * (after[2, 1] - after[1, 2])
-            y[13] = 0.5 * (after[0, 2] - after[2, 0])
-            y[14] = 0.5 * (after[1, 0] - after[0, 1])
+            weight = 1.0 if i < 3 else 2.0
+            step += weight * trial[i] * trial[i]
+            along += weight * trial[i] * x[i]
+        step = np.sqrt(step)
+        if not step < np.inf:
+            return False
+        # The direction turns by half a radian at most, and the size falls by half at most, in one turn.
+        across = np.sqrt(max(0.0, step * step - (along / size) ** 2))
+        fraction = 1.0
+        if along < -0.5 * size * size:
+            fraction = min(fraction, -0.5 * size * size / along)
+        if across > 0.5 * (size + max(0.0, along / size)):
+            fraction = min(fraction, 0.5 * (size + max(0.0, along / size)) / across)
+        for i in range(7):
+            x[i] += fraction * trial[i]
+        if fraction == 1.0 and step <= max(1e-12 * size, 1e-15 * scale):
             return True
     return False
+
+
+@kernel
+def _chat(par: Array, cos_c: float, surface: int, x: Array, work: Buffers) -> float:
+    """Cohesive strength ``chat = (k/sin phi) cos phi c`` in the direction of ``x[:6]``."""
+    if cos_c == 0.0:
+        return 0.0
+    _, _, det = invariants(x[0:6], work.c[2])
+    return slope_over_sine(surface, par[SIN_PHI], det) * cos_c

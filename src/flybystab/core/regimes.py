@@ -23,7 +23,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flybystab.core.contact import contact_impulse
+from flybystab.core.contact import FAILED, FREE, SLIDING, friction_impulse
 from flybystab.core.flow import follow_flow
 from flybystab.core.free import follow_free
 from flybystab.core.jit import kernel
@@ -236,9 +236,13 @@ def follow(
             if reason != CONTACT:
                 break
             log(CONTACT, t, 0.0, np.sqrt(determinant(ws.y[0:6])), events, count)
-            if contact_impulse(ws.y, par, ws.work):
+            did = friction_impulse(ws.y, par, 0.0, ws.spare[32:], ws.work, ws.jac, ws.pivots, ws.spare)
+            if did == FAILED:
+                reason = STUCK
+                break
+            if did == SLIDING:
                 regime = FLOWING
-            else:
+            elif did != FREE:
                 stiffen(ws.y, par, ws)
                 regime = RIGID
         if t >= t1:

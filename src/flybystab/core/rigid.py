@@ -167,27 +167,29 @@ def follow_rigid(
                 break
             record(t + x * h, RIGID, ws.ys, par, p, norm, det, ws, hist, count)
         n = N_SAMPLE if end > 1.0 else int(np.rint(end * N_SAMPLE)) - 1
-        # Extrema between the samples: of the mobilised friction, and of the yield function near zero.
+        # Extrema between the samples: of the yield function near zero, then of the friction mobilised before.
+        if not unyielding and end > 1.0:
+            for j in range(1, N_SAMPLE):
+                if (
+                    end > 1.0
+                    and _vertex_inside(f[0, j - 1], f[0, j], f[0, j + 1])
+                    and f[0, j] + abs(f[0, j + 1] - f[0, j - 1]) + 0.02 * norm > 0.0
+                ):
+                    a, b = (j - 1.0) / N_SAMPLE, (j + 1.0) / N_SAMPLE
+                    x, value = _largest(a, b, t, h, par, tide, ws, _ONSET)
+                    if value > 0.0:
+                        end = x
+                        n = int(np.floor(x * N_SAMPLE))
         for j in range(1, n):
-            a, b = (j - 1.0) / N_SAMPLE, (j + 1.0) / N_SAMPLE
             if (
                 f[1, j] < np.inf
                 and _vertex_inside(f[1, j - 1], f[1, j], f[1, j + 1])
                 and f[1, j] + abs(f[1, j + 1] - f[1, j - 1]) > ws.mark[0]
             ):
+                a, b = (j - 1.0) / N_SAMPLE, (j + 1.0) / N_SAMPLE
                 x, value = _largest(a, b, t, h, par, tide, ws, _FRICTION)
                 if value > ws.mark[0]:
                     ws.mark[0], ws.mark[1] = value, t + x * h
-            if (
-                not unyielding
-                and end > 1.0
-                and _vertex_inside(f[0, j - 1], f[0, j], f[0, j + 1])
-                and f[0, j] + abs(f[0, j + 1] - f[0, j - 1]) + 0.02 * norm > 0.0
-            ):
-                x, value = _largest(a, b, t, h, par, tide, ws, _ONSET)
-                if value > 0.0:
-                    end = x
-                    n = j - 1
         for j in range(1, n + 1):
             if f[1, j] > ws.mark[0]:
                 ws.mark[0], ws.mark[1] = f[1, j], t + h * j / N_SAMPLE

@@ -52,6 +52,7 @@ class Workspace(NamedTuple):
     scale: Array
     stress: Array
     sample: Array
+    spare: Array
     mark: Array  # largest mobilised friction, its time; step size; |D| peak
 
 
@@ -79,6 +80,7 @@ def workspace() -> Workspace:
         np.ones(15),
         np.zeros(6),
         np.zeros((2, N_SAMPLE + 1)),
+        np.zeros(38),
         np.zeros(4),
     )
 

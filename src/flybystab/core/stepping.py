@@ -1,0 +1,139 @@
+"""A second integrator that knows no events: time stepping with a set-valued friction law (after Moreau 1999).
+
+Each step drifts for half its length (free motion, in closed form: ``x -> (1 + t L) x``), kicks, and drifts
+again. The kick adds ``h K`` and then the impulse of :mod:`flybystab.core.contact`, which finds out by itself
+whether the body is rigid, flows or has no contact: rest, yield, arrest and contact need no root-finding and
+no switch. Angular momentum about the centre is kept to rounding, tides apart. The shape of a rigid body is
+kept to second order in the step; plastic flow is first order: runs with halved steps measure the error.
+
+It shares the self-gravity, the tide and the yield surfaces with :mod:`flybystab.core.regimes`, nothing else.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flybystab.core.contact import FAILED, FREE, REST, SLIDING, friction_impulse, gradient
+from flybystab.core.jit import kernel
+from flybystab.core.motion import COHESION, N_WORK, W_A, W_B, W_K, W_L, W_S, Buffers, dilatancy, field
+from flybystab.core.tensors import determinant, multiply, pack, unpack
+from flybystab.core.tide import TidePanels
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def drift(h: float, y: Array, work: Buffers) -> bool:
+    """Free motion for a time `h`: ``S -> F S F^T``, ``L -> L F^-1``, ``F = 1 + h L``; False if it folds."""
+    big_l, f, b, s = work.m[W_L], work.m[W_A], work.m[W_B], work.m[W_S]
+    gradient(y, big_l)
+    for i in range(3):
+        for j in range(3):
+            f[i, j] = h * big_l[i, j]
+        f[i, i] += 1.0
+    unpack(y[0:6], s)
+    multiply(f, s, b)
+    for i in range(3):
+        for j in range(3):
+            s[i, j] = b[i, 0] * f[j, 0] + b[i, 1] * f[j, 1] + b[i, 2] * f[j, 2]
+    pack(s, y[0:6])
+    # F^-1 by cofactors
+    c00 = f[1, 1] * f[2, 2] - f[1, 2] * f[2, 1]
+    c01 = f[1, 2] * f[2, 0] - f[1, 0] * f[2, 2]
+    c02 = f[1, 0] * f[2, 1] - f[1, 1] * f[2, 0]
+    det = f[0, 0] * c00 + f[0, 1] * c01 + f[0, 2] * c02
+    if not det > 0.0:
+        return False
+    d = 1.0 / det
+    b[0, 0], b[1, 0], b[2, 0] = c00 * d, c01 * d, c02 * d
+    b[0, 1] = (f[0, 2] * f[2, 1] - f[0, 1] * f[2, 2]) * d
+    b[1, 1] = (f[0, 0] * f[2, 2] - f[0, 2] * f[2, 0]) * d
+    b[2, 1] = (f[0, 1] * f[2, 0] - f[0, 0] * f[2, 1]) * d
+    b[0, 2] = (f[0, 1] * f[1, 2] - f[0, 2] * f[1, 1]) * d
+    b[1, 2] = (f[0, 2] * f[1, 0] - f[0, 0] * f[1, 2]) * d
+    b[2, 2] = (f[0, 0] * f[1, 1] - f[0, 1] * f[1, 0]) * d
+    multiply(big_l, b, s)
+    set_gradient(s, y)
+    return True
+
+
+@kernel
+def set_gradient(m: Array, y: Array) -> None:
+    """Store the velocity gradient ``m[3, 3]`` in the state."""
+    pack(m, y[6:12])
+    y[12] = 0.5 * (m[2, 1] - m[1, 2])
+    y[13] = 0.5 * (m[0, 2] - m[2, 0])
+    y[14] = 0.5 * (m[1, 0] - m[0, 1])
+
+
+@kernel
+def _shear(y: Array, offset: Array) -> float:
+    """Norm of the deviator of ``D - offset``."""
+    mean = (y[6] + y[7] + y[8] - offset[0] - offset[1] - offset[2]) / 3.0
+    total = 0.0
+    for i in range(3):
+        total += (y[6 + i] - offset[i] - mean) ** 2 + 2.0 * (y[9 + i] - offset[3 + i]) ** 2
+    return np.sqrt(total)
+
+
+@kernel
+def follow_steps(
+    t0: float, t1: float, n: int, y: Array, par: Array, tide: TidePanels, brittle: bool, summary: Array
+) -> bool:
+    """Carry the state ``y[15]`` from `t0` to `t1` in `n` equal steps; False if an impulse could not be found.
+
+    ``summary[4]`` gets the start of the first and the end of the last step that flowed (-1 if none), the
+    number of steps that flowed, and the number without contact.
+    """
+    work = Buffers(np.zeros((N_WORK, 3, 3)), np.zeros((3, 6)))
+    jac = np.zeros((15, 15))
+    pivots = np.zeros(15, dtype=np.int64)
+    spare = np.zeros(32)
+    offset = np.zeros(6)
+    last = np.zeros((3, 3))
+    gradient(y, last)
+    h = (t1 - t0) / n
+    contact = np.sqrt(determinant(y[0:6]))  # V/V0 at which the grains touch
+    summary[0] = summary[1] = -1.0
+    summary[2] = summary[3] = 0.0
+    for step in range(n):
+        t = t0 + (step + 0.5) * h
+        if not drift(0.5 * h, y, work):
+            return False
+        field(t, y, tide, work)
+        big_l = work.m[W_L]
+        gradient(y, big_l)
+        for i in range(3):
+            for j in range(3):
+                big_l[i, j] += h * work.m[W_K, i, j]
+        set_gradient(big_l, y)
+        volume = np.sqrt(determinant(y[0:6]))
+        # The drift to the next kick is 1 + h L, of mean gradient L - h L^2/2: that is what must obey the law
+        # of friction, and L^2 of the last step is near enough. What volume error is left is undone.
+        multiply(last, last, work.m[W_A])
+        pack(work.m[W_A], offset)
+        for i in range(6):
+            offset[i] *= 0.5 * h
+        for i in range(3):
+            offset[i] += np.log(contact / volume) / (3.0 * h)
+        beta, _ = dilatancy(contact, par)
+        did = FREE
+        if y[6] + y[7] + y[8] - offset[0] - offset[1] - offset[2] < beta * _shear(y, offset):
+            did = friction_impulse(y, par, h, offset, work, jac, pivots, spare)
+            if did == FAILED:
+                return False
+        gradient(y, last)
+        if did == SLIDING:
+            contact *= np.exp(h * beta * _shear(y, offset))
+            if brittle:
+                par[COHESION] = 0.0
+            if summary[2] == 0.0:
+                summary[0] = t - 0.5 * h
+            summary[1] = t + 0.5 * h
+            summary[2] += 1.0
+        elif did != REST:
+            summary[3] += 1.0
+        if not drift(0.5 * h, y, work):
+            return False
+    return True
