@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import astropy.units as u
 import numpy as np
@@ -39,7 +39,6 @@ class Passage:
     distance: float
     v_inf: float
     encounter: Encounter | None = None
-    size: tuple[float, float, float] = field(default=(np.inf, np.inf, np.inf))
 
     def bounds(self) -> tuple[float, float, float]:
         """Bounds on the tide from distance and speed alone; infinite where they say too little."""
@@ -67,9 +66,12 @@ class Passage:
         """The encounter, followed with all forces."""
         if self.encounter is None:
             self.encounter = Encounter.from_orbit(self.asteroid.orbit, self.planet, self.time)
-            e = self.encounter
-            self.size = tide_size(e.tide, e.t_start, e.t_stop)
         return self.encounter
+
+    def close_bounds(self) -> tuple[float, float, float]:
+        """Bounds on the tide of the encounter that was followed."""
+        e = self.meet()
+        return tide_size(e.tide, e.t_start, e.t_stop)
 
 
 def _quick(draw: Draws, code: int, size: tuple[float, float, float]) -> tuple[Array, NDArray[np.int64]]:
@@ -134,7 +136,7 @@ def judge(
     if np.any(decided == UNDECIDED):
         encounter = passage.meet()
         if quick and not encounter.impact:
-            close, sharper = _quick(draw, code, passage.size)
+            close, sharper = _quick(draw, code, passage.close_bounds())
             fresh = (decided == UNDECIDED) & (sharper != UNDECIDED)
             friction[fresh], decided[fresh] = close[fresh], sharper[fresh]
     dynamic = decided == UNDECIDED

@@ -1,0 +1,365 @@
+"""One asteroid of a catalogue: its body and its orbit, each value with its source.
+
+A value that nobody measured is flagged as assumed. The columns are explained in ``data/README.md``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from pathlib import Path
+from types import MappingProxyType
+from typing import TYPE_CHECKING, Any
+
+import astropy.units as u
+import numpy as np
+from astropy.time import Time
+from astropy.units import Quantity
+
+from flybystab.aggregate.body import Body, Material
+from flybystab.errors import InvalidInput
+from flybystab.survey.attitude import attitude_matrix, ecliptic_direction, free_spin, tumbling_state
+
+if TYPE_CHECKING:
+    from flybystab.sky.orbit import Orbit
+
+#: Version of the embedded table: the date of its newest source.
+CATALOGUE_DATE = "2026-07"
+
+_LENGTH = ("semi_axis_a_m", "semi_axis_b_m", "semi_axis_c_m", "diameter_m")
+_HOURS = ("spin_period_h", "precession_period_h", "rotation_period_h")
+_ANGLES = ("i_deg", "node_deg", "peri_deg", "M_deg")
+
+#: Unit of every numeric column.
+UNITS: Mapping[str, u.UnitBase] = MappingProxyType(
+    dict.fromkeys(_LENGTH, u.m)
+    | {c[:-2] + "_sigma_m": u.m for c in _LENGTH}
+    | dict.fromkeys(_HOURS, u.h)
+    | {c[:-2] + "_sigma_h": u.h for c in _HOURS}
+    | {"density_kg_m3": u.kg / u.m**3, "density_sigma_kg_m3": u.kg / u.m**3}
+    | dict.fromkeys(("pole_ecl_lon_deg", "pole_ecl_lat_deg", *_ANGLES), u.deg)
+    | {"sigma_" + c: u.deg for c in _ANGLES}
+    | {"H_mag": u.mag, "amplitude_mag": u.mag, "epoch_jd_tdb": u.d, "a_au": u.au, "sigma_a_au": u.au}
+    | dict.fromkeys(("A1_au_d2", "A2_au_d2", "A3_au_d2"), u.au / u.d**2)
+    | dict.fromkeys(
+        ("e", "sigma_e", "inertia_a_over_c", "inertia_b_over_c", "condition_code"), u.dimensionless_unscaled
+    )
+)
+
+#: Text columns.
+TEXTS = (
+    *(
+        "number",
+        "name",
+        "designation",
+        "aliases",
+        "orbit_class",
+        "pha",
+        "taxonomic_class",
+        "taxonomic_source",
+    ),
+    *("binary", "shape_kind", "semi_axes_source", "diameter_source", "spin_state", "spin_source"),
+    *("amplitude_source", "pole_source", "tumbling_mode", "tumbling_source", "density_assumed"),
+    *("density_source", "frame", "sigma_source", "nongrav_source", "orbit_solution"),
+    *("condition_code_source", "orbit_source", "assumed", "unchecked", "notes"),
+)
+
+_ORBIT = ("epoch_jd_tdb", "a_au", "e", "i_deg", "node_deg", "peri_deg", "M_deg")
+#: Columns of an orbit: kept as they are when a row is completed from another.
+_ORBITAL = frozenset(
+    {*_ORBIT, "A1_au_d2", "A2_au_d2", "A3_au_d2", "frame", "sigma_source", "nongrav_source"}
+    | {"sigma_" + c for c in _ORBIT[1:]}
+    | {"orbit_solution", "orbit_source", "condition_code", "condition_code_source"}
+)
+#: Columns that belong together: taken from the completing row as a whole.
+_BODILY = frozenset(
+    c for c in (*UNITS, *TEXTS) if c.startswith(("semi_axis", "semi_axes", "diameter", "spin_"))
+)
+_SHAPE = ("semi_axis_a_m", "semi_axis_b_m", "semi_axis_c_m")
+
+
+def key_of(name: object) -> str:
+    """A name as it is compared: no case, no spaces, no brackets."""
+    return "".join(c for c in str(name).casefold() if not c.isspace() and c not in "()_")
+
+
+@dataclass(frozen=True, eq=False)
+class Asteroid:
+    """One asteroid: a row of a catalogue, with its body and its orbit built on request.
+
+    Attributes
+    ----------
+    row : mapping of str to str
+        The row as it stands in the file.
+    material : Material
+        What the body is made of: a choice, not catalogue data. 35 degrees of friction by default.
+    file : str
+        Where the row comes from.
+    """
+
+    row: Mapping[str, str]
+    material: Material = field(default_factory=Material)
+    file: str = f"embedded catalogue {CATALOGUE_DATE}"
+
+    @classmethod
+    def from_catalogue(cls, name: str | int, material: Material | None = None) -> Asteroid:
+        """The asteroid of the embedded catalogue with this number, name or designation.
+
+        Parameters
+        ----------
+        name : str or int
+            "Apophis", 99942, "2004 MN4", "2004mn4", "(99942) Apophis": case and spaces do not count.
+        material : Material, optional
+            What it is made of.
+
+        Raises
+        ------
+        UnknownName
+            With near matches.
+        """
+        from flybystab.survey.catalogue import catalogue, find
+
+        return find(catalogue(), name, "the embedded catalogue").with_material(material)
+
+    @classmethod
+    def from_file(cls, path: str | Path, name: str | int, material: Material | None = None) -> Asteroid:
+        """The asteroid with this number, name or designation of a file with the catalogue's columns."""
+        from flybystab.survey.catalogue import catalogue, find
+
+        return find(catalogue(path), name, str(path)).with_material(material)
+
+    def with_material(self, material: Material | None) -> Asteroid:
+        """The same asteroid of another material (None: unchanged)."""
+        return self if material is None else replace(self, material=material)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Without what was built from the row: it is rebuilt where it is needed.
+        return Asteroid, (dict(self.row), self.material, self.file)
+
+    def __repr__(self) -> str:
+        return f"<Asteroid {self.label}>"
+
+    @property
+    def name(self) -> str:
+        """Name, or designation where there is none."""
+        return self.row.get("name") or self.row.get("designation") or self.row.get("number") or "unnamed"
+
+    @property
+    def number(self) -> int | None:
+        """IAU number."""
+        text = self.row.get("number", "")
+        return int(text) if text.isdigit() else None
+
+    @property
+    def designation(self) -> str:
+        """Principal designation."""
+        return self.row.get("designation", "")
+
+    @property
+    def label(self) -> str:
+        """Number and name, as astronomers write them."""
+        return self.name if self.number is None else f"({self.number}) {self.name}"
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Everything it can be found by."""
+        row = self.row
+        found = [row.get("name", ""), row.get("number", ""), row.get("designation", "")]
+        found += row.get("aliases", "").split(";")
+        found += [
+            f"{self.number} {n}" for n in (row.get("name"), row.get("designation")) if self.number and n
+        ]
+        return tuple(dict.fromkeys(n.strip() for n in found if n and n.strip()))
+
+    @cached_property
+    def assumed(self) -> tuple[str, ...]:
+        """Columns whose values nobody measured."""
+        return tuple(c for c in self.row.get("assumed", "").split(";") if c)
+
+    @cached_property
+    def measured(self) -> tuple[str, ...]:
+        """Numeric columns with a measured value."""
+        return tuple(c for c in UNITS if self.row.get(c) and c not in self.assumed)
+
+    @cached_property
+    def sources(self) -> Mapping[str, str]:
+        """Where each group of values comes from, e.g. ``sources["density"]``."""
+        found = {c.removesuffix("_source"): v for c, v in self.row.items() if c.endswith("_source") and v}
+        return MappingProxyType(found)
+
+    @cached_property
+    def record(self) -> Mapping[str, Any]:
+        """The whole row: a Quantity where the column has a unit, text otherwise, None where unknown."""
+        return MappingProxyType(
+            {
+                c: (self.quantity(c) if self.row.get(c) else None) if c in UNITS else self.row.get(c, "")
+                for c in (*TEXTS, *UNITS)
+            }
+        )
+
+    def quantity(self, column: str) -> Quantity:
+        """Value of a numeric column with its unit.
+
+        Raises
+        ------
+        InvalidInput
+            The cell is empty or not a finite number.
+        """
+        return self._number(column) * UNITS[column]
+
+    def _number(self, column: str) -> float:
+        text = self.row.get(column, "")
+        if not text:
+            raise InvalidInput(column, "(empty)", f"a value for {self.label} in {self.file}")
+        try:
+            value = float(text)
+        except ValueError:
+            value = np.nan
+        if not np.isfinite(value):
+            raise InvalidInput(column, text, f"a finite number for {self.label} in {self.file}")
+        return value
+
+    def knows(self, *columns: str) -> bool:
+        """Whether all these columns have a value."""
+        return all(self.row.get(c) for c in columns)
+
+    def completed(self, other: Asteroid) -> Asteroid:
+        """The same asteroid; what its row does not know of its body and names is taken from another row."""
+        row = dict(self.row)
+        if other.row.get("name") and row.get("name", "") in ("", row.get("designation"), row.get("number")):
+            row["name"] = other.row["name"]
+        # A size or a period from elsewhere would not fit the shape and the spin state that go with it.
+        for c, v in other.row.items():
+            if c not in _ORBITAL and (not row.get(c) or c in _BODILY):
+                row[c] = v
+        return replace(self, row=row)
+
+    @property
+    def epoch(self) -> Time:
+        """Epoch of the elements, TDB."""
+        day = self._number("epoch_jd_tdb")
+        whole = np.floor(day)
+        return Time(whole, day - whole, format="jd", scale="tdb")
+
+    @cached_property
+    def orbit(self) -> Orbit:
+        """The orbit, from the elements of the row with every digit, and A1, A2, A3 (zero where not known)."""
+        epoch = self.epoch
+        a, e, i, node, peri, mean = (self.quantity(c) for c in _ORBIT[1:])
+        a1, a2, a3 = (
+            self.quantity(c) if self.row.get(c) else 0.0 * u.au / u.d**2
+            for c in ("A1_au_d2", "A2_au_d2", "A3_au_d2")
+        )
+        from flybystab.sky.orbit import Orbit
+
+        return Orbit.from_elements(
+            epoch=epoch, a=a, e=float(e), i=i, node=node, peri=peri, M=mean, A1=a1, A2=a2, A3=a3
+        )
+
+    @property
+    def tumbles(self) -> bool:
+        """Whether the row has a complete tumbling solution (two periods and a mode)."""
+        return self.knows("tumbling_mode", "precession_period_h", "rotation_period_h")
+
+    @property
+    def semi_axes(self) -> Quantity:
+        """Semi-axes ``a >= b >= c``, m."""
+        return np.array([self._number(c) for c in _SHAPE]) * u.m
+
+    @cached_property
+    def body(self) -> Body:
+        """The body, of the asteroid's `material`; a tumbler at phase zero of its rotation."""
+        return self.body_with()
+
+    def body_with(self, material: Material | None = None, *, phase: float = 0.0) -> Body:
+        """The body.
+
+        Parameters
+        ----------
+        material : Material, optional
+            Instead of the asteroid's own.
+        phase : float
+            For a tumbler: fraction of its rotation period, which fixes where the spin vector is in the body.
+
+        Returns
+        -------
+        Body
+            Spinning about its short axis, or with the angular velocity of the tumbling solution (a
+            homogeneous ellipsoid with the two observed periods). A tumbler without a solution spins about
+            its short axis with its main lightcurve period: `assumptions` says so.
+        """
+        material = material or self.material
+        density = self.quantity("density_kg_m3")
+        if not self.tumbles:
+            period = self.quantity("spin_period_h")
+            return Body(semi_axes=self.semi_axes, density=density, spin_period=period, material=material)
+        moments, momentum, j = self._tumbling
+        spin = free_spin(moments, momentum, j, np.array([phase]))[0][0]
+        return Body(semi_axes=self.semi_axes, density=density, spin=spin * u.rad / u.s, material=material)
+
+    @cached_property
+    def _tumbling(self) -> tuple[np.ndarray, float, float]:
+        """Moments of inertia per mass (m2) of the ellipsoid, angular momentum per mass, L^2/(2E) per mass."""
+        squares = self.semi_axes.value**2
+        moments = (squares.sum() - squares) / 5.0
+        precession, rotation = (
+            self._number(c) * 3600.0 for c in ("precession_period_h", "rotation_period_h")
+        )
+        return moments, *tumbling_state(moments, precession, rotation, self.row["tumbling_mode"])
+
+    @property
+    def pole(self) -> np.ndarray | None:
+        """Unit vector, ICRF, of the spin pole (angular momentum of a tumbler); None where not known."""
+        if not self.knows("pole_ecl_lon_deg", "pole_ecl_lat_deg"):
+            return None
+        lon, lat = (np.radians(self._number(c)) for c in ("pole_ecl_lon_deg", "pole_ecl_lat_deg"))
+        return ecliptic_direction(float(lon), float(lat))
+
+    def attitude(self, angle: Quantity, *, phase: float = 0.0, pole: Any = None) -> np.ndarray:
+        """Rotation from body axes to ICRF.
+
+        Parameters
+        ----------
+        angle : Quantity
+            Turn about the pole. No catalogue says at what angle an asteroid is at a date decades away.
+        phase : float
+            For a tumbler: the phase given to `body_with`.
+        pole : ndarray (3,), optional
+            Direction, ICRF, of the angular momentum instead of the catalogued one.
+
+        Returns
+        -------
+        ndarray (3, 3)
+
+        Raises
+        ------
+        InvalidInput
+            No pole is known and none is given.
+        """
+        direction = self.pole if pole is None else np.asarray(pole, dtype=float)
+        if direction is None:
+            raise InvalidInput("pole", "(unknown)", f"a direction: the catalogue has no pole of {self.label}")
+        momentum = np.array([0.0, 0.0, 1.0])
+        if self.tumbles:
+            moments, size, j = self._tumbling
+            momentum = moments * free_spin(moments, size, j, np.array([phase]))[0][0]
+        return attitude_matrix(momentum, direction, float(angle.to_value(u.rad)))
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What a reader must know before taking the body for measured, in words."""
+        out = []
+        if any(c in self.assumed for c in _SHAPE):
+            out.append("shape from size and lightcurve amplitude")
+        if "density_kg_m3" in self.assumed:
+            out.append("density")
+        if self.pole is None:
+            out.append("pole unknown")
+        if "spin_state" in self.assumed:
+            out.append("principal-axis spin")
+        if "tumbling" in self.row.get("spin_state", "") and not self.tumbles:
+            out.append("tumbling replaced by principal-axis spin")
+        if self.row.get("unchecked"):
+            out.append("quoted, not checked: " + self.row["unchecked"].replace(";", ", "))
+        return tuple(out)
