@@ -1,0 +1,135 @@
+"""Scenes that several tests share, and the budgets that they check."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import astropy.units as u
+import numpy as np
+from numpy.typing import NDArray
+
+from flybystab.aggregate.body import Body, Material
+from flybystab.constants import G, R_EARTH
+from flybystab.core.passage import Passage, parameters, passage
+from flybystab.core.stepping import follow_steps
+from flybystab.core.tide import TidePanels, no_tide, tensor, tide_at
+from flybystab.sky.encounter import Encounter
+
+Array = NDArray[np.float64]
+
+R_E = R_EARTH * u.m
+
+#: The rubble pile of Richardson, Bottke & Love (1998) and of the reference flybys.
+PILE = Body(semi_axes=[1400, 850, 750] * u.m, density=2000 * u.kg / u.m**3, spin_period=6 * u.h)
+
+
+def earth(q: float, v_inf: float = 5.0, start: float = 10.0) -> Encounter:
+    """Earth passage: periapsis and start in Earth radii, v_inf in km/s."""
+    return Encounter.hyperbolic(
+        "earth", periapsis=q * R_E, v_inf=v_inf * u.km / u.s, start_distance=start * R_E
+    )
+
+
+def material(phi: float, **kwargs: Any) -> Material:
+    """Material with friction angle `phi` in deg."""
+    return Material(friction_angle=phi * u.deg, **kwargs)
+
+
+def carried(
+    body: Body,
+    t_start: float,
+    t_stop: float,
+    tide: TidePanels | None = None,
+    attitude: Array | None = None,
+    **kwargs: Any,
+) -> Passage:
+    """Array-level run of a body."""
+    m = body.material
+    return passage(
+        body.axes,
+        body.rho,
+        body.omega,
+        np.eye(3) if attitude is None else attitude,
+        t_start,
+        t_stop,
+        no_tide() if tide is None else tide,
+        phi=m.phi,
+        cohesion=m.c_pa,
+        dilatancy=m.dilatancy,
+        surface=m.surface_code,
+        brittle=m.brittle,
+        **kwargs,
+    )
+
+
+def axes_of(shape: Array) -> Array:
+    """Semi-axes, longest first."""
+    return np.sqrt(np.linalg.eigvalsh(shape)[..., ::-1])
+
+
+def momentum(shape: Array, gradient: Array) -> Array:
+    """Angular momentum per m/5."""
+    flow = gradient @ shape
+    return np.stack(
+        [
+            flow[..., 2, 1] - flow[..., 1, 2],
+            flow[..., 0, 2] - flow[..., 2, 0],
+            flow[..., 1, 0] - flow[..., 0, 1],
+        ],
+        axis=-1,
+    )
+
+
+def kinetic(shape: Array, gradient: Array) -> Array:
+    """Kinetic energy per m/5: tr(L S L^T)/2."""
+    return 0.5 * np.einsum("...ij,...jk,...ik->...", gradient, shape, gradient)
+
+
+def potential(body: Body, shape: Array) -> Array:
+    """Energy of self-gravity per m/5: -3 G m R_F."""
+    from scipy.special import elliprf
+
+    values = np.linalg.eigvalsh(shape)
+    return -3.0 * G * body.mass.value * elliprf(values[..., 0], values[..., 1], values[..., 2])
+
+
+def tides(tide: TidePanels, times: Array) -> Array:
+    """Tidal tensors, shape (n, 3, 3)."""
+    out = np.zeros((len(times), 6))
+    for t, row in zip(times, out, strict=True):
+        tide_at(tide.tau, tide.start, tide.width, tide.coefficients, t, row)
+    return tensor(out)
+
+
+def simpson(history: dict[str, Array], values: Array, samples: int) -> Array:
+    """Integral of sampled `values` over a stretch whose steps have `samples` equal parts (2 or 4)."""
+    t = history["time"]
+    weights = {2: np.array([1, 4, 1]) / 6.0, 4: np.array([7, 32, 12, 32, 7]) / 90.0}[samples]
+    total = np.zeros(values.shape[1:])
+    for i in range(0, len(t) - samples, samples):
+        total = total + (t[i + samples] - t[i]) * np.tensordot(
+            weights, values[i : i + samples + 1], axes=(0, 0)
+        )
+    return total
+
+
+def stepped(
+    body: Body, t_start: float, t_stop: float, n: int, tide: TidePanels | None = None
+) -> tuple[Array, Array]:
+    """Shape (m2) and velocity gradient (1/s) from the time-stepping integrator, body axes along the frame."""
+    m = body.material
+    t0 = body.dynamical_time
+    a0 = float(np.cbrt(np.prod(body.axes)))
+    par = parameters(body.axes, body.rho, m.phi, m.c_pa, m.dilatancy, m.surface_code)
+    y = np.zeros(15)
+    y[:3] = (body.axes / a0) ** 2
+    y[12:15] = body.omega * t0
+    panels = no_tide() if tide is None else tide
+    scaled = TidePanels(panels.tau / t0, panels.start, panels.width, panels.coefficients * t0**2)
+    assert follow_steps(t_start / t0, t_stop / t0, n, y, par, scaled, m.brittle, np.zeros(4))
+    gradient = tensor(y[6:12])
+    w = y[12:15]
+    gradient += np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+    return tensor(y[:6]) * a0**2, gradient / t0
+
+
