@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -11,12 +12,24 @@ from astropy.time import Time
 from astropy.units import Quantity
 from numpy.typing import NDArray
 
-from flybystab.constants import HOUR
+from flybystab.constants import AU, DAY, HOUR
 from flybystab.core.jit import kernel
 from flybystab.core.tide import TidePanels, tide_j2, tide_panels, tide_point
-from flybystab.errors import InvalidInput
+from flybystab.errors import InvalidInput, NoEncounter
+from flybystab.sky.approach import (
+    PanelTrack,
+    crossings,
+    nearest_minimum,
+    panel_track,
+    periapsis_time,
+    relative,
+)
+from flybystab.sky.ephemeris import BODIES, Ephemeris, Window
+from flybystab.sky.forces import FORCES, model, shares
 from flybystab.sky.kepler import states_at_times, time_at_distance
+from flybystab.sky.orbit import Orbit, _ephemeris, later, seconds
 from flybystab.sky.planets import PLANETS, Planet, planet
+from flybystab.sky.reboundry import Flight
 from flybystab.units import to_si
 
 Array = NDArray[np.float64]
@@ -101,8 +114,8 @@ class Encounter:
     forces : tuple of str
         What moves the asteroid and what makes its tide.
     left_out : tuple of (str, float)
-        What was left out, each with its estimated largest share: of the tide, or of the acceleration where
-        the name says "orbit".
+        What was left out, each with its estimated largest share. Names that begin with "orbit:" concern the
+        path: share of the acceleration (scripted) or displacement over distance (real); the others the tide.
     tide_error : float
         Largest difference between the stored tide and the exact one at points between the nodes, over the
         peak of the tide.
@@ -112,6 +125,10 @@ class Encounter:
         Zero.
     tide : TidePanels
         Tidal tensor in `frame` against s from closest approach, from `t_start` to 100 h after `t_stop`.
+        On an impact both it and the track end there, and `t_stop` is the time of it.
+    distance_error, time_error : Quantity or None
+        For a real orbit: change of distance and time of closest approach when the integration is made 100
+        times tighter plus the change when every known force is on. The orbit's own uncertainty is not in it.
     """
 
     planet: Planet
@@ -132,6 +149,8 @@ class Encounter:
     tide: TidePanels = field(repr=False)
     track: Track = field(repr=False)
     t_periapsis: float = 0.0
+    distance_error: Quantity | None = None
+    time_error: Quantity | None = None
 
     def position(self, t: Array | float) -> Array:
         """Asteroid from the planet's centre, m, shape (n, 3), in `frame`, ``t`` s from closest approach."""
@@ -231,6 +250,72 @@ class Encounter:
             track=track,
         )
 
+    @classmethod
+    def from_orbit(
+        cls,
+        orbit: Orbit,
+        planet: str | Planet,
+        time: Time,
+        *,
+        error: Quantity = 0.1 * u.km,
+        start_distance: Quantity | None = None,
+        settle: Quantity = 4 * u.h,
+        search: Quantity = 30 * u.d,
+        within: Quantity | None = None,
+        ephemeris: str | Ephemeris | None = None,
+        forces: tuple[str, ...] | None = None,
+    ) -> Encounter:
+        """Encounter on a real orbit: rebound among the bodies of an ephemeris, with the tide along the way.
+
+        Parameters
+        ----------
+        orbit : Orbit
+            Or anything with an attribute ``orbit``.
+        planet : str or Planet
+            The body encountered.
+        time : Time
+            Near closest approach; the minimum of distance nearest to it counts.
+        error : Quantity
+            Displacement asked for: forces whose estimated share is larger are modelled, the rest is listed.
+            Sources of tide are modelled down to a tenth of the relative error that this means for the tide.
+        start_distance : Quantity, optional
+            Where the encounter starts; by default 10 planet radii or, if larger, 10 times the closest distance
+            but no more than the planet's Hill radius (and at least 1.5 times the closest distance). An orbit
+            that comes from less far (a temporary capture) starts at its apoapsis.
+        settle : Quantity
+            Time added after the orbit is back at `start_distance`.
+        search : Quantity
+            How far from `time` to look for the closest approach.
+        within : Quantity, optional
+            Largest distance that counts as an encounter; by default 20 Hill radii, at most 1 au.
+        ephemeris : str or Ephemeris, optional
+            ``"de421"``, ``"de440"``; the best installed by default.
+        forces : tuple of str, optional
+            Exactly these forces, names as in ``flybystab.sky.forces.FORCES``, instead of choosing by `error`.
+
+        Raises
+        ------
+        NoEncounter
+            No minimum of distance below `within` near `time`.
+        OutOfSpan
+            The ephemeris does not cover the way.
+        UnitMismatch, InvalidInput, UnknownName
+        """
+        path = getattr(orbit, "orbit", orbit)
+        if not isinstance(path, Orbit):
+            raise InvalidInput("orbit", orbit, "an Orbit, or an object with one as its attribute 'orbit'")
+        if not isinstance(time, Time) or time.shape != ():
+            raise InvalidInput("time", time, "one astropy Time")
+        body = _planet(planet)
+        if body.name not in BODIES or body.name == "sun":
+            raise InvalidInput("planet", body.name, f"one of {', '.join(BODIES[1:])}")
+        reach = to_si(search, u.s, "search", low=0.0, open_low=True)
+        largest = _far(body) if within is None else to_si(within, u.m, "within", low=0.0, open_low=True)
+        accuracy = to_si(error, u.m, "error", low=0.0, open_low=True)
+        wait = to_si(settle, u.s, "settle", low=0.0)
+        start = None if start_distance is None else to_si(start_distance, u.m, "start_distance", low=0.0)
+        return _real(cls, path, body, time.tdb, accuracy, start, wait, reach, largest, ephemeris, forces)
+
 
 def _planet(name: str | Planet) -> Planet:
     return planet(name)
@@ -263,3 +348,287 @@ def _left_out(body: Planet, q: float, j2: bool) -> tuple[tuple[str, float], ...]
     if pair is not None:
         out.append((pair, PLANETS[pair].gm / body.gm * (q / 3.844e8) ** 3))
     return tuple(out)
+
+
+def _far(body: Planet) -> float:
+    """Distance that still counts as an encounter, m."""
+    return min(20.0 * hill_radius(body), AU)
+
+
+def hill_radius(body: Planet) -> float:
+    """Hill radius ``d (GM / 3 GM_primary)^(1/3)``, m; the Moon's primary is the Earth."""
+    if body.name == "moon":
+        return float(3.844e8 * (body.gm / (3.0 * PLANETS["earth"].gm)) ** (1.0 / 3.0))
+    return float(body.orbit_radius * (body.gm / (3.0 * PLANETS["sun"].gm)) ** (1.0 / 3.0))
+
+
+@dataclass(frozen=True)
+class _Passage:
+    """Closest approach on one integration: time (s), relative state, log of steps, row of the step before."""
+
+    t: float
+    state: Array
+    log: Array
+    step: int
+    forces: tuple[str, ...]
+
+    @property
+    def distance(self) -> float:
+        return float(np.linalg.norm(self.state[:3]))
+
+
+def _passage(
+    orbit: Orbit, window: Window, index: int, forces: tuple[str, ...], reach: float, epsilon: float
+) -> _Passage | None:
+    """The minimum of distance nearest to the epoch of the window, or None."""
+    flight = orbit.flight(window, forces, epsilon)
+    before = flight.t
+    if before != -reach:
+        way = flight.log_to(-reach)
+    log = flight.log_to(reach)
+    hit = nearest_minimum(log, window, index, 0.0)
+    if hit is None:
+        return None
+    t, _, step = hit
+    again = Flight(model(window, forces, orbit.nongrav), log[step, 0], log[step, 1:7], epsilon)
+    t, state = periapsis_time(_relative_to(again, window, index), float(window.gm[index]), t)
+    if before < -reach:
+        log = np.concatenate([way[:-1], log])
+        step += len(way) - 1
+    return _Passage(t, state, log, step, forces)
+
+
+def _relative_to(flight: Flight, window: Window, index: int, zero: float = 0.0) -> Callable[[float], Array]:
+    def state_at(t: float) -> Array:
+        return flight.to(t + zero) - window.states(index, np.array([t + zero]))[0]
+
+    return state_at
+
+
+def _real(
+    cls: type[Encounter],
+    orbit: Orbit,
+    body: Planet,
+    near: Time,
+    accuracy: float,
+    start: float | None,
+    wait: float,
+    reach: float,
+    largest: float,
+    ephemeris: str | Ephemeris | None,
+    forces: tuple[str, ...] | None,
+) -> Encounter:
+    index = BODIES.index(body.name)
+    epoch = seconds(orbit.epoch, near)
+    window = _ephemeris(ephemeris).window(
+        near, min(epoch, -reach), max(epoch, reach + wait + TAIL + 10.0 * DAY)
+    )
+    everything = tuple(n for n in FORCES if n != "non-gravitational" or any(orbit.nongrav.a))
+    first = _passage(orbit, window, index, forces or everything, reach, 1e-9)
+    if first is None or first.distance > largest:
+        closest = (
+            "no minimum of distance" if first is None else f"{first.distance / AU:.4f} au at the closest"
+        )
+        raise NoEncounter(
+            f"no encounter with {body.name} within {largest / AU:.4f} au and {reach / DAY:g} d of "
+            f"{near.iso} TDB: {closest}"
+        )
+    rows = (first.log[:, 0] - epoch) * np.sign(first.t - epoch) >= 0.0
+    rows &= (first.log[:, 0] - first.t) * np.sign(first.t - epoch) <= 0.0
+    size = shares(window, first.log[rows, 0], first.log[rows, 1:7], orbit.nongrav)
+    if forces is None:
+        forces = tuple(n for n in everything if size[n] >= accuracy)
+    chosen = _passage(orbit, window, index, forces, reach, 1e-9)
+    tight = _passage(orbit, window, index, forces, reach, 1e-11)
+    if chosen is None or tight is None:
+        raise NoEncounter(f"the closest approach to {body.name} vanishes with the forces {', '.join(forces)}")
+    d_error = abs(chosen.distance - first.distance) + abs(chosen.distance - tight.distance)
+    t_error = abs(chosen.t - first.t) + abs(chosen.t - tight.t)
+    return _around(cls, orbit, body, window, chosen, accuracy, start, wait, reach, size, (d_error, t_error))
+
+
+def _around(
+    cls: type[Encounter],
+    orbit: Orbit,
+    body: Planet,
+    window: Window,
+    passage: _Passage,
+    accuracy: float,
+    start: float | None,
+    wait: float,
+    reach: float,
+    size: dict[str, float],
+    errors: tuple[float, float],
+) -> Encounter:
+    """The encounter around a closest approach."""
+    index = BODIES.index(body.name)
+    gm = float(window.gm[index])
+    zero, q, state = passage.t, passage.distance, passage.state
+    level = body.impact_level(q)
+    entry = None
+    log, head, data = passage.log, window.head, window.data
+    if level is not None:
+        found, steps = crossings(log, head, data, window.gm, index, body.impact_distance, 8)
+        row = np.flatnonzero((found[:, 0] < zero) & (found[:, 2] < 0.0))[-1]
+        entry = float(found[row, 0])
+        state = np.empty(6)
+        relative(log, int(steps[row]), head, data, window.gm, index, entry, state)
+        q, ahead = _two_body_periapsis(gm, state)
+        zero = entry + ahead
+        level = body.impact_level(q)
+    speed2 = float(state[3:] @ state[3:]) - 2.0 * gm / float(np.linalg.norm(state[:3]))
+    v_p = float(np.sqrt(speed2 + 2.0 * gm / q))
+    tau = max(q, 0.01 * body.radius) / v_p
+    if start is None:
+        start = max(10.0 * body.radius, 1.5 * q, min(10.0 * q, hill_radius(body)))
+    elif start <= q:
+        raise InvalidInput("start_distance", start * u.m, f"more than the closest approach, {q:.6g} m")
+    t_in, t_out = _ends(passage.log, window, index, start, zero if entry is None else entry)
+    start = float(np.linalg.norm(_log_state(passage.log, window, index, t_in)[:3]))
+    stop = t_out + wait if entry is None else entry
+    end = stop + TAIL if entry is None else entry
+    row = max(int(np.searchsorted(log[:, 0], t_in, side="right")) - 1, 0)
+    flight = Flight(model(window, passage.forces, orbit.nongrav), log[row, 0], log[row, 1:7])
+    track = panel_track(_relative_to(flight, window, index, zero), t_in - zero, end - zero, tau)
+
+    sources, kept, dropped = _sources(track, window, index, body, zero, t_in, stop, 0.1 * accuracy / q)
+    axis = np.array(body.pole)
+
+    def tide(t: Array) -> Array:
+        return _tide(track, window, index, body, axis, zero, t, sources)
+
+    for width in (
+        0.5,
+        0.25,
+        0.125,
+        0.0625,
+    ):  # a passage by the Moon on the way is narrower than the encounter
+        panels, miss = tide_panels(tide, t_in - zero, end - zero, tau, width=width)
+        if miss < 1e-11:
+            break
+    return cls(
+        planet=body,
+        time=later(window.epoch, zero),
+        distance=(q * u.m).to(u.km),
+        v_inf=(np.sqrt(max(speed2, 0.0)) * u.m / u.s).to(u.km / u.s),
+        v_periapsis=(v_p * u.m / u.s).to(u.km / u.s),
+        start_distance=(start * u.m).to(u.km),
+        impact=entry is not None,
+        impact_level=level,
+        impact_time=None if entry is None else entry - zero,
+        frame="ICRF",
+        forces=(*(f"orbit: {n}" for n in passage.forces), *(f"tide: {n}" for n in kept)),
+        left_out=(
+            *((f"orbit: {n}", v / q) for n, v in size.items() if n not in passage.forces and v > 1e-6),
+            *dropped,
+        ),
+        tide_error=miss,
+        t_start=t_in - zero,
+        t_stop=stop - zero,
+        tide=panels,
+        track=track,
+        distance_error=(errors[0] * u.m).to(u.km),
+        time_error=errors[1] * u.s,
+    )
+
+
+def _two_body_periapsis(gm: float, state: Array) -> tuple[float, float]:
+    """Periapsis distance (m) and time to it (s) of the two-body orbit through an inbound state."""
+    r = float(np.linalg.norm(state[:3]))
+    v2 = float(state[3:] @ state[3:])
+    h2 = float(np.sum(np.cross(state[:3], state[3:]) ** 2))
+    energy = v2 - 2.0 * gm / r  # v_inf^2
+    # q from h^2 = q (2 gm + q v_inf^2), without cancellation
+    q = h2 / (gm + np.sqrt(gm * gm + h2 * energy))
+    q = max(q, 1.0)
+    return float(q), float(time_at_distance(gm, q, q * energy / gm, r))
+
+
+def _log_state(log: Array, window: Window, index: int, t: float) -> Array:
+    """State relative to a body at `t` within a log, shape (6,)."""
+    k = min(max(int(np.searchsorted(log[:, 0], t, side="right")) - 1, 0), len(log) - 2)
+    out = np.empty(6)
+    relative(log, k, window.head, window.data, window.gm, index, t, out)
+    return out
+
+
+def _ends(log: Array, window: Window, index: int, level: float, t: float) -> tuple[float, float]:
+    """Last time before `t` and first after it at distance `level`, or at an apoapsis or an end of the log."""
+    tables = (window.head, window.data, window.gm, index)
+    inside, _ = crossings(log, *tables, level, 8)
+    turning, _ = crossings(log, *tables, -1.0, 8)
+    before = [log[0, 0]] + [f[0] for f in (*inside, *turning) if f[0] < t and f[2] < 0.0]
+    after = [log[-1, 0]] + [f[0] for f in inside if f[0] > t and f[2] > 0.0]
+    after += [f[0] for f in turning if f[0] > t and f[2] < 0.0]
+    return float(max(before)), float(min(after))
+
+
+@kernel
+def _add_tides(gm: Array, places: Array, use: Array, out: Array) -> None:
+    """Add to ``out[n, 6]`` the tides (s^-2) of the bodies at ``places[n, 10, 3]`` (m from the asteroid)."""
+    for i in range(places.shape[0]):
+        for b in range(places.shape[1]):
+            if use[b]:
+                tide_point(gm[b], places[i, b, 0], places[i, b, 1], places[i, b, 2], out[i])
+
+
+def _places(track: PanelTrack, window: Window, index: int, zero: float, t: Array) -> Array:
+    """Bodies as seen from the asteroid, m, shape (n, 10, 3), ICRF axes, at `t` s from closest approach."""
+    near = track.states(t)[:, :3]
+    time = t + zero
+    centre = window.states(index, time)[:, :3]
+    out = np.empty((t.size, len(BODIES), 3))
+    for b in range(len(BODIES)):
+        # The encountered planet itself without the detour through the barycentre: no digit is lost.
+        out[:, b] = -near if b == index else (window.states(b, time)[:, :3] - centre) - near
+    return out
+
+
+def _tide(
+    track: PanelTrack,
+    window: Window,
+    index: int,
+    body: Planet,
+    axis: Array,
+    zero: float,
+    t: Array,
+    sources: tuple[Array, bool],
+) -> Array:
+    out = np.zeros((t.size, 6))
+    places = _places(track, window, index, zero, t)
+    _add_tides(window.gm, places, sources[0], out)
+    if sources[1]:
+        flat = np.zeros((t.size, 6))
+        planet_tide(window.gm[index], body.j2, body.radius, axis, -places[:, index], flat)
+        point = np.zeros((t.size, 6))
+        planet_tide(window.gm[index], 0.0, body.radius, axis, -places[:, index], point)
+        out += flat - point
+    return out
+
+
+def _sources(
+    track: PanelTrack,
+    window: Window,
+    index: int,
+    body: Planet,
+    zero: float,
+    t_in: float,
+    stop: float,
+    threshold: float,
+) -> tuple[tuple[Array, bool], list[str], list[tuple[str, float]]]:
+    """Which bodies make tide above `threshold` of the peak: switches, names; those left out with shares."""
+    t = np.unique(np.concatenate([np.linspace(t_in - zero, stop - zero, 33), [min(0.0, stop - zero)]]))
+    places = _places(track, window, index, zero, t)
+    size = 2.0 * window.gm / np.sum(places**2, axis=2) ** 1.5
+    share = size.max(axis=0) / size[:, index].max()
+    q = float(np.sqrt(np.sum(places[:, index] ** 2, axis=1).min()))
+    flat = 6.0 * body.j2 * (body.radius / q) ** 2
+    use = share >= threshold
+    use[index] = True
+    kept = [n for n, on in zip(BODIES, use, strict=True) if on]
+    dropped = [(n, float(v)) for n, v, on in zip(BODIES, share, use, strict=True) if not on]
+    if flat >= threshold:
+        kept.append(f"{body.name} J2")
+    else:
+        dropped.append((f"{body.name} J2", flat))
+    return (use, flat >= threshold), kept, dropped
