@@ -23,7 +23,8 @@ import numpy as np
 
 HERE = Path(__file__).resolve().parent
 G = 6.6743e-11
-GM_SUN = 0.01720209895**2  # au3/d2, the Gaussian constant: the unit in which JPL's elements are osculating
+#: Of the Sun in DE440/441, the one behind JPL's osculating elements, au3/d2.
+GM_SUN = 132712440041.279419 * 86400.0**2 / 149597870.7**3
 OBLIQUITY = math.radians(84381.448 / 3600)
 
 #: Elongation from a lightcurve amplitude dm (mag): a/b = 10^(0.4 f dm). Most amplitudes of the LCDB are the

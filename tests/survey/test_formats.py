@@ -30,7 +30,7 @@ def test_sbdb_query(tmp_path):
     path = tmp_path / "q.csv"
     path.write_text(
         "pdes,full_name,name,epoch,e,a,i,om,w,ma,H,diameter,diameter_sigma,rot_per,A2,spec_B,condition_code\n"
-        "99942,99942 Apophis (2004 MN4),Apophis,2459000.5,.19,.92,3,204,126,61,19,0.34,0.04,30.4,-2.9E-14,Sq,0\n"
+        "99942,99942 Apophis (2004 MN4),Apophis,2459000.5,.19,.92,3,4,5,6,19,0.34,0.04,30.4,-2.9E-14,Sq,0\n"
         "2020 AB1, (2020 AB1),,2459000.5,.5,2.1,3,4,5,6,25.1,,,,,,\n"
     )
     a, b = catalogue(path)

@@ -6,13 +6,12 @@ from concurrent.futures import ThreadPoolExecutor
 import astropy.units as u
 import numpy as np
 import pytest
-from astropy.time import Time
+from scripted import NAMES, SPAN, day, screening, three
 
 from flybystab.aggregate.body import Material
 from flybystab.constants import AU, R_EARTH
-from flybystab.errors import InvalidInput, NotConverged, UnknownName
+from flybystab.errors import InvalidInput, OutOfSpan, UnknownName
 from flybystab.sky.encounter import Encounter
-from flybystab.survey import screening
 from flybystab.survey.catalogue import Asteroid
 from flybystab.survey.columns import COLUMNS, VERDICTS, share_of
 from flybystab.survey.judging import Passage, contributors, judge, wilson
@@ -20,36 +19,6 @@ from flybystab.survey.population import Attitudes, Population, draws
 from flybystab.survey.quick import tide_size
 from flybystab.survey.results import read_results
 from flybystab.survey.screening import Screening, screen, settings
-
-NAMES = ["Apophis", "Anteros", "Toutatis", "1950 DA", "Bennu", "Duende"]
-SPAN = ("2026-01-01", "2036-01-01")
-NEAR = Encounter.hyperbolic("earth", periapsis=2.1 * R_EARTH * u.m, v_inf=6 * u.km / u.s)
-MIDDLE = Encounter.hyperbolic("earth", periapsis=6 * R_EARTH * u.m, v_inf=6 * u.km / u.s)
-
-
-def day(jd):
-    return Time(jd, format="jd", scale="tdb")
-
-
-def scripted(asteroid, settings):
-    """Three passages at fixed times: far, at 6 and at 2.1 radii of the Earth; Bennu cannot be followed."""
-    if asteroid.name == "Bennu":
-        raise NotConverged("lost")
-    v = 6000.0
-    far = Passage(asteroid, "earth", day(2461000.5), 0.02 * AU, v)
-    rest = [
-        Passage(
-            asteroid, "earth", Time(2462000.5 + k, format="jd", scale="tdb"), e.distance.to_value(u.m), v, e
-        )
-        for k, e in enumerate((MIDDLE, NEAR))
-    ]
-    return [far, *rest]
-
-
-@pytest.fixture
-def scene(monkeypatch):
-    monkeypatch.setattr(screening, "passages", scripted)
-    monkeypatch.setattr(screening, "_ephemeris_name", lambda: "none")
 
 
 def same(a, b):
@@ -60,8 +29,8 @@ def same(a, b):
         assert np.array_equal(x, y, equal_nan=x.dtype.kind == "f"), name
 
 
-def test_rows_say_what_they_must(scene):
-    table = screen(NAMES, *SPAN, samples=20, seed=1)
+def test_rows_say_what_they_must():
+    table = screen(NAMES, *SPAN, finder=three, samples=20, seed=1)
     assert len(table) == 5 * 3 + 1
     assert list(table.colnames) == list(COLUMNS)
     failed = table[table["asteroid"] == "Bennu"]
@@ -87,22 +56,22 @@ def test_rows_say_what_they_must(scene):
     assert table.meta["time_scale"] == "TDB"
 
 
-def test_one_sample_is_the_catalogue_body(scene):
-    table = screen(["Anteros"], *SPAN, material=Material(friction_angle=40 * u.deg))
+def test_one_sample_is_the_catalogue_body():
+    table = screen(["Anteros"], *SPAN, finder=three, material=Material(friction_angle=40 * u.deg))
     assert list(table["samples"]) == [0, 0, 0]
     assert np.all(table["friction_angle"] == 40 * u.deg)
     assert np.isfinite(table["numerical_error"][2])
     assert table["numerical_error"][2] < 1e-3 * u.deg
 
 
-def test_same_rows_for_any_executor_and_order(scene):
-    here = screen(NAMES, *SPAN, samples=5, seed=2)
+def test_same_rows_for_any_executor_and_order():
+    here = screen(NAMES, *SPAN, finder=three, samples=5, seed=2)
     with ThreadPoolExecutor(3) as pool:
-        same(here, screen(NAMES, *SPAN, samples=5, seed=2, executor=pool))
-    turned = screen(NAMES[::-1], *SPAN, samples=5, seed=2)
+        same(here, screen(NAMES, *SPAN, finder=three, samples=5, seed=2, executor=pool))
+    turned = screen(NAMES[::-1], *SPAN, finder=three, samples=5, seed=2)
     for name in NAMES:
         same(here[here["asteroid"] == name], turned[turned["asteroid"] == name])
-    other = screen(NAMES, *SPAN, samples=5, seed=3)
+    other = screen(NAMES, *SPAN, finder=three, samples=5, seed=3)
     assert not np.array_equal(here["margin"], other["margin"], equal_nan=True) or not np.array_equal(
         here["contributors"], other["contributors"]
     )
@@ -143,12 +112,10 @@ def test_bound_from_distance_and_speed_covers_the_tide():
 
 
 @pytest.mark.parametrize("suffix", ["ecsv", "parquet"])
-def test_stopped_run_goes_on_without_losing_or_repeating(scene, tmp_path, suffix, monkeypatch):
+def test_stopped_run_goes_on_without_losing_or_repeating(tmp_path, suffix):
     if suffix == "parquet":
         pytest.importorskip("pyarrow")
-    run = Screening(
-        [Asteroid.from_catalogue(n) for n in NAMES], settings(*SPAN, samples=4, keep_samples=True)
-    )
+    run = screening(samples=4, keep_samples=True)
     whole, out = tmp_path / f"whole.{suffix}", tmp_path / f"out.{suffix}"
     states = []
     run.run(whole, samples_output=tmp_path / f"s.{suffix}", progress=states.append)
@@ -168,8 +135,8 @@ def test_stopped_run_goes_on_without_losing_or_repeating(scene, tmp_path, suffix
     journal = out.with_name(out.name + ".journal")
     journal.write_bytes(journal.read_bytes() + b'{"task": 3, "ro')  # killed in the middle of a line
     called = []
-    monkeypatch.setattr(screening, "passages", lambda a, s: called.append(a.name) or scripted(a, s))
-    run.run(out)
+    again = Screening(run.asteroids, run.settings, lambda a, s: called.append(a.name) or three(a, s))
+    again.run(out)
     assert called == NAMES[3:]
     assert not journal.exists()
     same(read_results(out), read_results(whole))
@@ -184,6 +151,8 @@ def test_settings_are_checked():
         settings("soon", "2036-01-01")
     with pytest.raises(InvalidInput, match="stop"):
         settings("2036-01-01", "2026-01-01")
+    with pytest.raises(OutOfSpan):
+        settings("2026-01-01", "9999-01-01")
     with pytest.raises(UnknownName, match="earth"):
         settings(*SPAN, planets=["erth"])
     with pytest.raises(InvalidInput, match="within"):
@@ -199,9 +168,8 @@ def test_settings_are_checked():
         screen(["Apophis", 99942], *SPAN)
 
 
-def test_output_is_checked_before_anything_is_computed(tmp_path, monkeypatch):
-    monkeypatch.setattr(screening, "passages", lambda a, s: pytest.fail("computed"))
-    run = Screening([Asteroid.from_catalogue("Apophis")], settings(*SPAN))
+def test_output_is_checked_before_anything_is_computed(tmp_path):
+    run = screening(2, lambda a, s: pytest.fail("computed"))
     with pytest.raises(InvalidInput, match="can be written"):
         run.run(tmp_path / "nowhere" / "x.ecsv")
     with pytest.raises(InvalidInput, match="keep_samples"):

@@ -254,7 +254,17 @@ class Asteroid:
         from flybystab.sky.orbit import Orbit
 
         return Orbit.from_elements(
-            epoch=epoch, a=a, e=float(e), i=i, node=node, peri=peri, M=mean, A1=a1, A2=a2, A3=a3
+            epoch=epoch,
+            a=a,
+            e=float(e),
+            i=i,
+            node=node,
+            peri=peri,
+            M=mean,
+            A1=a1,
+            A2=a2,
+            A3=a3,
+            name=self.name,
         )
 
     @property

@@ -55,7 +55,7 @@ _MPC = {
 
 
 def kind_of(columns: Sequence[str]) -> str:
-    """ "sbdb", "mpc" or "" (the catalogue's own columns)."""
+    """Form of a table: ``sbdb``, ``mpc`` or nothing (the catalogue's own columns)."""
     names = set(columns)
     if {"pdes", "epoch", "e", "a", "i", "om", "w", "ma"} <= names:
         return "sbdb"

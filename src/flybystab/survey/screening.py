@@ -31,12 +31,14 @@ from flybystab.aggregate.body import Material
 from flybystab.constants import AU
 from flybystab.errors import FlybystabError, InvalidInput
 from flybystab.outcome import Verdict
+from flybystab.sky.ephemeris import ephemeris
 from flybystab.sky.planets import planet
 from flybystab.survey.catalogue import Asteroid, catalogue
 from flybystab.survey.columns import COLUMNS, SAMPLE_COLUMNS, VERDICTS, YIELDED, share_of
 from flybystab.survey.judging import Judged, Passage, contributors, inputs, judge, wilson
 from flybystab.survey.population import Attitudes, Draws, Population, draws, identity, nominal
 from flybystab.survey.results import Journal, check_output, table_of, write_rows
+from flybystab.units import to_si
 
 Array = NDArray[np.float64]
 
@@ -208,10 +210,16 @@ def passages(asteroid: Asteroid, settings: Settings) -> list[Passage]:
     return sorted(found, key=lambda p: (p.time.tdb.jd, p.planet))
 
 
-def screen_asteroid(asteroid: Asteroid, settings: Settings) -> dict[str, list[dict[str, Any]]]:
+#: What finds the passages of an asteroid: a function that workers can import.
+Finder = Callable[[Asteroid, Settings], list[Passage]]
+
+
+def screen_asteroid(
+    asteroid: Asteroid, settings: Settings, finder: Finder = passages
+) -> dict[str, list[dict[str, Any]]]:
     """All rows of one asteroid: the unit of work. What fails is a row that says why."""
     try:
-        found = passages(asteroid, settings)
+        found = finder(asteroid, settings)
     except FlybystabError as error:
         return {
             "rows": [_head(asteroid, settings) | {"error": f"{type(error).__name__}: {error}"}],
@@ -225,8 +233,10 @@ def screen_asteroid(asteroid: Asteroid, settings: Settings) -> dict[str, list[di
     return {"rows": rows, "samples": samples}
 
 
-def _work(asteroids: list[Asteroid], settings: Settings) -> list[dict[str, list[dict[str, Any]]]]:
-    return [screen_asteroid(a, settings) for a in asteroids]
+def _work(
+    asteroids: list[Asteroid], settings: Settings, finder: Finder
+) -> list[dict[str, list[dict[str, Any]]]]:
+    return [screen_asteroid(a, settings, finder) for a in asteroids]
 
 
 @dataclass(frozen=True)
@@ -272,11 +282,14 @@ class Screening:
     ----------
     asteroids : sequence of Asteroid
     settings : Settings
+    finder : callable
+        Finds the passages of an asteroid; those of its orbit by default.
     """
 
-    def __init__(self, asteroids: Sequence[Asteroid], settings: Settings) -> None:
+    def __init__(self, asteroids: Sequence[Asteroid], settings: Settings, finder: Finder = passages) -> None:
         self.asteroids = tuple(asteroids)
         self.settings = settings
+        self.finder = finder
 
     def meta(self, *, complete: bool = True) -> dict[str, Any]:
         """Provenance of the table."""
@@ -288,7 +301,7 @@ class Screening:
             "complete": complete,
             "asteroids": len(self.asteroids),
             "catalogue": files if len(files) > 1 else (files[0] if files else ""),
-            "ephemeris": _ephemeris_name(),
+            "ephemeris": ephemeris().name,
             "settings": self.settings.stated(),
             "nominal": "catalogue values and the material given; unknown poles and angles are drawn",
         }
@@ -298,7 +311,7 @@ class Screening:
         digest = hashlib.sha256()
         for a in self.asteroids:
             digest.update(json.dumps(sorted(a.row.items())).encode())
-        settings = json.dumps(self.settings.stated() | {"ephemeris": _ephemeris_name()}, sort_keys=True)
+        settings = json.dumps(self.settings.stated() | {"ephemeris": ephemeris().name}, sort_keys=True)
         digest.update(settings.encode())
         return {"flybystab": __version__, "run": digest.hexdigest(), "samples": self.settings.keep_samples}
 
@@ -325,7 +338,7 @@ class Screening:
         todo = [i for i in range(len(self.asteroids)) if i not in done]
         if executor is None:
             for i in todo:
-                yield i, screen_asteroid(self.asteroids[i], self.settings)
+                yield i, screen_asteroid(self.asteroids[i], self.settings, self.finder)
             return
         chunks = iter([todo[k : k + chunk] for k in range(0, len(todo), chunk)])
         limit = window or 4 * int(getattr(executor, "_max_workers", 0) or os.cpu_count() or 1)
@@ -333,7 +346,9 @@ class Screening:
         try:
             while True:
                 while len(pending) < limit and (part := next(chunks, None)) is not None:
-                    future = executor.submit(_work, [self.asteroids[i] for i in part], self.settings)
+                    future = executor.submit(
+                        _work, [self.asteroids[i] for i in part], self.settings, self.finder
+                    )
                     pending[future] = part
                 if not pending:
                     return
@@ -414,12 +429,6 @@ class Screening:
         return tell()
 
 
-def _ephemeris_name() -> str:
-    from flybystab.sky.ephemeris import ephemeris
-
-    return str(ephemeris().name)
-
-
 def settings(
     start: Time | str,
     stop: Time | str,
@@ -434,8 +443,6 @@ def settings(
     keep_samples: bool = False,
 ) -> Settings:
     """Checked settings of a screening (arguments of :func:`screen`)."""
-    from flybystab.units import to_si
-
     dates = []
     for name, date in (("start", start), ("stop", stop)):
         try:
@@ -449,6 +456,7 @@ def settings(
     for name, number, least in (("samples", samples, 1), ("seed", seed, 0)):
         if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < least:
             raise InvalidInput(name, number, f"a whole number, {least} or more")
+    ephemeris().check(*(Time(d, format="jd", scale="tdb") for d in dates))
     names = (planets,) if isinstance(planets, str) else tuple(planets)
     if not names:
         raise InvalidInput("planets", planets, "at least one planet")
@@ -480,6 +488,7 @@ def screen(
     *,
     tolerance: float = 1e-7,
     progress: Callable[[Progress], None] | None = None,
+    finder: Finder = passages,
 ) -> QTable:
     """What the encounters of asteroids do to them as rubble piles.
 
@@ -507,6 +516,8 @@ def screen(
         Step tolerance of the dynamics.
     progress : callable, optional
         Called with a :class:`Progress` after every asteroid.
+    finder : callable
+        Finds the passages of an asteroid, instead of its orbit.
 
     Returns
     -------
@@ -518,10 +529,8 @@ def screen(
     For long runs use :meth:`Screening.run`, which writes to a file and can be taken up again.
     """
     chosen = listed(asteroids)
-    run = Screening(
-        chosen,
-        settings(start, stop, planets, within, samples, seed, material, population, tolerance=tolerance),
-    )
+    wanted = settings(start, stop, planets, within, samples, seed, material, population, tolerance=tolerance)
+    run = Screening(chosen, wanted, finder)
     began = clock.monotonic()
     found: dict[int, list[dict[str, Any]]] = {}
     counts: Counter[str] = Counter()

@@ -1,0 +1,60 @@
+"""Passages at fixed times on two-body orbits, for tests without an ephemeris; workers import this module."""
+
+import os
+import sys
+import time
+
+import astropy.units as u
+from astropy.time import Time
+
+from flybystab.constants import AU, R_EARTH
+from flybystab.errors import NotConverged
+from flybystab.sky.encounter import Encounter
+from flybystab.survey.catalogue import Asteroid
+from flybystab.survey.judging import Passage
+from flybystab.survey.screening import Screening, settings
+
+NAMES = ["Apophis", "Anteros", "Toutatis", "1950 DA", "Bennu", "Duende"]
+SPAN = ("2026-01-01", "2036-01-01")
+NEAR = Encounter.hyperbolic("earth", periapsis=2.1 * R_EARTH * u.m, v_inf=6 * u.km / u.s)
+MIDDLE = Encounter.hyperbolic("earth", periapsis=6 * R_EARTH * u.m, v_inf=6 * u.km / u.s)
+
+
+def day(jd):
+    return Time(jd, format="jd", scale="tdb")
+
+
+def three(asteroid, settings):
+    """Far, at 6 and at 2.1 radii of the Earth; Bennu cannot be followed."""
+    if asteroid.name == "Bennu":
+        raise NotConverged("lost")
+    v = 6000.0
+    far = Passage(asteroid, "earth", day(2461000.5), 0.02 * AU, v)
+    rest = [
+        Passage(asteroid, "earth", day(2462000.5 + k), e.distance.to_value(u.m), v, e)
+        for k, e in enumerate((MIDDLE, NEAR))
+    ]
+    return [far, *rest]
+
+
+def slow(asteroid, settings):
+    """The same, a tenth of a second later; leaves a mark in the directory named by the environment."""
+    if "MARKS" in os.environ:
+        with open(os.path.join(os.environ["MARKS"], str(os.getpid())), "a") as stream:
+            stream.write(asteroid.name + "\n")
+    time.sleep(0.1)
+    return three(asteroid, settings)
+
+
+def screening(n=6, finder=three, **options):
+    """A screening of the first `n` names, or of copies of Anteros under other names."""
+    asteroids = [Asteroid.from_catalogue(x) for x in NAMES[:n]]
+    base = dict(Asteroid.from_catalogue("Anteros").row)
+    while len(asteroids) < n:
+        row = base | {"number": str(10**6 + len(asteroids)), "name": f"copy {len(asteroids)}"}
+        asteroids.append(Asteroid(row))
+    return Screening(asteroids, settings(*SPAN, **options), finder)
+
+
+if __name__ == "__main__":
+    screening(30, slow, samples=3, seed=4).run(sys.argv[1])

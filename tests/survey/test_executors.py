@@ -1,0 +1,108 @@
+"""Many workers: the same rows from processes and from dask, with kills in the middle."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections import Counter
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+
+import pytest
+from scripted import screening, slow, three
+from test_screening import same
+
+from flybystab.survey.results import read_results
+
+HERE = Path(__file__).parent
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory):
+    path = tmp_path_factory.mktemp("reference") / "r.ecsv"
+    screening(30, three, samples=3, seed=4).run(path)
+    return read_results(path)
+
+
+def wait_for(condition, seconds=60.0):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "waited too long"
+        time.sleep(0.02)
+
+
+def test_processes_give_the_same_rows(tmp_path, reference):
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        screening(30, three, samples=3, seed=4).run(tmp_path / "p.ecsv", executor=pool)
+    same(read_results(tmp_path / "p.ecsv"), reference)
+
+
+def test_killed_run_resumes_without_losing_or_repeating_a_row(tmp_path, reference):
+    out, marks = tmp_path / "k.ecsv", tmp_path / "marks"
+    marks.mkdir()
+    environment = os.environ | {"MARKS": str(marks)}
+    journal = tmp_path / "k.ecsv.journal"
+
+    def lines():
+        return journal.read_bytes().count(b"\n") if journal.exists() else 0
+
+    run = subprocess.Popen([sys.executable, HERE / "scripted.py", out], env=environment)
+    wait_for(lambda: lines() > 8)
+    run.send_signal(signal.SIGKILL)
+    run.wait()
+    assert not out.exists()
+    saved = lines() - 1
+    assert 8 <= saved < 30
+    subprocess.run([sys.executable, HERE / "scripted.py", out], env=environment, check=True)
+    same(read_results(out), reference)
+    assert not journal.exists()
+    computed = Counter(line for f in marks.iterdir() for line in f.read_text().split("\n") if line)
+    assert len(computed) == 30
+    # Only the asteroid in work when the run was killed may have been begun twice.
+    assert sum(computed.values()) <= 31
+
+
+def test_dask_with_a_killed_worker_gives_the_same_rows(tmp_path, reference):
+    distributed = pytest.importorskip("distributed")
+    marks = tmp_path / "marks"
+    marks.mkdir()
+    environment = os.environ | {
+        "MARKS": str(marks),
+        "PYTHONPATH": os.pathsep.join([str(HERE), os.environ.get("PYTHONPATH", "")]),
+        "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "10",
+    }
+    python = [sys.executable, "-m"]
+    address = tmp_path / "scheduler.json"
+    quiet = {"env": environment, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    scheduler = subprocess.Popen(
+        [*python, "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard",
+         "--scheduler-file", address], **quiet,
+    )  # fmt: skip
+    workers = []
+    try:
+        wait_for(address.exists)
+        workers = [
+            subprocess.Popen(
+                [*python, "distributed.cli.dask_worker", "--scheduler-file", address, "--nthreads", "1",
+                 "--no-nanny", "--no-dashboard", "--local-directory", tmp_path / f"w{k}"], **quiet,
+            )
+            for k in range(2)
+        ]  # fmt: skip
+        with distributed.Client(scheduler_file=str(address), timeout=60) as client:
+            client.wait_for_workers(2, timeout=60)
+
+            def kill(state):
+                if state.done >= 6 and workers[0].poll() is None:
+                    workers[0].kill()
+
+            run = screening(30, slow, samples=3, seed=4)
+            run.run(tmp_path / "d.ecsv", executor=client.get_executor(), chunk=1, progress=kill)
+        assert workers[0].poll() is not None
+        assert len(list(marks.iterdir())) == 2  # both had worked
+    finally:
+        for process in (*workers, scheduler):
+            process.kill()
+            process.wait()
+    same(read_results(tmp_path / "d.ecsv"), reference)
