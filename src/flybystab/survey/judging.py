@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.stats import rankdata
 
 from flybystab.aggregate.body import Material
+from flybystab.errors import FlybystabError
 from flybystab.flyby import LOOSER, flyby_many, periapsis_axes
 from flybystab.outcome import Verdict
 from flybystab.sky.encounter import Encounter
@@ -133,12 +134,17 @@ def judge(
     friction, decided = _quick(draw, code, passage.bounds())
     if not quick:
         decided[:] = UNDECIDED
+    failure = ""
     if np.any(decided == UNDECIDED):
-        encounter = passage.meet()
-        if quick and not encounter.impact:
-            close, sharper = _quick(draw, code, passage.close_bounds())
-            fresh = (decided == UNDECIDED) & (sharper != UNDECIDED)
-            friction[fresh], decided[fresh] = close[fresh], sharper[fresh]
+        try:
+            encounter = passage.meet()
+        except FlybystabError as error:
+            failure = f"{type(error).__name__}: {error}"
+        else:
+            if quick and not encounter.impact:
+                close, sharper = _quick(draw, code, passage.close_bounds())
+                fresh = (decided == UNDECIDED) & (sharper != UNDECIDED)
+                friction[fresh], decided[fresh] = close[fresh], sharper[fresh]
     dynamic = decided == UNDECIDED
     out = Judged([""] * n, np.full(n, np.nan), friction[:, 0].copy(), dynamic, [""] * n)
     for i in (int(k) for k in np.flatnonzero(~dynamic)):
@@ -146,7 +152,10 @@ def judge(
         out.verdict[i] = Verdict.INTACT if intact else Verdict.NOT_IN_EQUILIBRIUM
         out.margin[i] = draw.phi[i] - friction[i, 1 if intact else 0]
     todo = [int(k) for k in np.flatnonzero(dynamic)]
-    if todo:
+    if todo and failure:
+        for i in todo:
+            out.error[i] = failure
+    elif todo:
         encounter = passage.meet()
         frame = periapsis_axes(encounter)
         bodies = [draw.body(i, material) for i in todo]

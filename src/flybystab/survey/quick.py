@@ -9,9 +9,12 @@ tide of norm ``|K|`` changes ``T`` by at most ``S_1 |K|`` in any direction. It a
 - ``X = sum J_i (J_3 - J_i) w_i^2 = 2 E J_3 - L^2``, zero for spin about the short axis, obeys
   ``d sqrt(X)/dt <= tau sqrt((J_3 - J_1)/J_1)``, which bounds the wobble.
 
-Both bound the change of ``w w``. If every stress within that distance ``d`` of the undisturbed one is inside
-the yield surface, ``|s| + d sqrt(1 + k^2/3) <= k (p + c)`` with the least ``k``, the body cannot yield:
-INTACT is proved without integrating anything. Where the test fails nothing is said; the dynamics decides.
+Both bound the change of ``w w``. Where ``J_2`` is close to ``J_3`` the axis may turn far in the plane of the
+two short axes; then the stress turns with it, but for terms in ``S_2 - S_3``, and the smaller bound counts.
+
+If every stress within that distance ``d`` of the undisturbed one is inside the yield surface,
+``|s| + d sqrt(1 + k^2/3) <= k (p + c)`` with the least ``k``, the body cannot yield: INTACT is proved without
+integrating anything. Where the test fails nothing is said; the dynamics decides.
 
 The unwanted opposite is proved the same way: a free body whose stress is outside the yield surface by more
 than the tide at the start can mend is not in equilibrium.
@@ -23,6 +26,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.constants import G
+from flybystab.core.ellipsoid import gravity_coefficients
 from flybystab.core.jit import kernel
 from flybystab.core.rheology import least_slope, required_friction, slope_over_sine
 from flybystab.core.statics import invariants, overload, rigid_stress
@@ -65,11 +69,13 @@ def _friction_bound(code: int, phi: float, cohesion: float, s: float, p: float, 
 
 
 @kernel
-def disturbance(axes: Array, omega: Array, peak: float, impulse: float) -> tuple[float, float]:
+def disturbance(
+    axes: Array, pi_g_rho: float, omega: Array, peak: float, impulse: float
+) -> tuple[float, float]:
     """Bound on the change of ``T = 5 sigma/rho`` (m2/s2), and the squared spin about a3 it is counted from.
 
-    `axes` (m) and `omega` (rad/s) along the principal axes; `peak` is the largest norm of the tide (s^-2) and
-    `impulse` its time integral (1/s).
+    `axes` (m) and `omega` (rad/s) along the principal axes; `pi_g_rho` is ``pi G rho`` (s^-2), `peak` the
+    largest norm of the tide (s^-2), `impulse` its time integral (1/s). Turns of the stress do not count.
     """
     s1, s2, s3 = axes[0] ** 2, axes[1] ** 2, axes[2] ** 2
     j1, j2, j3 = s2 + s3, s1 + s3, s1 + s2
@@ -98,7 +104,20 @@ def disturbance(axes: Array, omega: Array, peak: float, impulse: float) -> tuple
     h12, h13, h23 = 2 * s1 * s2 / (s1 + s2), 2 * s1 * s3 / (s1 + s3), 2 * s2 * s3 / (s2 + s3)
     squares = (s1 * (w2 + half)) ** 2 + (s2 * (w1 + half)) ** 2 + (s3 * (w1 + w2)) ** 2
     squares += 2.0 * (h12 * h12 * w1 * w2 + (h13 * h13 * w1 + h23 * h23 * w2) * high)
-    return np.sqrt(squares) + s1 * peak, centre
+    change = np.sqrt(squares)
+    # The axis turned by any angle in the plane of a2 and a3, at a rate w: the stress turned alike, and
+    high = (most / j2) ** 2
+    low = max(0.0, least * least - j1 * j1 * w1) / (j3 * j3)
+    half = 0.5 * (high - low)
+    _, g2, g3 = gravity_coefficients(s1, s2, s3)
+    load = 2.0 * pi_g_rho * abs(s2 * g2 - s3 * g3)
+    slip = load + (s2 - s3) * high
+    turned = np.sqrt(load * load + 1.5 * slip * slip) + np.sqrt(s1 * s1 + s2 * s2) * half
+    turned += np.sqrt((s2 * s2 + s3 * s3) * w1 * w1 + 2.0 * h12 * h12 * w1 * high)
+    if turned < change:
+        change = turned
+        centre = 0.5 * (high + low)
+    return change + s1 * peak, centre
 
 
 @kernel
@@ -147,7 +166,7 @@ def quick_margins(
         sin = np.sin(phi[i])
         steep = (3.0 + sin) / (2.0 * np.sqrt(6.0)) + sin / np.sqrt(3.0)
         out = overload(code, phi[i], cohesion[i], stress) - steep * scale * s1 * start
-        d, centre = disturbance(axes[i], omega[i], peak, impulse)
+        d, centre = disturbance(axes[i], rate2, omega[i], peak, impulse)
         spin[2] = np.sqrt(centre)
         rigid_stress(s1, s2, s3, rho[i], rate2, spin, none, stress)
         p, s, det = invariants(stress)
