@@ -9,10 +9,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.aggregate.body import Body, Material
-from flybystab.constants import G, R_EARTH
+from flybystab.constants import R_EARTH, G
+from flybystab.core import motion
 from flybystab.core.passage import Passage, parameters, passage
+from flybystab.core.regimes import follow
 from flybystab.core.stepping import follow_steps
-from flybystab.core.tide import TidePanels, no_tide, tensor, tide_at
+from flybystab.core.tide import TidePanels, components, no_tide, tensor, tide_at
+from flybystab.core.workspace import N_EVENT, N_HISTORY
 from flybystab.sky.encounter import Encounter
 
 Array = NDArray[np.float64]
@@ -133,3 +136,40 @@ def stepped(
     return tensor(y[:6]) * a0**2, gradient / t0
 
 
+def deforming(
+    body: Body,
+    rate: Array,
+    t_stop: float,
+    *,
+    regime: int = motion.FLOWING,
+    viscosity: float = 0.0,
+    tolerance: float = 1e-11,
+    tide: TidePanels | None = None,
+    limit: float = 100.0,
+) -> tuple[Array, Array, list[tuple[int, float]], Array]:
+    """Follow a body that starts with the velocity gradient ``rate + W`` (1/s), body axes along the frame.
+
+    Returns shape (m2), velocity gradient (1/s), events (code, time in s) and the history's columns
+    (time s, S in m2 as six components).
+    """
+    m = body.material
+    t0 = body.dynamical_time
+    a0 = float(np.cbrt(np.prod(body.axes)))
+    par = parameters(body.axes, body.rho, m.phi, m.c_pa, m.dilatancy, m.surface_code, viscosity)
+    y = np.zeros(15)
+    y[:3] = (body.axes / a0) ** 2
+    y[6:12] = components(rate) * t0
+    y[12:15] = body.omega * t0
+    panels = no_tide() if tide is None else tide
+    scaled = TidePanels(panels.tau / t0, panels.start, panels.width, panels.coefficients * t0**2)
+    history, events = np.zeros((20000, N_HISTORY)), np.zeros((64, N_EVENT))
+    count, mark = np.zeros(4, dtype=np.int64), np.zeros(2)
+    follow(
+        0.0, t_stop / t0, t_stop / t0, regime, y, par, scaled, tolerance, limit, m.brittle, False,
+        200_000, history, events, count, mark,
+    )  # fmt: skip
+    w = y[12:15]
+    gradient = tensor(y[6:12]) + np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
+    rows = history[: count[0], [0, 2, 3, 4, 5, 6, 7]] * np.array([t0] + [a0**2] * 6)
+    log = [(int(c), t * t0) for c, t, _, _ in events[: count[1]]]
+    return tensor(y[:6]) * a0**2, gradient / t0, log, rows

@@ -27,9 +27,7 @@ def initial(body, attitude=None):
     """Shape and velocity gradient at the start."""
     r = np.eye(3) if attitude is None else attitude
     w = r @ body.omega
-    return r @ np.diag(body.axes**2) @ r.T, np.array(
-        [[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]]
-    )
+    return r @ np.diag(body.axes**2) @ r.T, np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
 
 
 @pytest.mark.parametrize("axes", [(1400, 850, 750), (1000, 1000, 1000), (900, 900, 700), (1400, 800, 800)])
@@ -147,23 +145,19 @@ def test_rotating_everything_together_changes_nothing():
     from flybystab.core.tide import components, tensor
 
     tilted = e.tide._replace(
-        coefficients=np.ascontiguousarray(
-            components(turn @ tensor(e.tide.coefficients) @ turn.T)
-        )
+        coefficients=np.ascontiguousarray(components(turn @ tensor(e.tide.coefficients) @ turn.T))
     )
     a = carried(body, e.t_start, e.t_stop, e.tide, tolerance=1e-10)
     b = carried(body, e.t_start, e.t_stop, tilted, turn, tolerance=1e-10)
     np.testing.assert_allclose(turn @ a.shape @ turn.T, b.shape, atol=3e-8 * 1400**2)
-    np.testing.assert_allclose(
-        turn @ a.velocity_gradient @ turn.T, b.velocity_gradient, atol=3e-8 * 3e-4
-    )
+    np.testing.assert_allclose(turn @ a.velocity_gradient @ turn.T, b.velocity_gradient, atol=3e-8 * 3e-4)
 
 
 def test_rigid_motion_runs_backwards():
     """Rigid motion is symmetric in time: the end state, reversed in a reversed tide, returns to the start."""
     e = earth(3.0)
     p = carried(PILE, e.t_start, -e.t_start, e.tide, unyielding=True, tolerance=1e-12)
-    values, vectors = np.linalg.eigh(p.shape)
+    vectors = np.linalg.eigh(p.shape)[1]
     vectors = vectors[:, ::-1]
     vectors[:, 2] *= np.linalg.det(vectors)
     g = p.velocity_gradient
@@ -185,11 +179,8 @@ def test_same_dimensionless_problem_at_two_sizes():
     large = PILE.with_(semi_axes=[1400, 850, 750] * u.km)
     a = carried(small, e.t_start, e.t_stop, e.tide)
     b = carried(large, e.t_start, e.t_stop, e.tide)
-    np.testing.assert_allclose(axes_of(a.shape) * 1e6, axes_of(b.shape), rtol=1e-8)
-    # The units of the kernels: sizes that are powers of two apart give the same bits.
-    c = carried(PILE.with_(semi_axes=[1400, 850, 750] * u.m), e.t_start, e.t_stop, e.tide)
-    d = carried(PILE.with_(semi_axes=np.array([1400, 850, 750]) * 8 * u.m), e.t_start, e.t_stop, e.tide)
-    np.testing.assert_allclose(axes_of(c.shape) * 8, axes_of(d.shape), rtol=1e-12)
+    np.testing.assert_allclose(axes_of(a.shape) * 1e6, axes_of(b.shape), rtol=1e-12)
+    assert a.events[1][1] == pytest.approx(b.events[1][1], abs=1e-6)
 
 
 def test_stepping_keeps_angular_momentum_exactly():

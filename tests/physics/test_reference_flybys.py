@@ -44,9 +44,7 @@ def test_second_integrator_agrees(name):
     body = PILE.with_(material=material(35, dilatancy=dilatancy))
     e = earth(q)
     fine = carried(body, e.t_start, e.t_stop, e.tide, tolerance=1e-10)
-    coarse, middle, dense = (
-        stepped(body, e.t_start, e.t_stop, n, e.tide) for n in (8000, 16000, 32000)
-    )
+    coarse, middle, dense = (stepped(body, e.t_start, e.t_stop, n, e.tide) for n in (8000, 16000, 32000))
     reference = axes_of(fine.shape)
     errors = [np.abs(axes_of(s) / reference - 1.0).max() for s, _ in (coarse, middle, dense)]
     assert 1.6 < errors[0] / errors[1] < 2.5
