@@ -11,8 +11,16 @@ With semi-axes ``a_i`` and density ``rho`` the internal acceleration is ``-2 pi 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flybystab.core.jit import kernel
+
+Array = NDArray[np.float64]
+
+# 24 Gauss-Legendre nodes on [0, 1]: index symbols to 1e-14 for axis ratios up to 10, 2e-11 up to 100.
+_X, _WEIGHTS = np.polynomial.legendre.leggauss(24)
+NODES = 0.5 * (1.0 + _X)
+WEIGHTS = 0.5 * _WEIGHTS
 
 
 @kernel
@@ -117,3 +125,67 @@ def potential_coefficient(s1: float, s2: float, s3: float) -> float:
     """
     rf, _, _, _ = carlson_fd(s1, s2, s3)
     return 2.0 * np.sqrt(s1 * s2 * s3) * rf
+
+
+@kernel
+def index_symbols(s1: float, s2: float, s3: float, one: Array, two: Array, three: Array) -> None:
+    """Write Chandrasekhar's index symbols ``A_i``, ``A_ij``, ``A_ijk`` of squared semi-axes ``s_i``.
+
+        A_ij... = a1 a2 a3 int_0^inf du / (Delta (s_i + u)(s_j + u)...),   Delta^2 = prod (s_i + u)
+
+    into ``one[3]`` (no unit), ``two[3, 3]`` (m^-2) and ``three[3, 3, 3]`` (m^-4) (Chandrasekhar 1969, section 21).
+
+    The usual recurrences ``A_ij = (A_j - A_i)/(s_i - s_j)`` lose all digits for nearly equal axes. Here all
+    symbols come from one Gauss rule in ``y``: with ``tanh y = sqrt((s_max - s_min)/(s_max + u))`` the integrand is
+    analytic in the strip ``|Im y| < pi/2`` and the range of ``y`` grows as the logarithm of the axis ratio
+    only, so that the rule converges at the same geometric rate for spheres, discs and needles.
+    """
+    big = max(s1, s2, s3)
+    small = min(s1, s2, s3)
+    q = np.sqrt((big - small) / big)
+    stretch = 1.0  # y_max/q
+    if q > 0.0:
+        stretch = np.arcsinh(np.sqrt((big - small) / small)) / q
+    f1 = f2 = f3 = 1.0
+    if q > 0.0:
+        f1 = (s1 - small) / (big - small)
+        f2 = (s2 - small) / (big - small)
+        f3 = (s3 - small) / (big - small)
+    for i in range(3):
+        one[i] = 0.0
+        for j in range(3):
+            two[i, j] = 0.0
+            for k in range(3):
+                three[i, j, k] = 0.0
+    volume = np.sqrt(s1 * s2 * s3)
+    n = np.empty(3)
+    for node in range(NODES.size):
+        eta = stretch * NODES[node]
+        y = q * eta
+        t = np.tanh(y)
+        w = t / q if y > 1e-9 else eta
+        c = 1.0 / np.cosh(y)
+        g1 = c * c + f1 * t * t
+        g2 = c * c + f2 * t * t
+        g3 = c * c + f3 * t * t
+        r = w * w / big
+        n[0] = r / g1
+        n[1] = r / g2
+        n[2] = r / g3
+        weight = volume * WEIGHTS[node] * stretch * 2.0 * c * c / np.sqrt(big * g1 * g2 * g3)
+        for i in range(3):
+            x = weight * n[i]
+            one[i] += x
+            for j in range(i, 3):
+                z = x * n[j]
+                two[i, j] += z
+                for k in range(j, 3):
+                    three[i, j, k] += z * n[k]
+    for i in range(3):
+        for j in range(i + 1, 3):
+            two[j, i] = two[i, j]
+        for j in range(3):
+            for k in range(3):
+                a = min(i, j, k)
+                b = max(i, j, k)
+                three[i, j, k] = three[a, i + j + k - a - b, b]
