@@ -36,6 +36,12 @@ COLUMNS: dict[str, Column] = {
     "decided_by": Column(str, None, "bound or dynamics"),
     "friction_angle": Column(float, u.deg, "of the catalogue body"),
     "cohesion": Column(float, u.Pa, "of the catalogue body"),
+    "yield_surface": Column(str, None, "form of the yield surface, of the samples, too"),
+    "semi_axis_a": Column(float, u.m, "long semi-axis of the catalogue body"),
+    "semi_axis_b": Column(float, u.m, "middle semi-axis of the catalogue body"),
+    "semi_axis_c": Column(float, u.m, "short semi-axis of the catalogue body"),
+    "density": Column(float, u.kg / u.m**3, "bulk density of the catalogue body"),
+    "spin_period": Column(float, u.h, "2 pi over the spin rate of the catalogue body"),
     "required_friction_at_rest": Column(float, u.deg, "mobilised by the free body; inf if none would do"),
     "samples": Column(int, None, "samples drawn"),
     "samples_dynamic": Column(int, None, "samples that needed the dynamics"),
@@ -53,6 +59,10 @@ COLUMNS: dict[str, Column] = {
         float, u.deg, "of the largest mobilised friction angle, measured; nan if by bound"
     ),
     "seed": Column(int, None, "seed of the run"),
+    "orbit": Column(str, None, "orbit solution"),
+    "catalogue": Column(str, None, "where the asteroid comes from"),
+    "ephemeris": Column(str, None, "of the planets"),
+    "version": Column(str, None, "of flybystab"),
     "error": Column(str, None, "why the row could not be computed"),
 }
 

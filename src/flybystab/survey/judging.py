@@ -112,6 +112,7 @@ def judge(
     *,
     tolerance: float = 1e-7,
     quick: bool = True,
+    sharp: float = np.inf,
     measure: bool = False,
 ) -> Judged:
     """Verdicts on bodies in one passage: by the bound where it decides, else by the dynamics.
@@ -126,6 +127,9 @@ def judge(
         Yield surface, dilatancy and brittleness; friction and cohesion are those of the draw.
     quick : bool
         Whether the bound may decide.
+    sharp : float
+        Follow a body that the bound decides all the same if its bound on the mobilised friction angle exceeds
+        the angle mobilised at rest by more than this, rad: for a margin instead of a lower limit to it.
     measure : bool
         Measure the numerical error of the first body by a run with a larger step tolerance.
     """
@@ -134,6 +138,7 @@ def judge(
     friction, decided = _quick(draw, code, passage.bounds())
     if not quick:
         decided[:] = UNDECIDED
+    decided[(decided == INTACT) & (friction[:, 1] > friction[:, 0] + sharp)] = UNDECIDED
     failure = ""
     if np.any(decided == UNDECIDED):
         try:
@@ -144,6 +149,7 @@ def judge(
             if quick and not encounter.impact:
                 close, sharper = _quick(draw, code, passage.close_bounds())
                 fresh = (decided == UNDECIDED) & (sharper != UNDECIDED)
+                fresh &= (sharper != INTACT) | (close[:, 1] <= close[:, 0] + sharp)
                 friction[fresh], decided[fresh] = close[fresh], sharper[fresh]
     dynamic = decided == UNDECIDED
     out = Judged([""] * n, np.full(n, np.nan), friction[:, 0].copy(), dynamic, [""] * n)

@@ -43,6 +43,10 @@ from flybystab.units import to_si
 Array = NDArray[np.float64]
 
 
+#: The margin of the catalogue body is computed, not bounded, where the bound is this far from rest, rad.
+SHARP = float(np.radians(0.1))
+
+
 @dataclass(frozen=True)
 class Settings:
     """What a screening computes, apart from the list of asteroids.
@@ -110,7 +114,9 @@ def screen_passage(passage: Passage, settings: Settings) -> tuple[dict[str, Any]
     try:
         known = nominal(asteroid, material, settings.population)
         attitude = Attitudes.at(asteroid, known, settings.seed, "nominal", *where)
-        main = judge(passage, known, attitude, material, tolerance=settings.tolerance, measure=True)
+        main = judge(
+            passage, known, attitude, material, tolerance=settings.tolerance, sharp=SHARP, measure=True
+        )
     except FlybystabError as error:
         return row | {"error": f"{type(error).__name__}: {error}"}, []
     row |= {
@@ -120,10 +126,15 @@ def screen_passage(passage: Passage, settings: Settings) -> tuple[dict[str, Any]
         "required_friction_at_rest": float(np.rad2deg(main.rest[0])),
         "numerical_error": main.numerical,
         "error": main.error[0],
-        "assumed": "; ".join(dict.fromkeys((*asteroid.assumptions, *known.drawn))),
+        "assumed": "; ".join(
+            (*asteroid.assumptions, *(d for d in known.drawn if d.split(" (")[0] not in asteroid.assumptions))
+        ),
         "forces": "; ".join(passage.encounter.forces)
         if passage.encounter
         else "bound on the tide of all bodies",
+        **{f"semi_axis_{x}": float(a) for x, a in zip("abc", known.axes[0], strict=True)},
+        "density": float(known.rho[0]),
+        "spin_period": float(known.period[0]) / 3600.0,
         "samples": 0,
         "samples_dynamic": 0,
     }
@@ -182,13 +193,18 @@ def _head(asteroid: Asteroid, settings: Settings) -> dict[str, Any]:
         "number": -1 if asteroid.number is None else asteroid.number,
         "friction_angle": float(np.rad2deg(settings.material.phi)),
         "cohesion": settings.material.c_pa,
+        "yield_surface": settings.material.yield_surface,
         "seed": settings.seed,
+        "orbit": asteroid.row.get("orbit_solution", ""),
+        "catalogue": asteroid.file,
+        "ephemeris": ephemeris().name,
+        "version": __version__,
     }
 
 
 def passages(asteroid: Asteroid, settings: Settings) -> list[Passage]:
     """Encounters of an asteroid, in time."""
-    from flybystab.sky import find_encounters
+    from flybystab.sky.finder import find_encounters
 
     table = find_encounters(
         asteroid.orbit,
@@ -196,6 +212,7 @@ def passages(asteroid: Asteroid, settings: Settings) -> list[Passage]:
         Time(settings.stop, format="jd", scale="tdb"),
         planets=list(settings.planets),
         within=settings.within * u.m,
+        threads=1,
     )
     found = [
         Passage(
