@@ -17,6 +17,7 @@ from flybystab.survey.screening import Screening, settings
 NAMES = ["Apophis", "Anteros", "Toutatis", "1950 DA", "Bennu", "Duende"]
 SPAN = ("2026-01-01", "2036-01-01")
 NEAR = Encounter.hyperbolic("earth", periapsis=2.1 * R_EARTH * u.m, v_inf=6 * u.km / u.s)
+FAR = Encounter.hyperbolic("earth", periapsis=0.02 * u.au, v_inf=6 * u.km / u.s)
 MIDDLE = Encounter.hyperbolic("earth", periapsis=6 * R_EARTH * u.m, v_inf=6 * u.km / u.s)
 
 
@@ -29,7 +30,7 @@ def three(asteroid, settings):
     if asteroid.name == "Bennu":
         raise NotConverged("lost")
     v = 6000.0
-    far = Passage(asteroid, "earth", day(2461000.5), 0.02 * AU, v)
+    far = Passage(asteroid, "earth", day(2461000.5), 0.02 * AU, v, FAR)
     rest = [
         Passage(asteroid, "earth", day(2462000.5 + k), e.distance.to_value(u.m), v, e)
         for k, e in enumerate((MIDDLE, NEAR))

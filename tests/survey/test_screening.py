@@ -40,7 +40,8 @@ def test_rows_say_what_they_must():
     assert len(good) == 15
     assert set(good["decided_by"]) == {"bound", "dynamics"}
     far = good[good["distance"] > 0.01 * u.au]
-    assert set(far["decided_by"]) == {"bound"}
+    assert list(far["decided_by"]).count("bound") >= 4
+    assert sum(far["samples_dynamic"]) < 0.1 * sum(far["samples"])
     shares = sum(good[share_of(v)] for v in VERDICTS)
     assert shares == pytest.approx(1.0)
     assert np.all(good["p_yield_low"] <= good["p_yield_high"])
