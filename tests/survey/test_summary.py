@@ -17,7 +17,7 @@ ROWS = [
     {"asteroid": "lost", "verdict": "", "error": "NotConverged: x"},
 ]
 for row, n in zip(ROWS, (0, 5, 10, 0, 0), strict=True):
-    row["samples_dynamic"] = n
+    row |= {"samples_dynamic": n, "friction_rise": 0.1 * n}
 for k, row in enumerate(ROWS):
     row |= {"planet": "earth", "time_tdb": "2029-04-13T21:46:00", "distance": 0.001 * (k + 1), "v_inf": 6.0}
     row |= {share_of(v): float(row["verdict"] == v) for v in VERDICTS}
@@ -29,11 +29,12 @@ def test_summary_counts_and_ranks(tmp_path):
     assert s.verdicts == {"INTACT": 2, "RESHAPED": 1, "NOT IN EQUILIBRIUM": 1}
     assert list(s.closest["asteroid"]) == ["soft", "tight"]
     assert list(s.reshaped["asteroid"]) == ["soft"]
+    assert [str(n) for n in s.strongest["asteroid"]] == ["soft", "tight"]
     assert s.dynamic_share == pytest.approx(0.5)
     assert s.errors == {"NotConverged: x": 1}
     text = s.text()
     assert "unfinished" in text
-    assert "margin -3.00 deg, yields in 40 % of the samples" in text
+    assert "margin -3.00 deg, 1 deg by the passage, yields in 40 % of the samples" in text
 
 
 def test_summary_of_a_file_and_its_figure(tmp_path):

@@ -43,6 +43,9 @@ COLUMNS: dict[str, Column] = {
     "density": Column(float, u.kg / u.m**3, "bulk density of the catalogue body"),
     "spin_period": Column(float, u.h, "2 pi over the spin rate of the catalogue body"),
     "required_friction_at_rest": Column(float, u.deg, "mobilised by the free body; inf if none would do"),
+    "friction_rise": Column(
+        float, u.deg, "what the passage adds to that; an upper limit if decided by bound"
+    ),
     "samples": Column(int, None, "samples drawn"),
     "samples_dynamic": Column(int, None, "samples that needed the dynamics"),
     **{share_of(v): Column(float, None, f"share of the samples with verdict {v}") for v in VERDICTS},

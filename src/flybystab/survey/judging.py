@@ -173,7 +173,8 @@ def judge(
             out.margin[i] = np.radians(table.margin[k].to_value(u.deg))
         if measure and dynamic[0] and not out.error[0]:
             looser = flyby_many(bodies[:1], [encounter], turns[:1], tolerance=LOOSER * tolerance, workers=1)
-            out.numerical = float(abs(looser.margin[0] - table.margin[0]).to_value(u.deg))
+            pair = [t.max_required_friction_angle[0].to_value(u.deg) for t in (looser, table)]
+            out.numerical = 0.0 if pair[0] == pair[1] else float(abs(pair[0] - pair[1]))
     return out
 
 

@@ -124,6 +124,7 @@ def screen_passage(passage: Passage, settings: Settings) -> tuple[dict[str, Any]
         "margin": float(np.rad2deg(main.margin[0])),
         "decided_by": "dynamics" if main.dynamic[0] else "bound",
         "required_friction_at_rest": float(np.rad2deg(main.rest[0])),
+        "friction_rise": float(np.rad2deg(_rise(known.phi[0] - main.margin[0], main.rest[0]))),
         "numerical_error": main.numerical,
         "error": main.error[0],
         "assumed": "; ".join(
@@ -162,6 +163,11 @@ def screen_passage(passage: Passage, settings: Settings) -> tuple[dict[str, Any]
     if failures and not row["error"]:
         row["error"] = f"{len(failures)} samples: {failures[0]}"
     return row, list(_samples(passage, draw, attitudes, result)) if settings.keep_samples else []
+
+
+def _rise(most: float, rest: float) -> float:
+    """What a passage adds to the mobilised friction; inf beyond any friction, nan if rest needs that, too."""
+    return most - rest if np.isfinite(rest) else np.nan
 
 
 def _samples(passage: Passage, draw: Draws, attitudes: Attitudes, result: Judged) -> Iterator[dict[str, Any]]:

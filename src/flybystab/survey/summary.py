@@ -16,8 +16,20 @@ from flybystab.outcome import Verdict
 from flybystab.survey.columns import VERDICTS, share_of
 from flybystab.survey.results import read_results
 
+#: Rows of a list in the text.
+TOP = 20
 #: Columns of the short lists.
-SHORT = ("asteroid", "planet", "time_tdb", "distance", "v_inf", "verdict", "margin", "p_yield")
+SHORT = (
+    "asteroid",
+    "planet",
+    "time_tdb",
+    "distance",
+    "v_inf",
+    "verdict",
+    "margin",
+    "friction_rise",
+    "p_yield",
+)
 
 
 @dataclass(frozen=True)
@@ -34,6 +46,8 @@ class Summary:
         Samples drawn, and those that needed the dynamics.
     closest : QTable
         Encounters of bodies in equilibrium that come closest to failure, worst first.
+    strongest : QTable
+        Encounters of bodies in equilibrium that add most to the mobilised friction.
     reshaped : QTable
         Encounters in which any sample, or the catalogue body, yields.
     errors : dict of str to int
@@ -48,6 +62,7 @@ class Summary:
     samples: int
     samples_dynamic: int
     closest: QTable
+    strongest: QTable
     reshaped: QTable
     errors: dict[str, int]
     meta: dict[str, Any]
@@ -65,7 +80,11 @@ class Summary:
         lines += [f"  {name}: {n}" for name, n in self.verdicts.items()]
         if self.samples:
             lines.append(f"{self.samples} samples, {100 * self.dynamic_share:.2g} % of them by the dynamics")
-        for title, table in (("closest to failure", self.closest), ("may yield", self.reshaped)):
+        for title, table in (
+            ("closest to failure", self.closest),
+            ("most loaded by the passage", self.strongest),
+            ("may yield", self.reshaped[:TOP]),
+        ):
             if len(table):
                 lines += [f"{title}:", *("  " + line for line in _lines(table))]
         lines += [f"  {n} x {reason}" for reason, n in self.errors.items()]
@@ -79,7 +98,8 @@ def _lines(table: QTable) -> list[str]:
         out.append(
             f"{row['asteroid']:>16} {row['time_tdb'][:16]} {row['planet']:>7} "
             f"{row['distance'].to_value(u.km):11,.0f} km {row['verdict']}, "
-            f"margin {row['margin'].to_value(u.deg):.2f} deg{p}"
+            f"margin {row['margin'].to_value(u.deg):.2f} deg, "
+            f"{row['friction_rise'].to_value(u.deg):.3g} deg by the passage{p}"
         )
     return out
 
@@ -103,6 +123,9 @@ def summary(results: QTable | str | Path, closest: int = 10) -> Summary:
     yields = np.nan_to_num(np.asarray(table["p_yield"], dtype=float))
     order = np.lexsort((margin, -yields))
     order = order[stands[order]]
+    rise = np.nan_to_num(np.asarray(table["friction_rise"].to_value(u.deg)), posinf=1e9)
+    loaded = np.argsort(-rise, kind="stable")
+    loaded = loaded[stands[loaded]]
     touched = stands & ((verdict != Verdict.INTACT) | (yields > 0.0))
     counts = Counter(verdict[~failed])
     errors = Counter(e for e in np.asarray(table["error"], dtype=str) if e)
@@ -113,6 +136,7 @@ def summary(results: QTable | str | Path, closest: int = 10) -> Summary:
         samples=int(np.maximum(table["samples"], 0).sum()),
         samples_dynamic=int(np.maximum(table["samples_dynamic"], 0).sum()),
         closest=table[order[:closest]][list(SHORT)],
+        strongest=table[loaded[:closest]][list(SHORT)],
         reshaped=table[order[touched[order]]][list(SHORT)],
         errors=dict(errors.most_common(10)),
         meta=dict(table.meta),

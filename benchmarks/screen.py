@@ -1,0 +1,168 @@
+"""Throughput, overhead and memory of a screening, measured and printed as a table.
+
+python benchmarks/screen.py throughput     samples per second by distance and workers; cost of 10^8 samples
+python benchmarks/screen.py memory         resident memory while 10^6 rows are written
+python benchmarks/screen.py catalogue [FILE] [--jobs N] [--samples N] [--output FILE]
+                                           a whole run: time, verdicts, the ten closest to failure
+"""
+
+from __future__ import annotations
+
+import argparse
+import resource
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import astropy.units as u
+from astropy.time import Time
+
+from flybystab.constants import AU, R_EARTH
+from flybystab.sky.encounter import Encounter
+from flybystab.survey.catalogue import Asteroid, catalogue
+from flybystab.survey.formats import with_physical_data
+from flybystab.survey.judging import Passage
+from flybystab.survey.progress import ProgressBar, duration
+from flybystab.survey.screening import Screening, Settings, settings
+from flybystab.survey.summary import summary
+
+SPAN = ("2026-01-01", "2050-01-01")
+DISTANCES = {"0.02 au": 0.02 * AU, "10 R_E": 10 * R_EARTH, "4 R_E": 4 * R_EARTH, "2 R_E": 2 * R_EARTH}
+
+
+def at(q: float, asteroid: Asteroid, settings: Settings) -> list[Passage]:
+    e = Encounter.hyperbolic("earth", periapsis=q * u.m, v_inf=6 * u.km / u.s)
+    return [Passage(asteroid, "earth", Time(2462000.5, format="jd", scale="tdb"), q, 6000.0, e)]
+
+
+def far(asteroid: Asteroid, settings: Settings) -> list[Passage]:
+    return at(DISTANCES["0.02 au"], asteroid, settings)
+
+
+def ten(asteroid: Asteroid, settings: Settings) -> list[Passage]:
+    return at(DISTANCES["10 R_E"], asteroid, settings)
+
+
+def four(asteroid: Asteroid, settings: Settings) -> list[Passage]:
+    return at(DISTANCES["4 R_E"], asteroid, settings)
+
+
+def two(asteroid: Asteroid, settings: Settings) -> list[Passage]:
+    return at(DISTANCES["2 R_E"], asteroid, settings)
+
+
+FINDERS = dict(zip(DISTANCES, (far, ten, four, two), strict=True))
+
+
+def measured(run: Screening, executor: Executor | None) -> tuple[float, int, int]:
+    """Seconds, samples, samples by dynamics."""
+    began = time.perf_counter()
+    rows = [r for _, result in run.results(executor) for r in result["rows"]]
+    spent = time.perf_counter() - began
+    return spent, sum(r["samples"] for r in rows), sum(r["samples_dynamic"] for r in rows)
+
+
+def throughput() -> None:
+    bodies = [a for a in catalogue() if a.name != "Bennu"]
+    print(
+        f"{'distance':>9} {'workers':>7} {'samples':>8} {'by dynamics':>11} {'samples/s':>10} {'1e8 samples':>12}"
+    )
+    with ProcessPoolExecutor(2) as pool:
+        measured(
+            Screening(bodies[:20], settings(*SPAN, samples=20), two), pool
+        )  # compile, in the workers, too
+        measured(Screening(bodies[:4], settings(*SPAN, samples=20), two), None)
+        for name, finder in FINDERS.items():
+            n = {"0.02 au": 200, "10 R_E": 100, "4 R_E": 50, "2 R_E": 20}[name]
+            for workers in (1, 2):
+                run = Screening(bodies[:n], settings(*SPAN, samples=100), finder)
+                spent, samples, dynamic = measured(run, pool if workers == 2 else None)
+                rate = samples / spent
+                print(
+                    f"{name:>9} {workers:7d} {samples:8d} {100 * dynamic / samples:10.1f}% {rate:10.0f} "
+                    f"{duration(1e8 / rate):>12}"
+                )
+        nothing = settings(*SPAN, within=1 * u.m)
+        began = time.perf_counter()
+        futures = [pool.submit(len, [a, nothing]) for a in bodies]
+        for f in futures:
+            f.result()
+        print(f"overhead of one task: {1e3 * (time.perf_counter() - began) / len(bodies):.2f} ms")
+    run = Screening(catalogue(), settings(*SPAN))
+    began = time.perf_counter()
+    found = sum(len(result["rows"]) for _, result in run.results())
+    spent = time.perf_counter() - began
+    years = 24 * len(run.asteroids)
+    print(
+        f"search and nominal verdicts, 1 worker: {years / spent:.0f} object-years/s ({found} encounters of "
+        f"{len(run.asteroids)} asteroids in 24 years, {spent:.1f} s)"
+    )
+
+
+class Rows(Screening):
+    """Rows that cost nothing: what is left is the journal and the writing."""
+
+    def results(self, *args: Any, skip: Any = (), **kwargs: Any) -> Iterator[tuple[int, dict[str, Any]]]:
+        """The first asteroid's rows, many times."""
+        one = super().results(*args, **kwargs)
+        _, pattern = next(iter(one))
+        for i in range(len(self.asteroids)):
+            if i not in skip:
+                yield i, {"rows": pattern["rows"] * 100, "samples": []}
+
+
+def memory(count: int) -> None:
+    """Peak resident memory at stages of a run of `count` rows."""
+    base = Asteroid.from_catalogue("Anteros")
+    print(f"{'rows':>9} {'peak memory (MB)':>17} {'seconds':>8}")
+    with tempfile.TemporaryDirectory() as where:
+        for suffix in ("ecsv", "parquet"):
+            for n in (count // 100, count // 10, count):
+                run = Rows([base] * (n // 100), settings(*SPAN, samples=100), far)
+                began = time.perf_counter()
+                run.run(Path(where) / f"x{n}.{suffix}")
+                peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+                print(f"{n:9d} {peak:17.0f} {time.perf_counter() - began:8.1f}  {suffix}")
+
+
+def whole(args: argparse.Namespace) -> None:
+    asteroids = with_physical_data(catalogue(args.file)) if args.file else catalogue()
+    run = Screening(asteroids, settings(*SPAN, samples=args.samples, seed=args.seed))
+    output = args.output or Path(tempfile.mkdtemp()) / "screen.ecsv"
+    began = time.perf_counter()
+    if args.jobs > 1:
+        with ProcessPoolExecutor(args.jobs) as pool:
+            run.run(output, executor=pool, progress=ProgressBar())
+    else:
+        run.run(output, progress=ProgressBar())
+    print(f"{time.perf_counter() - began:.1f} s with {args.jobs} workers; {output}")
+    print(summary(output).text())
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("what", choices=("throughput", "memory", "catalogue"))
+    parser.add_argument("file", nargs="?", type=Path)
+    parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--samples", type=int, default=100)
+    parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--rows", type=int, default=1_000_000)
+    parser.add_argument("--output", type=Path)
+    args = parser.parse_args()
+    if args.what == "throughput":
+        throughput()
+    elif args.what == "memory":
+        memory(args.rows)
+    else:
+        whole(args)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
