@@ -68,13 +68,11 @@ def measured(run: Screening, executor: Executor | None) -> tuple[float, int, int
 
 def throughput() -> None:
     bodies = [a for a in catalogue() if a.name != "Bennu"]
-    print(
-        f"{'distance':>9} {'workers':>7} {'samples':>8} {'by dynamics':>11} {'samples/s':>10} {'1e8 samples':>12}"
-    )
+    head = [("workers", 7), ("samples", 8), ("by dynamics", 11), ("samples/s", 10), ("1e8 samples", 12)]
+    print(f"{'distance':>9} " + " ".join(f"{name:>{width}}" for name, width in head))
     with ProcessPoolExecutor(2) as pool:
-        measured(
-            Screening(bodies[:20], settings(*SPAN, samples=20), two), pool
-        )  # compile, in the workers, too
+        # The first runs compile, in the workers, too.
+        measured(Screening(bodies[:20], settings(*SPAN, samples=20), two), pool)
         measured(Screening(bodies[:4], settings(*SPAN, samples=20), two), None)
         for name, finder in FINDERS.items():
             n = {"0.02 au": 200, "10 R_E": 100, "4 R_E": 50, "2 R_E": 20}[name]

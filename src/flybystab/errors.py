@@ -80,3 +80,7 @@ class MissingExtra(FlybystabError, ImportError):
     def __init__(self, package: str, extra: str, purpose: str) -> None:
         self.package, self.extra = package, extra
         super().__init__(f"{purpose} needs the package {package}: pip install 'flybystab[{extra}]'")
+
+
+class WorkersLost(FlybystabError, RuntimeError):
+    """Processes that computed something are gone; what was finished is kept."""

@@ -11,6 +11,7 @@ from flybystab.constants import AU, R_EARTH
 from flybystab.errors import NotConverged
 from flybystab.sky.encounter import Encounter
 from flybystab.survey.catalogue import Asteroid
+from flybystab.survey.executors import workers
 from flybystab.survey.judging import Passage
 from flybystab.survey.screening import Screening, settings
 
@@ -39,11 +40,11 @@ def three(asteroid, settings):
 
 
 def slow(asteroid, settings):
-    """The same, a tenth of a second later; leaves a mark in the directory named by the environment."""
+    """The same, a moment later; leaves a mark in the directory named by the environment."""
     if "MARKS" in os.environ:
         with open(os.path.join(os.environ["MARKS"], str(os.getpid())), "a") as stream:
             stream.write(asteroid.name + "\n")
-    time.sleep(0.1)
+    time.sleep(0.05)
     return three(asteroid, settings)
 
 
@@ -58,4 +59,5 @@ def screening(n=6, finder=three, **options):
 
 
 if __name__ == "__main__":
-    screening(30, slow, samples=3, seed=4).run(sys.argv[1])
+    with workers(int([*sys.argv, "1"][2])) as pool:
+        screening(16, slow, samples=3, seed=4).run(sys.argv[1], executor=pool, chunk=1)

@@ -3,6 +3,7 @@
 import astropy.units as u
 import numpy as np
 import pytest
+from astropy.time import Time
 
 from flybystab.aggregate.body import Body
 from flybystab.constants import R_EARTH, G
@@ -10,7 +11,7 @@ from flybystab.errors import InvalidInput
 from flybystab.flyby import flyby
 from flybystab.sky.encounter import Encounter
 from flybystab.survey.catalogue import Asteroid
-from flybystab.survey.inference import infer, inference_figure
+from flybystab.survey.inference import infer, inference_figure, survived
 
 DENSITIES = [1500, 2500] * u.kg / u.m**3
 
@@ -50,6 +51,15 @@ def test_fast_rotator_needs_cohesion():
     )
     assert table["friction_equilibrium"][0] == np.inf * u.deg
     assert table["friction_equilibrium"][1] < 60 * u.deg
+
+
+def test_toutatis_2004_is_among_its_passages_and_hardly_loads_it():
+    a = Asteroid.from_catalogue("Toutatis")
+    past = survived(a, Time("2000-01-01", scale="tdb"), Time("2010-01-01", scale="tdb"), within=0.02 * u.au)
+    assert [e.time.tdb.isot[:10] for e in past] == ["2004-09-29"]
+    table = infer(a, past, densities=[2000] * u.kg / u.m**3, cohesions=[0] * u.Pa, attitudes=8)
+    rise = table["friction_every_attitude"][0] - table["friction_equilibrium"][0]
+    assert 0 * u.deg <= rise < 1 * u.deg
 
 
 def test_figure_and_bad_input(tmp_path):

@@ -17,6 +17,7 @@ from typing import Any
 import astropy.units as u
 import numpy as np
 from astropy.table import QTable
+from astropy.time import Time
 from astropy.units import Quantity
 
 from flybystab.aggregate.body import Body, Material
@@ -25,6 +26,7 @@ from flybystab.core.passage import passage
 from flybystab.core.statics import demand, rigid_stress
 from flybystab.errors import InvalidInput
 from flybystab.sky.encounter import Encounter
+from flybystab.sky.finder import find_encounters
 from flybystab.survey.attitude import attitude_matrix, isotropic_direction
 from flybystab.survey.catalogue import Asteroid
 from flybystab.survey.population import identity, stream
@@ -117,6 +119,24 @@ def infer(
         "reading": "bounds from passages hold for a body that has kept its shape since",
     }
     return table
+
+
+def survived(
+    asteroid: Asteroid,
+    start: Time,
+    stop: Time,
+    planets: Sequence[str] = ("earth",),
+    within: Quantity = 0.01 * u.au,
+) -> list[Encounter]:
+    """Passages of an asteroid's orbit between two dates, followed with all forces, for :func:`infer`.
+
+    Raises
+    ------
+    OutOfSpan
+        The span reaches beyond the ephemeris.
+    """
+    table = find_encounters(asteroid, start, stop, planets=list(planets), within=within)
+    return [Encounter.from_orbit(asteroid.orbit, str(row["planet"]), row["time"]) for row in table]
 
 
 def _grid(values: Quantity, unit: u.UnitBase, name: str) -> np.ndarray:

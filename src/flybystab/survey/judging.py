@@ -45,7 +45,7 @@ class Passage:
         """Bounds on the tide from distance and speed alone; infinite where they say too little."""
         body = planet(self.planet)
         far = self.planet != "earth" or self.distance > FAR_FROM_EARTH
-        if not far or self.distance < 3.0 * body.radius or not self.v_inf > 0.0:
+        if self.planet == "moon" or not far or self.distance < 3.0 * body.radius or not self.v_inf > 0.0:
             return np.inf, np.inf, np.inf
         q, v = self.distance, self.v_inf
         others = PLANETS["sun"].gm / (0.7 * body.orbit_radius) ** 3

@@ -24,7 +24,7 @@ from astropy.table import QTable
 from flybystab.errors import InvalidInput, MissingExtra
 
 #: Rows of one Parquet row group.
-ROW_GROUP = 50_000
+ROW_GROUP = 10_000
 #: Bytes that must be free where the output goes.
 LEAST_SPACE = 64 * 2**20
 FORMATS = (".ecsv", ".parquet")

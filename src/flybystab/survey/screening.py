@@ -14,7 +14,7 @@ import os
 import time as clock
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, wait
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from flybystab import __version__
 from flybystab.aggregate.body import Material
 from flybystab.constants import AU
-from flybystab.errors import FlybystabError, InvalidInput
+from flybystab.errors import FlybystabError, InvalidInput, WorkersLost
 from flybystab.outcome import Verdict
 from flybystab.sky.ephemeris import ephemeris
 from flybystab.sky.planets import planet
@@ -378,7 +378,12 @@ class Screening:
                 finished, _ = wait(pending, return_when=FIRST_COMPLETED)
                 for future in finished:
                     part = pending.pop(future)
-                    yield from zip(part, future.result(), strict=True)
+                    try:
+                        results = future.result()
+                    except (BrokenExecutor, CancelledError) as error:
+                        lost = ", ".join(self.asteroids[i].name for i in part)
+                        raise WorkersLost(f"workers died or went away ({error}); in work: {lost}") from None
+                    yield from zip(part, results, strict=True)
         finally:
             for future in pending:
                 future.cancel()
@@ -405,6 +410,8 @@ class Screening:
         ------
         InvalidInput, MissingExtra
             The output cannot be written, or another run's journal is in the way: before anything is computed.
+        WorkersLost
+            Processes of the executor died; the rows so far are in the file and the same call goes on.
         KeyboardInterrupt
             After the rows so far have been written into a valid file; the same call goes on later.
         """

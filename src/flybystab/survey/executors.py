@@ -1,0 +1,68 @@
+"""Where a screening is computed: here, on processes of this machine, or on a dask cluster."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from concurrent.futures import Executor, ProcessPoolExecutor
+from contextlib import contextmanager
+from multiprocessing import get_context
+
+from flybystab.errors import InvalidInput, MissingExtra, WorkersLost
+
+
+def _quiet() -> None:
+    # Ctrl-C reaches every process of the terminal; the parent alone answers it.
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+
+
+@contextmanager
+def workers(jobs: int = 1, dask: str | None = None, timeout: float = 30.0) -> Iterator[Executor | None]:
+    """An executor for `screen` and `Screening.run`, closed at the end.
+
+    Parameters
+    ----------
+    jobs : int
+        Processes on this machine; 1 computes here.
+    dask : str, optional
+        Address of a dask scheduler, such as ``tcp://host:8786``, or its scheduler file; `jobs` does not
+        count then.
+    timeout : float
+        Seconds to wait for the scheduler.
+
+    Yields
+    ------
+    Executor or None
+
+    Raises
+    ------
+    InvalidInput
+        `jobs` is no positive number.
+    MissingExtra
+        dask.distributed is not installed.
+    WorkersLost
+        The scheduler does not answer.
+    """
+    if isinstance(jobs, bool) or not isinstance(jobs, int) or jobs < 1:
+        raise InvalidInput("jobs", jobs, "a whole number, 1 or more")
+    if dask is not None:
+        try:
+            from distributed import Client
+        except ImportError:
+            raise MissingExtra("distributed", "dask", "a dask cluster") from None
+        where = {"scheduler_file": dask} if dask.endswith(".json") else {"address": dask}
+        try:
+            client = Client(**where, timeout=timeout)
+        except (OSError, ValueError) as error:
+            raise WorkersLost(f"no dask scheduler at {dask}: {error}") from None
+        with client:
+            yield client.get_executor()
+    elif jobs == 1:
+        yield None
+    else:
+        # Fresh processes: a fork of a process with threads can hang.
+        pool = ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_quiet)
+        try:
+            yield pool
+        finally:
+            pool.shutdown(wait=True, cancel_futures=True)
