@@ -65,6 +65,17 @@ def test_one_sample_is_the_catalogue_body():
     assert table["numerical_error"][2] < 1e-3 * u.deg
 
 
+def test_an_orbit_into_the_planet_is_an_impact():
+    def hit(asteroid, settings):
+        e = Encounter.hyperbolic("earth", periapsis=0.5 * R_EARTH * u.m, v_inf=9 * u.km / u.s)
+        return [Passage(asteroid, "earth", day(2462000.5), e.distance.to_value(u.m), 9000.0, e)]
+
+    (row,) = screen(["Anteros"], *SPAN, samples=20, finder=hit)
+    assert row["verdict"] == "IMPACT"
+    assert row["p_impact"] + row["p_not_in_equilibrium"] == pytest.approx(1.0)
+    assert row["p_yield"] == 1.0
+
+
 def test_same_rows_for_any_executor_and_order():
     here = screen(NAMES, *SPAN, finder=three, samples=5, seed=2)
     with ThreadPoolExecutor(3) as pool:

@@ -343,7 +343,7 @@ class Screening:
         executor: Executor | None = None,
         *,
         skip: Iterable[int] = (),
-        chunk: int = 4,
+        chunk: int = 1,
         window: int | None = None,
     ) -> Iterator[tuple[int, dict[str, list[dict[str, Any]]]]]:
         """Results of the asteroids that are not in `skip`, as they are done: (position, result).
@@ -394,7 +394,7 @@ class Screening:
         *,
         samples_output: str | Path | None = None,
         executor: Executor | None = None,
-        chunk: int = 4,
+        chunk: int = 1,
         progress: Callable[[Progress], None] | None = None,
     ) -> Progress:
         """Compute what is missing and write the files.
