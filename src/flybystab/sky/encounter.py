@@ -279,7 +279,7 @@ class Encounter:
             Displacement asked for: forces whose estimated share is larger are modelled, the rest is listed.
             Sources of tide are modelled down to a tenth of the relative error that this means for the tide.
         start_distance : Quantity, optional
-            Where the encounter starts; by default 10 planet radii or, if larger, 10 times the closest distance
+            Where the encounter starts; by default 10 planet radii or, if larger, 10 times the distance
             but no more than the planet's Hill radius (and at least 1.5 times the closest distance). An orbit
             that comes from less far (a temporary capture) starts at its apoapsis.
         settle : Quantity
@@ -504,7 +504,7 @@ def _around(
         0.0625,
     ):  # a passage by the Moon on the way is narrower than the encounter
         panels, miss = tide_panels(tide, t_in - zero, end - zero, tau, width=width)
-        if miss < 1e-11:
+        if miss < 1e-10:  # below lies the rounding of barycentric coordinates
             break
     return cls(
         planet=body,

@@ -234,8 +234,8 @@ class Orbit:
 
 
 def default_forces(orbit: Orbit, *bodies: str) -> tuple[str, ...]:
-    """All point masses, Sun 1PN, J2 of the Earth and of `bodies`, and A1, A2, A3 if the orbit has them."""
-    flat = {f"{name} J2" for name in ("earth", *bodies)}
+    """All point masses, Sun 1PN, J2 of Sun, Earth and `bodies`, and A1, A2, A3 if the orbit has them."""
+    flat = {f"{name} J2" for name in ("sun", "earth", *bodies)}
     return tuple(
         name
         for name in FORCES
