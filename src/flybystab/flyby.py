@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from flybystab.aggregate.body import YIELD_SURFACES, Body
 from flybystab.constants import G
 from flybystab.core.ellipsoid import gravity_coefficients
-from flybystab.core.motion import invariants, rigid_stress_components
+from flybystab.core.motion import rigid_stress_components
 from flybystab.core.passage import Passage, passage
-from flybystab.core.rheology import required_cohesion, required_friction
+from flybystab.core.rheology import required_friction
+from flybystab.core.statics import demand, overload
 from flybystab.errors import FlybystabError, InvalidInput, NotConverged
 from flybystab.outcome import Verdict, bound_fraction, classed
 from flybystab.sky.encounter import TAIL, Encounter
@@ -230,12 +231,11 @@ def flyby(
         return _run(body, encounter, rotation, surface, tol, max_axis_ratio, keep, unyielding)
 
     surface = body.material.yield_surface
-    friction, cohesion = _free_requirements(body)
-    holds = friction <= body.material.phi * (1.0 + 1e-12)
+    holds, cohesion = _on_its_own(body)
     # A body that cannot exist on its own is not carried on: its demand at the start is the answer.
     main = run(surface, tolerance, 20_000 if history else 0, unyielding=not holds)
     yielded = any(name == "onset" for name, _, _ in main.events)
-    demand = run(surface, tolerance, unyielding=True) if yielded else main
+    needs = run(surface, tolerance, unyielding=True) if yielded else main
     verdict, letter, bound = _verdict(main, encounter, body, holds)
     verdicts = {surface: verdict}
     for other in surfaces:
@@ -243,18 +243,18 @@ def flyby(
             raise InvalidInput("surfaces", other, f"names out of {YIELD_SURFACES}")
         if other != surface:
             other_body = body.with_(material=body.material.with_(yield_surface=other))
-            other_holds = _free_requirements(other_body)[0] <= body.material.phi * (1.0 + 1e-12)
-            verdicts[other] = _verdict(run(other, tolerance), encounter, body, other_holds)[0]
+            other_run = run(other, tolerance)
+            verdicts[other] = _verdict(other_run, encounter, body, _on_its_own(other_body)[0])[0]
     measured = None
     if error:
         loose = run(surface, min(1e-3, tolerance * LOOSER), unyielding=not holds)
-        loose_demand = run(surface, min(1e-3, tolerance * LOOSER), unyielding=True) if yielded else loose
+        loose_needs = run(surface, min(1e-3, tolerance * LOOSER), unyielding=True) if yielded else loose
         loose_verdict = _verdict(loose, encounter, body, holds)
         measured = FlybyError(
             semi_axes=float(np.max(np.abs(_axes(loose.shape) / _axes(main.shape) - 1.0))),
             spin=_relative(_spin(loose.velocity_gradient), _spin(main.velocity_gradient)),
             bound_fraction=abs(loose_verdict[2] - bound),
-            required_friction_angle=np.rad2deg(_difference(demand.max_friction, loose_demand.max_friction))
+            required_friction_angle=np.rad2deg(_difference(needs.max_friction, loose_needs.max_friction))
             * u.deg,
             event_times=_event_difference(main, loose) * u.s,
             verdict_agrees=loose_verdict[0] == verdict,
@@ -264,7 +264,7 @@ def flyby(
     onset = next((t for name, t, _ in main.events if name == "onset"), None)
     arrests = [t for name, t, _ in main.events if name in ("arrest", "jam")]
     lode = next((angle for name, _, angle in main.events if name == "onset"), None)
-    margin = body.material.phi - demand.max_friction
+    margin = body.material.phi - needs.max_friction
     spin_ratio, pole_change = _spin_change(body, rotation, main)
     return FlybyResult(
         verdict=verdict,
@@ -276,8 +276,8 @@ def flyby(
         onset_time=None if onset is None else (onset - start) * u.s,
         arrest_time=(arrests[-1] - start) * u.s if arrests else None,
         end_time=(main.time - start) * u.s,
-        max_required_friction_angle=np.rad2deg(demand.max_friction) * u.deg,
-        max_required_friction_time=(demand.max_friction_time - start) * u.s,
+        max_required_friction_angle=np.rad2deg(needs.max_friction) * u.deg,
+        max_required_friction_time=(needs.max_friction_time - start) * u.s,
         margin=np.rad2deg(margin) * u.deg,
         required_cohesion=(0.0 if holds else cohesion) * u.Pa,
         lode_angle=None if lode is None else np.rad2deg(lode) * u.deg,
@@ -432,17 +432,17 @@ def _row(
 ) -> tuple[str, Array]:
     rotation = periapsis_axes(encounter).T @ _rotation(attitude)
     surface = body.material.yield_surface
-    holds = _free_requirements(body)[0] <= body.material.phi * (1.0 + 1e-12)
+    holds = _on_its_own(body)[0]
     run = _run(body, encounter, rotation, surface, tolerance, max_axis_ratio, unyielding=not holds)
-    demand = run.max_friction
+    needed = run.max_friction
     if any(name == "onset" for name, _, _ in run.events):
-        demand = _run(
+        needed = _run(
             body, encounter, rotation, surface, tolerance, max_axis_ratio, unyielding=True
         ).max_friction
     verdict, _, bound = _verdict(run, encounter, body, holds)
     ratio, turn = _spin_change(body, rotation, run)
     spin = float(np.linalg.norm(_spin(run.velocity_gradient)))
-    return str(verdict), np.array([bound, *_axes(run.shape), spin, np.rad2deg(demand), ratio, turn])
+    return str(verdict), np.array([bound, *_axes(run.shape), spin, np.rad2deg(needed), ratio, turn])
 
 
 def periapsis_axes(encounter: Encounter) -> Array:
@@ -471,18 +471,17 @@ def _rotation(attitude: Any) -> Array:
     return matrix
 
 
-def _free_requirements(body: Body) -> tuple[float, float]:
-    """Friction angle (rad) and cohesion (Pa) that the body needs on its own, far from any planet."""
+def _on_its_own(body: Body) -> tuple[bool, float]:
+    """Whether the body can exist far from any planet, and the cohesion (Pa) that it needs there."""
     s = body.axes**2
     gravity = -2.0 * np.pi * G * body.rho * np.array(gravity_coefficients(*s))
-    stress, unit = np.zeros(6), np.zeros(6)
+    stress = np.zeros(6)
     rigid_stress_components(np.zeros(6), body.omega, s, gravity, stress)
-    p, norm, det = invariants(stress * body.rho / 5.0, unit)
+    stress *= body.rho / 5.0
     m = body.material
-    return (
-        required_friction(m.surface_code, m.c_pa, norm, p, det),
-        required_cohesion(m.surface_code, m.phi, norm, p, det),
-    )
+    excess = overload(m.surface_code, m.phi, m.c_pa, stress)
+    holds = excess <= 1e-12 * float(np.abs(stress).max())
+    return holds, demand(m.surface_code, m.phi, m.c_pa, stress)[1]
 
 
 def _verdict(

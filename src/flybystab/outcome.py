@@ -78,9 +78,8 @@ def classed(bound: float) -> tuple[Verdict, str | None]:
     """Verdict and Richardson class of a body that has flowed; class edges belong to the heavier class."""
     if bound >= ALL_BOUND:
         return Verdict.RESHAPED, None
-    lost = 1.0 - bound
-    if lost < 0.1:
+    if bound > 0.9:
         return Verdict.MASS_LOSS, "M"
-    if lost < 0.5:
+    if bound > 0.5:
         return Verdict.MASS_LOSS, "B"
     return Verdict.DISRUPTED, "S"

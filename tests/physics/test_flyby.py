@@ -1,0 +1,209 @@
+"""Verdicts, bad input and the shape of the result."""
+
+import astropy.units as u
+import numpy as np
+import pytest
+from scenes import PILE, earth, material
+from scipy.spatial.transform import Rotation
+
+from flybystab.aggregate.body import Body, Material
+from flybystab.constants import G
+from flybystab.errors import InvalidInput, UnitMismatch, UnknownName
+from flybystab.flyby import flyby, flyby_many, periapsis_axes
+from flybystab.outcome import bound_fraction, classed
+
+
+def test_intact_with_margin():
+    r = flyby(PILE, earth(3.0))
+    assert r.verdict == "INTACT"
+    assert r.onset_time is None
+    assert r.arrest_time is None
+    assert r.margin == 35 * u.deg - r.max_required_friction_angle
+    assert r.margin > 0 * u.deg
+    np.testing.assert_allclose(r.body.axes, PILE.axes, rtol=1e-12)
+    assert r.history.distance.min() < 3.2 * 6378.137 * u.km
+    assert len(r.history) == len(r.history.time) == len(r.history.semi_axes)
+
+
+def test_weaker_friction_than_demanded_yields():
+    demanded = flyby(PILE, earth(3.0)).max_required_friction_angle
+    below = PILE.with_(material=Material(friction_angle=demanded - 0.01 * u.deg))
+    above = PILE.with_(material=Material(friction_angle=demanded + 0.01 * u.deg))
+    assert flyby(below, earth(3.0)).verdict == "RESHAPED"
+    assert flyby(above, earth(3.0)).verdict == "INTACT"
+
+
+def test_impact_is_a_verdict():
+    assert flyby(PILE, earth(0.9)).verdict == "IMPACT"
+    assert flyby(PILE, earth(1.005)).verdict == "IMPACT"  # 32 km above the ground
+    assert flyby(PILE, earth(1.02)).verdict != "IMPACT"
+
+
+def test_not_in_equilibrium_says_what_would_help():
+    fast = PILE.with_(spin_period=2 * u.h)
+    r = flyby(fast, earth(5.0))
+    assert r.verdict == "NOT IN EQUILIBRIUM"
+    assert r.required_cohesion > 0 * u.Pa
+    cured = fast.with_(material=material(35, cohesion=1.0001 * r.required_cohesion))
+    assert flyby(cured, earth(50.0, start=100.0)).verdict == "INTACT"
+
+
+def test_cohesive_body_in_tension_that_cannot_hold():
+    body = Body(
+        semi_axes=[60, 50, 45] * u.m,
+        density=2000 * u.kg / u.m**3,
+        spin_period=0.5 * u.h,
+        material=material(30, cohesion=10 * u.Pa),
+    )
+    assert flyby(body, earth(5.0)).verdict == "NOT IN EQUILIBRIUM"
+
+
+def test_beyond_model_instead_of_a_guess():
+    r = flyby(PILE, earth(1.5))
+    assert r.verdict == "BEYOND MODEL"
+    assert float(r.semi_axes[0] / r.semi_axes[2]) == pytest.approx(6.0, rel=1e-6)
+
+
+def test_surfaces_and_robustness():
+    surfaces = ("mohr-coulomb", "matsuoka-nakai", "drucker-prager-extension")
+    r = flyby(PILE, earth(2.0), surfaces=surfaces)
+    assert r.robust is False
+    assert r.verdict_by_surface["drucker-prager"] == "RESHAPED"
+    assert r.verdict_by_surface["mohr-coulomb"] == "BEYOND MODEL"
+    assert flyby(PILE, earth(3.0), surfaces=surfaces).robust is True
+    assert flyby(PILE, earth(3.0)).robust is None
+
+
+def test_damage_orders_as_published():
+    """Richardson et al. 1998: more damage for smaller q, smaller v_inf, prograde spin, elongation."""
+
+    # The phase of the spin is not known: means over twelve, as in that paper.
+    phases = [Rotation.from_euler("z", 30 * k, degrees=True).as_matrix() for k in range(12)]
+
+    def stretch(body, q, v):
+        table = flyby_many([body] * 12, [earth(q, v)] * 12, phases)
+        return float(np.mean(np.log(table.semi_axes[:, 0] / body.semi_axes[0])))
+
+    assert stretch(PILE, 1.9, 5) > stretch(PILE, 2.1, 5) > stretch(PILE, 2.4, 5) >= 0.0
+    assert stretch(PILE, 2.1, 2) > stretch(PILE, 2.1, 6) > stretch(PILE, 2.1, 14)
+    still = PILE.with_(spin_period=None)
+    back = PILE.with_(spin_period=-6 * u.h)
+    assert stretch(PILE, 2.0, 5) > stretch(still, 2.0, 5) > stretch(back, 2.0, 5) >= 0.0
+    fast = PILE.with_(spin_period=5 * u.h)
+    assert stretch(fast, 2.1, 5) > stretch(PILE, 2.1, 5)
+    round_pile = PILE.with_(semi_axes=[970, 962.4, 956] * u.m)
+    assert stretch(PILE, 2.1, 5) > stretch(round_pile, 2.1, 5)
+
+
+def test_attitude_is_a_rotation_from_body_to_periapsis_axes():
+    e = earth(2.2)
+    np.testing.assert_allclose(periapsis_axes(e), np.eye(3), atol=1e-12)
+    turned = Rotation.from_euler("z", 180, degrees=True)
+    # An ellipsoid turned by half a turn about a3 is the same body.
+    a, b = flyby(PILE, e, history=False), flyby(PILE, e, turned, history=False)
+    np.testing.assert_allclose(a.semi_axes.value, b.semi_axes.value, rtol=1e-6)
+    quarter = flyby(PILE, e, Rotation.from_euler("z", 90, degrees=True), history=False)
+    assert abs(quarter.semi_axes[0] / a.semi_axes[0] - 1) > 1e-3
+
+
+@pytest.mark.parametrize(
+    ("attitude", "text"),
+    [
+        (np.eye(2), "rotation matrix"),
+        (np.diag([1.0, 1.0, -1.0]), "det A = \\+1"),
+        (np.full((3, 3), np.nan), "finite"),
+        ("north", "rotation matrix"),
+    ],
+)
+def test_bad_attitudes(attitude, text):
+    with pytest.raises(InvalidInput, match=text):
+        flyby(PILE, earth(3.0), attitude)
+
+
+def test_bad_arguments():
+    with pytest.raises(InvalidInput, match=r"a flybystab\.Body"):
+        flyby("Apophis", earth(3.0))
+    with pytest.raises(InvalidInput, match=r"a flybystab\.Encounter"):
+        flyby(PILE, 3.0)
+    with pytest.raises(InvalidInput, match=r"1e-13"):
+        flyby(PILE, earth(3.0), tolerance=0.0)
+    with pytest.raises(InvalidInput, match="mohr"):
+        flyby(PILE, earth(3.0), surfaces=("mohr",))
+
+
+@pytest.mark.parametrize(
+    ("changes", "error", "text"),
+    [
+        ({"semi_axes": [1400, 850, -1] * u.m}, InvalidInput, "semi_axes"),
+        ({"semi_axes": [850, 1400, 750] * u.m}, InvalidInput, "a1 >= a2 >= a3"),
+        ({"semi_axes": [1400, 850, np.nan] * u.m}, InvalidInput, "finite"),
+        ({"semi_axes": [1400, 850] * u.m}, InvalidInput, "shape"),
+        ({"semi_axes": [1400, 850, 750] * u.s}, UnitMismatch, "converts to m"),
+        ({"density": 2000}, UnitMismatch, "Quantity"),
+        ({"density": 0 * u.kg / u.m**3}, InvalidInput, "density"),
+        ({"spin_period": 0 * u.h}, InvalidInput, "spin_period"),
+        ({"spin_period": 1 * u.h, "spin": [0, 0, 1] * u.rad / u.h}, InvalidInput, "not both"),
+        ({"material": "sand"}, InvalidInput, "a Material"),
+    ],
+)
+def test_bad_bodies(changes, error, text):
+    arguments = {"semi_axes": [1400, 850, 750] * u.m, "density": 2000 * u.kg / u.m**3}
+    with pytest.raises(error, match=text) as caught:
+        Body(**(arguments | changes))
+    assert isinstance(caught.value, ValueError)
+
+
+@pytest.mark.parametrize("angle", [-1, 90, 91, np.nan])
+def test_bad_friction(angle):
+    with pytest.raises(InvalidInput, match="friction_angle"):
+        Material(friction_angle=angle * u.deg)
+
+
+def test_unknown_surface_offers_near_ones():
+    with pytest.raises(UnknownName, match="did you mean mohr-coulomb"):
+        Material(yield_surface="mohr-colomb")
+
+
+def test_bound_fraction_of_a_sphere_in_closed_form():
+    """Homologous expansion of a sphere, v = h x: bound where h^2 r^2/2 < 2 pi G rho (R^2 - r^2/3)."""
+    rho, radius = 2000.0, 500.0
+    g = np.pi * G * rho
+    shape = radius**2 * np.eye(3)
+    for h2_over_g in (0.1, 8.0 / 3.0, 4.0, 10.0, 50.0):
+        rate = np.sqrt(h2_over_g * g)
+        reach2 = 2.0 * g / (0.5 * rate**2 + 2.0 * g / 3.0)  # in units of R^2
+        exact = min(1.0, reach2**1.5)
+        assert bound_fraction(shape, rate * np.eye(3), rho) == pytest.approx(exact, rel=1e-10)
+
+
+def test_bound_fraction_against_sampling():
+    rng = np.random.default_rng(2)
+    rho = 2000.0
+    rate = np.sqrt(np.pi * G * rho)
+    axes = np.array([900.0, 500.0, 300.0])
+    gradient = rate * (np.diag([1.5, 0.5, 0.2]) + rng.normal(0, 0.5, (3, 3)))
+    from flybystab.core.ellipsoid import gravity_coefficients, potential_coefficient
+
+    x = rng.normal(size=(200_000, 3))
+    x *= (rng.random(200_000) ** (1 / 3) / np.linalg.norm(x, axis=1))[:, None] * axes
+    a = np.array(gravity_coefficients(*axes**2))
+    depth = np.pi * G * rho * (potential_coefficient(*axes**2) - x**2 @ a)
+    share = np.mean(0.5 * np.sum((x @ gradient.T) ** 2, axis=1) < depth)
+    found = bound_fraction(np.diag(axes**2), gradient, rho)
+    assert 0.1 < found < 0.9
+    assert found == pytest.approx(share, abs=5 * np.sqrt(found * (1 - found) / 200_000))
+
+
+@pytest.mark.parametrize(
+    ("bound", "verdict", "letter"),
+    [
+        (1.0, "RESHAPED", None),
+        (0.95, "MASS LOSS", "M"),
+        (0.9, "MASS LOSS", "B"),
+        (0.51, "MASS LOSS", "B"),
+        (0.5, "DISRUPTED", "S"),
+        (0.1, "DISRUPTED", "S"),
+    ],
+)
+def test_class_edges_belong_to_the_heavier_class(bound, verdict, letter):
+    assert classed(bound) == (verdict, letter)
