@@ -1,5 +1,68 @@
-"""flybystab: do rubble-pile asteroids survive their close planetary encounters?"""
+"""flybystab: do rubble-pile asteroids survive their close planetary encounters?
+
+>>> import astropy.units as u, flybystab as fs
+>>> pile = fs.Body(semi_axes=[1400, 850, 750] * u.m, density=2 * u.g / u.cm**3, spin_period=6 * u.h)
+>>> passage = fs.Encounter.hyperbolic("earth", periapsis=2.2 * fs.R_earth, v_inf=5 * u.km / u.s)
+>>> print(fs.flyby(pile, passage).verdict)
+RESHAPED
+
+Names are loaded when they are first used, so that importing the package costs nothing.
+"""
 
 from __future__ import annotations
 
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
 __version__ = "0.1.0"
+
+_HOME = {
+    "Asteroid": "survey.asteroid",
+    "Body": "aggregate.body",
+    "Encounter": "sky.encounter",
+    "FlybyResult": "flybys",
+    "FlybystabError": "errors",
+    "Material": "aggregate.body",
+    "Orbit": "sky.orbit",
+    "R_earth": "units",
+    "Verdict": "outcome",
+    "catalogue": "survey.catalogue",
+    "equilibrium": "aggregate.equilibrium",
+    "find_encounters": "sky.finder",
+    "flyby": "flybys",
+    "flyby_many": "flybys",
+    "infer": "survey.inference",
+    "periapsis_axes": "flybys",
+    "screen": "survey.screening",
+    "spin_sample": "spin",
+}
+
+__all__ = ["__version__", *_HOME]
+
+if TYPE_CHECKING:
+    from flybystab.aggregate.body import Body, Material
+    from flybystab.aggregate.equilibrium import equilibrium
+    from flybystab.errors import FlybystabError
+    from flybystab.flybys import FlybyResult, flyby, flyby_many, periapsis_axes
+    from flybystab.outcome import Verdict
+    from flybystab.sky.encounter import Encounter
+    from flybystab.sky.finder import find_encounters
+    from flybystab.sky.orbit import Orbit
+    from flybystab.spin import spin_sample
+    from flybystab.survey.asteroid import Asteroid
+    from flybystab.survey.catalogue import catalogue
+    from flybystab.survey.inference import infer
+    from flybystab.survey.screening import screen
+    from flybystab.units import R_earth
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module 'flybystab' has no attribute {name!r}")
+    value = getattr(import_module(f"flybystab.{_HOME[name]}"), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from flybystab.aggregate.body import Body, Material
 from flybystab.errors import InvalidInput
-from flybystab.flyby import TOLERANCE, flyby_many, periapsis_axes
+from flybystab.flybys import TOLERANCE, flyby_many, periapsis_axes
 from flybystab.sky.encounter import Encounter
 
 Array = NDArray[np.float64]
@@ -86,7 +86,7 @@ def spin_sample(
     material : Material, optional
         Instead of the asteroid's own.
     tolerance : float
-        As in :func:`flybystab.flyby.flyby`.
+        As in :func:`flybystab.flybys.flyby`.
     workers : int, optional
         Threads; one a core by default. The result does not depend on it.
 

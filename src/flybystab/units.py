@@ -8,6 +8,7 @@ import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
 
+from flybystab.constants import R_EARTH
 from flybystab.errors import InvalidInput, UnitMismatch
 
 
@@ -70,3 +71,7 @@ def to_si(
         span = f"{'(' if open_low else '['}{low:g}, {high:g}{')' if open_high else ']'}"
         raise InvalidInput(name, value, f"a value in {span} {unit}".rstrip())
     return float(array) if shape == () else array
+
+
+#: Equatorial radius of the Earth as a quantity, for scripts: ``periapsis=2.2 * fs.R_earth``.
+R_earth = (R_EARTH / 1000.0) * u.km

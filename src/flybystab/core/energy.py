@@ -24,7 +24,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flybystab.core.ellipsoid import carlson_fd, index_symbols
+from flybystab.core.ellipsoid import carlson_fd
 from flybystab.core.jit import kernel
 from flybystab.core.tensors import eigensystem, multiply, unpack
 

@@ -2,7 +2,7 @@
 
 The asteroid is massless; Sun, planets and Moon move on the ephemeris. Barycentric ICRF, m, s. Formulas:
 
-- point masses, Newton; inside 0.9 radii a homogeneous sphere, so that a plunge, an impact, stays finite;
+- point masses, Newton; inside 0.9 radii a smooth core, so that a plunge (an impact) stays finite;
 - Sun 1PN: ``GM/(c^2 r^3) [(4 GM/r - v^2) r + 4 (r.v) v]``, r and v from the Sun (Schwarzschild, harmonic
   coordinates; Will 1993, Moyer 2003);
 - J2: ``-3/2 J2 GM a^2/r^5 [(1 - 5 s^2) r + 2 (r.p) p]``, ``s = r.p/r``, p the pole at J2000;
@@ -41,7 +41,7 @@ _PN, _J2, _NON = N_BODIES, N_BODIES + 1, 2 * N_BODIES + 1
 # Layout of a model, one flat array that a C callback can be handed as a pointer:
 #   [0] length  [1] Earth/Moon ratio  [2..5] switches: 1PN, any J2, non-gravitational, unused
 #   [6..8] A1 A2 A3 (m/s2)  [9..13] law: ALN, r0 (m), m, n, k  [14] address, [15] rows and [16] count of a log
-#   [20] head (10 x 5)  [70] gm (10)  [80] radius of the inner sphere (10)  [90] J2: c, pole (10 x 4)
+#   [20] head (10 x 5)  [70] gm (10)  [80] radius of the core (10)  [90] J2: c, pole (10 x 4)
 #   [130] GM in use (10; zero: left out)  [140...] coefficients
 LOG_ADDRESS, LOG_ROWS, LOG_COUNT = 14, 15, 16
 _HEAD, _GM, _INNER, _FLAT, _USED, _DATA = 20, 70, 80, 90, 130, 140
@@ -179,6 +179,30 @@ def push(law: Array, r: Array, v: Array, out: Array) -> None:
 
 
 @kernel
+def core(s: float) -> float:
+    """``s^(-3/2)`` continued into ``s < 1`` by its first nine Taylor terms at 1: finite, eight derivatives smooth.
+
+    A jump in any low derivative would stop a high-order integrator with adaptive steps.
+    """
+    x = 1.0 - s
+    out = 1.0
+    term = 1.0
+    for n in range(1, 9):
+        term *= x * (0.5 + n) / n
+        out += term
+    return out
+
+
+@kernel
+def fade(s: float) -> float:
+    """Smooth switch, four derivatives continuous: 0 for ``s <= 1/2``, 1 for ``s >= 1``."""
+    if s >= 1.0:
+        return 1.0
+    x = max(2.0 * s - 1.0, 0.0)
+    return x**5 * (126.0 + x * (-420.0 + x * (540.0 + x * (-315.0 + 70.0 * x))))
+
+
+@kernel
 def acceleration_among(model: Array, places: Array, sun_rate: Array, x: Array, v: Array, out: Array) -> None:
     """Write into ``out[3]`` the acceleration (m/s2) at ``x`` (m), ``v`` (m/s); bodies at ``places`` (m)."""
     ax = ay = az = 0.0
@@ -191,7 +215,7 @@ def acceleration_among(model: Array, places: Array, sun_rate: Array, x: Array, v
         dz = places[i, 2] - x[2]
         r2 = dx * dx + dy * dy + dz * dz
         inner = model[_INNER + i]
-        c = gm / (r2 * np.sqrt(r2)) if r2 > inner * inner else gm / (inner * inner * inner)
+        c = gm / (r2 * np.sqrt(r2)) if r2 > inner * inner else gm * core(r2 / (inner * inner)) / inner**3
         ax += c * dx
         ay += c * dy
         az += c * dz
@@ -207,8 +231,7 @@ def acceleration_among(model: Array, places: Array, sun_rate: Array, x: Array, v
                 for j in range(3):
                     d[j] = x[j] - places[i, j]
                     r2 += d[j] * d[j]
-                if r2 > model[_INNER + i] ** 2:
-                    oblateness(model[p], model[p + 1 : p + 4], d, out)
+                oblateness(model[p] * fade(r2 / model[_INNER + i] ** 2), model[p + 1 : p + 4], d, out)
     if model[2] != 0.0 or model[4] != 0.0:
         r = np.empty(3)
         w = np.empty(3)

@@ -126,6 +126,7 @@ class Flight:
         sim.dt = 3600.0
         settings = sim.ri_ias15 if hasattr(sim, "ri_ias15") else sim.integrator
         settings.epsilon = epsilon
+        settings.min_dt = 0.1  # far below any step that a path outside a planet needs: no run can stall
         sim.extras = self._model.ctypes.data
         sim.additional_forces = force.ctypes
         self._sim, self._log = sim, log

@@ -12,7 +12,7 @@ from scipy.stats import rankdata
 
 from flybystab.aggregate.body import Material
 from flybystab.errors import FlybystabError
-from flybystab.flyby import LOOSER, flyby_many, periapsis_axes
+from flybystab.flybys import LOOSER, flyby_many, periapsis_axes
 from flybystab.outcome import Verdict
 from flybystab.sky.encounter import Encounter
 from flybystab.sky.planets import PLANETS, planet

@@ -1,0 +1,5 @@
+"""``python -m flybystab``: the command line."""
+
+from flybystab.face.cli import main
+
+raise SystemExit(main())

@@ -1,0 +1,156 @@
+"""Error against time of the flyby integrators, on one case with flow (reference flyby P1).
+
+The truth is the default integrator at a tolerance of 1e-12; errors are the largest relative ones of the
+semi-axes at the end. SciPy's Radau and DOP853 solve the same compiled right-hand side from the same onset to the
+same arrest: what they are spared is the location of events.
+"""
+
+from __future__ import annotations
+
+import time
+from pathlib import Path
+from typing import Any
+
+import astropy.units as u
+import numpy as np
+
+from flybystab.aggregate.body import Body
+from flybystab.core import motion
+from flybystab.core.passage import parameters, passage
+from flybystab.core.stepping import follow_steps
+from flybystab.core.tide import TidePanels, tensor
+from flybystab.sky.encounter import Encounter
+from flybystab.units import R_earth
+
+PHI = np.deg2rad(35.0)
+
+
+def _case() -> tuple[Body, Encounter]:
+    body = Body(semi_axes=[1400, 850, 750] * u.m, density=2000 * u.kg / u.m**3, spin_period=6 * u.h)
+    return body, Encounter.hyperbolic("earth", periapsis=2.2 * R_earth, v_inf=5 * u.km / u.s)
+
+
+def _best(run: Any, repeat: int) -> float:
+    """Least wall time of several runs, s: the least disturbed one."""
+    times = []
+    for _ in range(repeat):
+        start = time.perf_counter()
+        run()
+        times.append(time.perf_counter() - start)
+    return min(times)
+
+
+def flyby_bench(figure: str | Path | None = None, repeat: int = 5) -> list[dict[str, Any]]:
+    """Rows of method, setting, relative error, wall time (s) and time over that of the default at 1e-6."""
+    body, e = _case()
+    t0 = body.dynamical_time
+    a0 = float(np.cbrt(np.prod(body.axes)))
+    tide = TidePanels(e.tide.tau / t0, e.tide.start, e.tide.width, e.tide.coefficients * t0**2)
+
+    def default(tolerance: float, keep: int = 0) -> Any:
+        return passage(
+            body.axes, body.rho, body.omega, np.eye(3), e.t_start, e.t_stop, e.tide,
+            phi=PHI, tolerance=tolerance, keep=keep,
+        )  # fmt: skip
+
+    def axes(shape: Any) -> Any:
+        return np.sqrt(np.linalg.eigvalsh(shape)[::-1])
+
+    exact = default(1e-12, keep=200_000)
+    truth = axes(exact.shape)
+    rows: list[dict[str, Any]] = []
+
+    def add(method: str, setting: str, shape: Any, wall: float) -> None:
+        error = float(np.abs(axes(shape) / truth - 1.0).max())
+        rows.append({"method": method, "setting": setting, "error_relative": error, "wall_s": wall})
+
+    for tolerance in (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10):
+        run = default(tolerance)
+        add("default", f"tol {tolerance:.0e}", run.shape, _best(lambda t=tolerance: default(t), repeat))
+
+    par = parameters(body.axes, body.rho, PHI, 0.0, 0.0, 0)
+
+    def stepping(n: int) -> Any:
+        y = np.zeros(15)
+        y[:3] = (body.axes / a0) ** 2
+        y[12:15] = body.omega * t0
+        follow_steps(e.t_start / t0, e.t_stop / t0, n, y, par.copy(), tide, False, np.zeros(4))
+        return tensor(y[:6]) * a0**2
+
+    for n in (2000, 8000, 32000):
+        coarse, fine = stepping(n), stepping(2 * n)
+        wall = _best(lambda n=n: (stepping(n), stepping(2 * n)), 2)
+        add("stepping", f"{n} and {2 * n} steps", 2.0 * fine - coarse, wall)
+
+    # SciPy: from just after onset, where the flow is started as the default starts it, to just before arrest.
+    history = exact.history
+    flowing = np.flatnonzero(history["regime"] == motion.FLOWING)
+    first, last = flowing[0], flowing[-1]
+    start, stop = history["time"][first] / t0, history["time"][last] / t0
+    work = motion.Buffers(np.zeros((motion.N_WORK, 3, 3)), np.zeros((3, 6)))
+
+    def state(i: int) -> Any:
+        gradient = history["velocity_gradient"][i] * t0
+        d, w = 0.5 * (gradient + gradient.T), 0.5 * (gradient - gradient.T)
+        shape = history["shape"][i] / a0**2
+        pick = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
+        return np.array([shape[p] for p in pick] + [d[p] for p in pick] + [w[2, 1], w[0, 2], w[1, 0]])
+
+    def derivative(t: float, y: Any) -> Any:
+        dy = np.zeros(15)
+        motion.rate(motion.FLOWING, t, y, dy, par, tide, work)
+        return dy
+
+    from scipy.integrate import solve_ivp
+
+    target = axes(history["shape"][last])
+    for method, tolerances in (("Radau", (1e-4, 1e-6, 1e-8)), ("DOP853", (1e-4, 1e-6, 1e-8))):
+        for tolerance in tolerances:
+            begin = time.perf_counter()
+            # |D| starts at 1e-10: its own tolerance must be below it
+            solution = solve_ivp(
+                derivative, (start, stop), state(first), method=method, rtol=tolerance, atol=tolerance * 1e-4
+            )
+            wall = time.perf_counter() - begin
+            error = float(np.abs(axes(tensor(solution.y[:6, -1])) * a0 / target - 1.0).max())
+            rows.append(
+                {
+                    "method": f"SciPy {method}",
+                    "setting": f"rtol {tolerance:.0e}",
+                    "error_relative": error,
+                    "wall_s": wall,
+                }
+            )
+    reached = [r["wall_s"] for r in rows if r["method"] == "default" and r["error_relative"] <= 1e-6]
+    for row in rows:
+        row["wall_over_default_at_1e-6"] = row["wall_s"] / min(reached)
+    if figure is not None:
+        _plot(rows, figure)
+    return rows
+
+
+def lines(rows: list[dict[str, Any]]) -> list[str]:
+    """The table as text."""
+    head = (
+        f"{'method':14s} {'setting':24s} {'rel. error':>10s} {'wall (ms)':>10s} {'over default at 1e-6':>21s}"
+    )
+    return [head] + [
+        f"{r['method']:14s} {r['setting']:24s} {r['error_relative']:10.1e} {1e3 * r['wall_s']:10.2f} "
+        f"{r['wall_over_default_at_1e-6']:21.1f}"
+        for r in rows
+    ]
+
+
+def _plot(rows: list[dict[str, Any]], path: str | Path) -> None:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.0, 4.2), layout="constrained")
+    FigureCanvasAgg(figure)
+    panel: Any = figure.subplots()
+    for method, marker in zip(dict.fromkeys(r["method"] for r in rows), "os^Dv", strict=False):
+        points = [(r["wall_s"] * 1e3, r["error_relative"]) for r in rows if r["method"] == method]
+        panel.loglog(*zip(*points, strict=True), marker=marker, label=method)
+    panel.set(xlabel="wall time (ms)", ylabel="relative error of the semi-axes", title="Flyby P1, with flow")
+    panel.legend(frameon=False)
+    figure.savefig(path, dpi=150)
