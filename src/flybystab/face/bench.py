@@ -27,7 +27,10 @@ PHI = np.deg2rad(35.0)
 
 def _case() -> tuple[Body, Encounter]:
     body = Body(semi_axes=[1400, 850, 750] * u.m, density=2000 * u.kg / u.m**3, spin_period=6 * u.h)
-    return body, Encounter.hyperbolic("earth", periapsis=2.2 * R_earth, v_inf=5 * u.km / u.s)
+    encounter = Encounter.hyperbolic(
+        "earth", periapsis=2.2 * R_earth, v_inf=5 * u.km / u.s, start_distance=10 * R_earth
+    )
+    return body, encounter
 
 
 def _best(run: Any, repeat: int) -> float:

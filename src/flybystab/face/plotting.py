@@ -51,7 +51,7 @@ def friction_plot(axes: Any, history: History, limit: u.Quantity) -> Any:
     axes.axhline(limit.to_value(u.deg), color=BLACK, ls="--", label="material")
     axes.set_ylim(0.0, 1.15 * limit.to_value(u.deg))
     axes.set_ylabel("friction angle (deg)")
-    axes.legend(frameon=False, fontsize=8, loc="upper left")
+    axes.legend(frameon=False, fontsize=8, loc="center right")
     _shade(axes, history)
     return axes
 
