@@ -180,7 +180,7 @@ def push(law: Array, r: Array, v: Array, out: Array) -> None:
 
 @kernel
 def core(s: float) -> float:
-    """``s^(-3/2)`` continued into ``s < 1`` by its first nine Taylor terms at 1: finite, eight derivatives smooth.
+    """``s^(-3/2)`` continued into ``s < 1`` by its first nine Taylor terms at 1: finite and smooth.
 
     A jump in any low derivative would stop a high-order integrator with adaptive steps.
     """
