@@ -136,7 +136,7 @@ def flyby_command(options: argparse.Namespace) -> None:
         attitude = periapsis_axes(encounter) @ asteroid.attitude(0 * u.deg)
     result = flyby(asteroid.body, encounter, attitude, surfaces=OTHER_SURFACES)
     sample = spin_sample(asteroid, encounter, n=options.attitudes, seed=options.seed)
-    title = f"{asteroid.label}, {encounter.time.tdb.iso[:10]}"
+    title = f"{asteroid.label}, {date.tdb.iso[:10]}"
     if options.output:
         from flybystab.face.plotting import flyby_figure
 
@@ -149,8 +149,9 @@ def flyby_command(options: argparse.Namespace) -> None:
             asteroid=asteroid.label,
             orbit_solution=asteroid.record.get("orbit_solution"),
             assumed=asteroid.assumptions,
-            distance_error_km=getattr(encounter, "distance_error", None)
-            and encounter.distance_error.to_value("km"),
+            distance_error_km=None
+            if encounter.distance_error is None
+            else encounter.distance_error.to_value("km"),
             figure=options.output,
         ),
         lambda: [
@@ -291,8 +292,8 @@ def screen_command(options: argparse.Namespace) -> None:
             seed=options.seed,
         ),
     )
-    with workers(options.jobs, options.dask) as executor, ProgressBar() as bar:
-        screening.run(output, executor=executor, progress=bar)
+    with workers(options.jobs, options.dask) as executor:
+        screening.run(output, executor=executor, progress=ProgressBar())
     _print(
         options,
         lambda: table_document(read_results(output)),

@@ -1,0 +1,212 @@
+"""The command line: readable text, one JSON document, honest exit statuses, errors that teach."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from flybystab.face.cli import COMMANDS, main
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
+
+
+def run(capsys, *arguments):
+    status = main([str(a) for a in arguments])
+    captured = capsys.readouterr()
+    return status, captured.out, captured.err
+
+
+def test_apophis_survives(capsys, tmp_path):
+    picture = tmp_path / "with space" / "apophis.png"
+    picture.parent.mkdir()
+    status, out, err = run(capsys, "flyby", "Apophis", "--output", picture, "--attitudes", 64)
+    assert status == 0, err
+    assert "INTACT" in out
+    assert "2029-04-13" in out
+    assert "assumed    density" in out
+    assert picture.read_bytes()[:4] == b"\x89PNG"
+
+
+def test_apophis_as_json(capsys):
+    status, out, _ = run(capsys, "flyby", "99942", "--date", "2029-04-13", "--json")
+    assert status == 0
+    d = json.loads(out)
+    assert d["verdict"] == "INTACT"
+    assert d["robust"] is True
+    assert d["encounter"]["distance_km"] == pytest.approx(38011.5, abs=5)
+    assert d["encounter"]["time_tdb"].startswith("2029-04-13T21:46:12")
+    assert d["margin_deg"] == pytest.approx(
+        d["friction_angle_deg"] - d["max_required_friction_angle_deg"], abs=1e-9
+    )
+    # Benson et al. (2023): the spin rate may halve or double, the pole moves by 10 deg or more
+    spin = d["attitudes"]["spin_ratio"]
+    assert 0.5 < spin["q0"] < 0.7
+    assert 1.4 < spin["q100"] < 2.0
+    assert d["attitudes"]["pole_change_deg"]["q100"] > 10
+    assert d["attitudes"]["verdicts"] == {"INTACT": 64}
+    assert set(d) >= {"asteroid", "assumed", "modelled", "left_out", "error"}
+
+
+def test_scenario_of_the_reference_case(capsys, tmp_path):
+    status, out, _ = run(capsys, "scenario", EXAMPLES / "disruption_p2.toml", "--json")
+    assert status == 0
+    d = json.loads(out)
+    assert d["verdict"] == "RESHAPED"
+    assert d["semi_axes_m"] == pytest.approx([2405.551, 664.6593, 558.2060], rel=3e-7)
+    assert d["spin_rad_s"] == pytest.approx(2.735800e-4, rel=1e-6)
+    assert d["onset_time_s"] == pytest.approx(8518.24, abs=0.01)
+    assert d["robust"] is False
+    picture = tmp_path / "p2.png"
+    status, out, _ = run(capsys, "scenario", EXAMPLES / "disruption_p2.toml", "--output", picture)
+    assert status == 0
+    assert "depends on the yield surface" in out
+    assert picture.stat().st_size > 10_000
+
+
+def test_scenario_of_apophis(capsys):
+    status, out, _ = run(capsys, "scenario", EXAMPLES / "apophis_2029.toml", "--json")
+    assert status == 0
+    assert json.loads(out)["verdict"] == "INTACT"
+
+
+def test_encounters(capsys):
+    status, out, _ = run(
+        capsys, "encounters", "Apophis", "--from", "2029-01-01", "--to", "2029-12-31", "--json"
+    )
+    assert status == 0
+    rows = json.loads(out)["rows"]
+    assert len(rows) == 1
+    assert rows[0]["distance_km"] == pytest.approx(38011.5, abs=10)
+    status, out, _ = run(capsys, "encounters", "Apophis", "--from", "2029-01-01", "--to", "2029-12-31")
+    assert "1 encounters" in out
+
+
+def test_stability(capsys):
+    status, out, _ = run(capsys, "stability", "1950 DA", "--json")
+    assert status == 0
+    d = json.loads(out)
+    assert d["admissible"] is False
+    assert d["required_friction_angle_deg"] == "inf"
+    assert d["required_cohesion_Pa"] > 10
+    status, out, _ = run(capsys, "stability", "Toutatis")
+    assert "holds with 35 deg" in out
+
+
+def test_screen_and_show(capsys, tmp_path):
+    table = tmp_path / "screening.ecsv"
+    status, out, err = run(capsys, "screen", "--from", "2029-01-01", "--to", "2030-01-01", "--output", table)
+    assert status == 0, err
+    assert "INTACT" in out
+    assert table.exists()
+    status, out, _ = run(capsys, "show", table, "--json")
+    rows = json.loads(out)["rows"]
+    assert any("Apophis" in str(row["asteroid"]) or "Apophis" in str(row) for row in rows)
+
+
+def test_cite(capsys):
+    status, out, _ = run(capsys, "cite")
+    assert status == 0
+    assert "@article{Sharma2013" in out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status", "text"),
+    [
+        (["flyby", "Apofis"], 1, "did you mean Apophis"),
+        (["flyby", "Apophis", "--date", "yesterday"], 1, "a date such as"),
+        (["flyby", "Apophis", "--date", "2700-01-01"], 1, "span"),
+        (["flyby", "Apophis", "--friction", "95"], 1, "friction_angle"),
+        (["flyby", "Apophis", "--surface", "mohr"], 1, "did you mean mohr-coulomb"),
+        (["flyby", "Apophis", "--output", "/nowhere/x.png"], 1, "a folder that exists"),
+        (["flyby", "Apophis", "--output", "x.doc"], 1, "ends in .png"),
+        (["flyby", "Apophis", "--planet", "vulcan"], 1, "unknown"),
+        (["flyby"], 2, "name"),
+        (["flibby", "Apophis"], 2, "did you mean flyby"),
+        (["flyby", "Apophis", "--colour", "red"], 2, "unrecognized"),
+        (["scenario", "no-such-file.toml"], 1, "a readable file"),
+        (["show", "no-such-file.ecsv"], 1, "no-such-file"),
+    ],
+)
+def test_bad_usage(capsys, arguments, status, text):
+    got, out, err = run(capsys, *arguments)
+    assert got == status
+    assert out == ""
+    assert text in err
+    assert "Traceback" not in err
+
+
+GOOD = """
+[body]
+semi_axes = "1400, 850, 750 m"
+density = "2000 kg/m3"
+spin_period = "6 h"
+[encounter]
+periapsis = "3 R_earth"
+v_inf = "5 km/s"
+"""
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "text"),
+    [
+        ("", "", None),
+        ("spin_period", "spinperiod", "did you mean spin_period"),
+        ("[body]", "[bodi]", "did you mean body"),
+        ('"6 h"', "6", "text with a unit"),
+        ('"6 h"', '"6 kg"', "converts to s"),
+        ('"6 h"', '"six h"', "numbers and a unit"),
+        ('"1400, 850, 750 m"', '"1400, 850, -750 m"', "semi_axes"),
+        ('"1400, 850, 750 m"', '"850, 1400, 750 m"', "a1 >= a2 >= a3"),
+        ('density = "2000 kg/m3"', "", "body.density"),
+        ('"3 R_earth"', '"nan R_earth"', "finite"),
+        ("[encounter]", "[encounter", "valid TOML"),
+        ('"5 km/s"', '"5 km/s"\nplanet = "plannet"', "unknown planet"),
+    ],
+)
+def test_scenario_files(capsys, tmp_path, old, new, text):
+    file = tmp_path / "scene.toml"
+    file.write_text(GOOD.replace(old, new) if old else GOOD)
+    status, out, err = run(capsys, "scenario", file)
+    if text is None:
+        assert status == 0
+        assert "INTACT" in out
+    else:
+        assert status == 1
+        assert text in err
+        assert out == ""
+
+
+def test_impact_is_reported(capsys, tmp_path):
+    file = tmp_path / "scene.toml"
+    file.write_text(GOOD.replace("3 R_earth", "0.9 R_earth"))
+    status, out, _ = run(capsys, "scenario", file, "--json")
+    assert status == 0
+    assert json.loads(out)["verdict"] == "IMPACT"
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_help_has_an_example(capsys, command):
+    status, out, _ = run(capsys, command, "--help")
+    assert status == 0
+    assert f"flybystab {command}" in out.split("example:")[1]
+
+
+def test_importing_is_quiet_and_cheap():
+    code = (
+        "import sys, flybystab; "
+        "print(sorted(m for m in ('numba', 'astropy', 'rebound', 'matplotlib') if m in sys.modules))"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.strip() == "[]"
+    assert done.stderr == ""
+
+
+def test_every_public_name_is_there():
+    import flybystab
+
+    for name in flybystab.__all__:
+        assert getattr(flybystab, name) is not None
+    with pytest.raises(AttributeError, match="no attribute 'flyy'"):
+        flybystab.flyy  # noqa: B018
