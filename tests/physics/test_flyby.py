@@ -9,7 +9,7 @@ from scipy.spatial.transform import Rotation
 from flybystab.aggregate.body import Body, Material
 from flybystab.constants import G
 from flybystab.errors import InvalidInput, UnitMismatch, UnknownName
-from flybystab.flyby import flyby, flyby_many, periapsis_axes
+from flybystab.flybys import flyby, flyby_many, periapsis_axes
 from flybystab.outcome import bound_fraction, classed
 
 

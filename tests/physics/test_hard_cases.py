@@ -21,7 +21,7 @@ from flybystab.aggregate.body import YIELD_SURFACES, Body
 from flybystab.core import motion
 from flybystab.core.workspace import ARREST, CONTACT, JAM, LOSS, ONSET
 from flybystab.errors import InvalidInput
-from flybystab.flyby import flyby, flyby_many
+from flybystab.flybys import flyby, flyby_many
 
 DENSITY = 2000 * u.kg / u.m**3
 TILT = Rotation.from_euler("zxz", [30, 40, 70], degrees=True).as_matrix()

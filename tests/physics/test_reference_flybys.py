@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scenes import PILE, axes_of, carried, earth, material, momentum, stepped
 
-from flybystab.flyby import flyby
+from flybystab.flybys import flyby
 
 # periapsis (R_E), dilatancy, end, onset, arrest (s), semi-axes (m), spin rate (rad/s)
 CASES = {

@@ -8,7 +8,7 @@ from astropy.time import Time
 from flybystab.aggregate.body import Body
 from flybystab.constants import R_EARTH, G
 from flybystab.errors import InvalidInput
-from flybystab.flyby import flyby
+from flybystab.flybys import flyby
 from flybystab.sky.encounter import Encounter
 from flybystab.survey.catalogue import Asteroid
 from flybystab.survey.inference import infer, inference_figure, survived
