@@ -14,8 +14,7 @@ for q in (1.8, 2.0, 2.2, 2.6, 3.0):
     result = fs.flyby(pile, encounter, surfaces=YIELD_SURFACES, history=False)
     verdicts[q] = result.verdict_by_surface
     stretch = result.semi_axes[0] / pile.semi_axes[0]
-    print(
-        f"q = {q} R_E  x{stretch:.3f}  robust {result.robust!s:5s}  {', '.join(f'{k} {v}' for k, v in result.verdict_by_surface.items())}"
-    )
+    by_surface = ", ".join(f"{k} {v}" for k, v in result.verdict_by_surface.items())
+    print(f"q = {q} R_E  x{stretch:.3f}  robust {result.robust!s:5s}  {by_surface}")
 robust = [q for q, v in verdicts.items() if len(set(v.values())) == 1]
 print("robust at", robust)
