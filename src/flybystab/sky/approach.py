@@ -116,28 +116,30 @@ def _measure(s: Array, level: float) -> float:
     return np.sqrt(s[0] ** 2 + s[1] ** 2 + s[2] ** 2) - level
 
 
-def periapsis_time(state_at: Callable[[float], Array], gm: float, t: float) -> tuple[float, Array]:
+def periapsis_time(state_at: Callable[[float], Array], t: float) -> tuple[float, Array]:
     """Zero of ``r.v`` near `t` on an exact trajectory, and the relative state there.
 
-    Newton with ``d(r.v)/dt = v^2 - gm/r``, the two-body value, which is close enough to converge fast.
+    Secant method: the slope of ``r.v`` is measured, since far from the planet the Sun makes as much of it.
 
     Parameters
     ----------
     state_at : callable
         Time (s) to relative state (m, m/s), shape (6,).
-    gm : float
-        Of the planet, m3/s2.
     t : float
         First guess, s.
     """
+    s = state_at(t)
+    last, step = float(s[:3] @ s[3:]), 60.0
     for _ in range(40):
-        s = state_at(t)
-        rv, v2 = float(s[:3] @ s[3:]), float(s[3:] @ s[3:])
-        slope = v2 - gm / float(np.sqrt(s[:3] @ s[:3]))
-        step = -rv / (slope if slope > 0.1 * v2 else v2)
         t += step
-        if abs(step) < 1e-7:
-            return t, state_at(t)
+        s = state_at(t)
+        rv = float(s[:3] @ s[3:])
+        slope = (rv - last) / step
+        if not slope > 0.0:
+            break
+        last, step = rv, -rv / slope
+        if abs(step) < 1e-6:
+            return t + step, state_at(t + step)
     raise NotConverged(f"closest approach near t = {t:.6g} s: the last correction was {step:.3g} s")
 
 

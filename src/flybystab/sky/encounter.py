@@ -18,6 +18,7 @@ from flybystab.core.tide import TidePanels, tide_j2, tide_panels, tide_point
 from flybystab.errors import InvalidInput, NoEncounter
 from flybystab.sky.approach import (
     PanelTrack,
+    between,
     crossings,
     nearest_minimum,
     panel_track,
@@ -29,7 +30,7 @@ from flybystab.sky.forces import FORCES, model, shares
 from flybystab.sky.kepler import states_at_times, time_at_distance
 from flybystab.sky.orbit import Orbit, _ephemeris, later, seconds
 from flybystab.sky.planets import PLANETS, Planet, planet
-from flybystab.sky.reboundry import Flight
+from flybystab.sky.reboundry import LOG_WIDTH, Flight
 from flybystab.units import to_si
 
 Array = NDArray[np.float64]
@@ -364,12 +365,13 @@ def hill_radius(body: Planet) -> float:
 
 @dataclass(frozen=True)
 class _Passage:
-    """Closest approach on one integration: time (s), relative state, log of steps, row of the step before."""
+    """Closest approach on one integration: time (s), relative state, log of steps, step of it, way from the epoch."""
 
     t: float
     state: Array
     log: Array
     step: int
+    way: Array
     forces: tuple[str, ...]
 
     @property
@@ -383,19 +385,37 @@ def _passage(
     """The minimum of distance nearest to the epoch of the window, or None."""
     flight = orbit.flight(window, forces, epsilon)
     before = flight.t
-    if before != -reach:
-        way = flight.log_to(-reach)
+    way = flight.log_to(-reach) if before != -reach else np.empty((0, LOG_WIDTH))
     log = flight.log_to(reach)
     hit = nearest_minimum(log, window, index, 0.0)
     if hit is None:
         return None
     t, _, step = hit
     again = Flight(model(window, forces, orbit.nongrav), log[step, 0], log[step, 1:7], epsilon)
-    t, state = periapsis_time(_relative_to(again, window, index), float(window.gm[index]), t)
+    t, state = periapsis_time(_relative_to(again, window, index), t)
     if before < -reach:
         log = np.concatenate([way[:-1], log])
         step += len(way) - 1
-    return _Passage(t, state, log, step, forces)
+    if before <= -reach:
+        way = log
+    elif before < t:
+        way = log[max(int(np.searchsorted(log[:, 0], before)) - 1, 0) :]
+    else:
+        way = way[::-1]
+    return _Passage(t, state, log, step, way, forces)
+
+
+def _path(way: Array, start: float, stop: float) -> tuple[Array, Array]:
+    """Times from `start` to `stop` (s, either order) and barycentric states, along a log, dense enough to sum."""
+    low, high = min(start, stop), max(start, stop)
+    inside = way[(way[:, 0] > low) & (way[:, 0] < high), 0]
+    t = np.unique(np.concatenate([np.linspace(low, high, 129), inside]))
+    t = t[(t >= way[0, 0]) & (t <= way[-1, 0])]
+    states = np.empty((t.size, 6))
+    for n, time in enumerate(t):
+        k = min(max(int(np.searchsorted(way[:, 0], time, side="right")) - 1, 0), len(way) - 2)
+        between(way, k, float(time), states[n])
+    return (t, states) if start <= stop else (t[::-1], states[::-1])
 
 
 def _relative_to(flight: Flight, window: Window, index: int, zero: float = 0.0) -> Callable[[float], Array]:
@@ -433,9 +453,7 @@ def _real(
             f"no encounter with {body.name} within {largest / AU:.4f} au and {reach / DAY:g} d of "
             f"{near.iso} TDB: {closest}"
         )
-    rows = (first.log[:, 0] - epoch) * np.sign(first.t - epoch) >= 0.0
-    rows &= (first.log[:, 0] - first.t) * np.sign(first.t - epoch) <= 0.0
-    size = shares(window, first.log[rows, 0], first.log[rows, 1:7], orbit.nongrav)
+    size = shares(window, *_path(first.way, epoch, first.t), orbit.nongrav)
     if forces is None:
         forces = tuple(n for n in everything if size[n] >= accuracy)
     chosen = _passage(orbit, window, index, forces, reach, 1e-9)

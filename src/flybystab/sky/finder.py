@@ -108,19 +108,21 @@ def _refine(
     data = model[140:]
     for _ in range(12):
         _step(model, law, t0, y0, t - t0, k, y, places, rate)
-        place = body_states(head, data, gm, body, np.array([t]))
+        # Places, and the planet's acceleration by a central difference over two minutes: a slow passage is
+        # steered by the Sun as much as by the planet.
+        place = body_states(head, data, gm, body, np.array([t, t - 60.0, t + 60.0]))
         rv = 0.0
+        slope = 0.0
         v2 = 0.0
-        r2 = 0.0
         for j in range(3):
             out[j] = y[j] - place[0, j]
             out[3 + j] = y[3 + j] - place[0, 3 + j]
             rv += out[j] * out[3 + j]
             v2 += out[3 + j] ** 2
-            r2 += out[j] ** 2
-        slope = v2 - gm[body] / np.sqrt(r2)
-        if slope < 0.1 * v2:
-            slope = v2
+            slope += out[j] * (k[12, 3 + j] - (place[2, 3 + j] - place[1, 3 + j]) / 120.0)
+        slope += v2
+        if not slope > 1e-3 * v2:
+            return t
         dt = -rv / slope
         if abs(dt) < 1e-5:
             # What is left is linear: shift along the relative velocity.
