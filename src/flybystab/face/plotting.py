@@ -12,6 +12,7 @@ from typing import Any
 import astropy.units as u
 import numpy as np
 
+from flybystab.errors import InvalidInput
 from flybystab.flybys import FlybyResult, History
 from flybystab.sky.encounter import Encounter
 
@@ -85,7 +86,7 @@ def flyby_figure(result: FlybyResult, title: str, path: str | Path) -> Path:
 
     history = result.history
     if history is None:
-        raise ValueError("this result has no history: call flyby(..., history=True)")
+        raise InvalidInput("result", "without history", "the result of flyby(..., history=True)")
     figure = Figure(figsize=(7.2, 8.4), layout="constrained")
     FigureCanvasAgg(figure)
     panels: Any = figure.subplots(4, 1, sharex=True)
