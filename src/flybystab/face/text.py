@@ -92,7 +92,12 @@ def sample_lines(s: SpinSample) -> list[str]:
 
 def model_lines(r: FlybyResult, assumed: tuple[str, ...] = ()) -> list[str]:
     """What was modelled, left out and assumed."""
-    out = ["modelled   " + "; ".join(r.modelled)]
+    groups: dict[str, list[str]] = {}
+    for entry in r.modelled:
+        head, _, rest = entry.partition(": ")
+        groups.setdefault(head if rest else "body", []).append(rest or entry)
+    rows = [f"{head}: {', '.join(entries).replace(' point mass', '')}" for head, entries in groups.items()]
+    out = [("modelled   " if i == 0 else "           ") + row for i, row in enumerate(rows)]
     if r.left_out:
         largest = sorted(r.left_out, key=lambda x: -x[1])[:4]
         out.append("left out   " + "; ".join(f"{name} ({share:.0e})" for name, share in largest))
