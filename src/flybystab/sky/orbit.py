@@ -81,7 +81,7 @@ class Orbit:
     name : str
         Free text, shown in tables.
     covariance : object or None
-        Uncertainty of the elements, see :mod:`flybystab.sky.uncertainty`.
+        Uncertainty of the elements, carried along; nothing here samples it yet.
     """
 
     epoch: Time
