@@ -40,6 +40,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         options = parser.parse_args(arguments)
     except SystemExit as stop:  # argparse has printed help or the reason
         return int(stop.code or 0)
+    options.words = arguments
     if options.command is None:
         parser.print_help()
         return 2
@@ -92,29 +93,27 @@ def _asteroid(options: argparse.Namespace) -> Any:
     return Asteroid.from_catalogue(options.name, material=material)
 
 
-def _picture(path: str | None) -> None:
-    """Find out that a picture cannot be written before computing it."""
+def _picture(path: str | None, endings: tuple[str, ...] = (".png", ".pdf", ".svg")) -> None:
+    """Find out that a picture (or page) cannot be written before computing it."""
     if path is None:
         return
     from pathlib import Path
 
     target = Path(path)
-    if target.suffix.lower() not in (".png", ".pdf", ".svg"):
-        raise InvalidInput("--output", path, "a file that ends in .png, .pdf or .svg")
+    if target.suffix.lower() not in endings:
+        raise InvalidInput("--output", path, f"a file that ends in {' or '.join(endings)}")
     if not target.parent.is_dir() or not os.access(target.parent, os.W_OK):
         raise InvalidInput("--output", path, "a folder that exists and can be written")
 
 
-def flyby_command(options: argparse.Namespace) -> None:
-    """``flybystab flyby NAME``."""
+def _flown(options: argparse.Namespace) -> tuple[Any, Any, Any]:
+    """Asteroid, result and sample of attitudes of its encounter at the date, or of its closest one."""
     from flybystab.errors import NoEncounter
-    from flybystab.face import document, text
     from flybystab.flybys import flyby, periapsis_axes
     from flybystab.sky.encounter import Encounter
     from flybystab.sky.finder import find_encounters
     from flybystab.spin import spin_sample
 
-    _picture(options.output)
     asteroid = _asteroid(options)
     if options.date is None:
         table = find_encounters(
@@ -136,11 +135,20 @@ def flyby_command(options: argparse.Namespace) -> None:
         attitude = periapsis_axes(encounter) @ asteroid.attitude(0 * u.deg)
     result = flyby(asteroid.body, encounter, attitude, surfaces=OTHER_SURFACES)
     sample = spin_sample(asteroid, encounter, n=options.attitudes, seed=options.seed)
-    title = f"{asteroid.label}, {date.tdb.iso[:10]}"
+    return asteroid, result, sample
+
+
+def flyby_command(options: argparse.Namespace) -> None:
+    """``flybystab flyby NAME``."""
+    from flybystab.face import document, text
+
+    _picture(options.output)
+    asteroid, result, sample = _flown(options)
+    encounter = result.encounter
     if options.output:
         from flybystab.face.plotting import flyby_figure
 
-        flyby_figure(result, title, options.output)
+        flyby_figure(result, f"{asteroid.label}, {encounter.time.tdb.iso[:10]}", options.output)
     _print(
         options,
         lambda: document.flyby_document(
@@ -149,7 +157,7 @@ def flyby_command(options: argparse.Namespace) -> None:
             asteroid=asteroid.label,
             orbit_solution=asteroid.record.get("orbit_solution"),
             assumed=asteroid.assumptions,
-            distance_error_km=None
+            distance_error_numerical_km=None
             if encounter.distance_error is None
             else encounter.distance_error.to_value("km"),
             figure=options.output,
@@ -162,6 +170,42 @@ def flyby_command(options: argparse.Namespace) -> None:
             *text.model_lines(result, asteroid.assumptions),
             *([f"figure     {options.output}"] if options.output else []),
         ],
+    )
+
+
+def report_command(options: argparse.Namespace) -> None:
+    """``flybystab report NAME``."""
+    import shlex
+
+    import astropy.units as u
+
+    from flybystab.face import document
+    from flybystab.face.report import report
+    from flybystab.survey.screening import screen
+
+    _picture(options.output, (".html",))
+    asteroid, result, sample = _flown(options)
+    e = result.encounter
+    screened = None
+    if options.samples > 1:
+        day = 1.0 * u.d
+        table = screen(
+            [asteroid],
+            e.time - day,
+            e.time + day,
+            planets=[options.planet],
+            within=1.01 * e.distance,
+            samples=options.samples,
+            seed=options.seed,
+            material=asteroid.material,
+        )
+        screened = table[0] if len(table) == 1 and not table["error"][0] else None
+    command = "flybystab " + shlex.join(options.words)
+    path = report(asteroid, result, sample, options.output, screened=screened, command=command)
+    _print(
+        options,
+        lambda: document.flyby_document(result, sample, asteroid=asteroid.label, report=str(path)),
+        lambda: [f"{asteroid.label}: {result.verdict}", f"report     {path}"],
     )
 
 
@@ -358,6 +402,7 @@ def cite_command(options: argparse.Namespace) -> None:
 
 COMMANDS: dict[str, Callable[[argparse.Namespace], None]] = {
     "flyby": flyby_command,
+    "report": report_command,
     "scenario": scenario_command,
     "encounters": encounters_command,
     "stability": stability_command,
@@ -408,16 +453,30 @@ def _parser() -> argparse.ArgumentParser:
             "--within", type=float, default=0.05, metavar="AU", help="largest distance (0.05 au)"
         )
 
+    def passage(sub: argparse.ArgumentParser) -> None:
+        sub.add_argument("name", help="number, name or designation in the embedded catalogue")
+        sub.add_argument(
+            "--date", help=f"near the encounter, TDB; the closest one of {SPAN[0]} to {SPAN[1]} if left out"
+        )
+        sub.add_argument("--planet", default="earth", help="planet encountered (earth)")
+        material(sub)
+        sub.add_argument("--attitudes", type=int, default=64, metavar="N", help="attitudes to sample (64)")
+        sub.add_argument("--seed", type=int, default=0, help="seed of the samples (0)")
+
     sub = add("flyby", "one asteroid through one encounter", "flybystab flyby Apophis --output apophis.png")
-    sub.add_argument("name", help="number, name or designation in the embedded catalogue")
-    sub.add_argument(
-        "--date", help=f"near the encounter, TDB; the closest one of {SPAN[0]} to {SPAN[1]} if left out"
-    )
-    sub.add_argument("--planet", default="earth", help="planet encountered (earth)")
-    material(sub)
-    sub.add_argument("--attitudes", type=int, default=64, metavar="N", help="attitudes to sample (64)")
-    sub.add_argument("--seed", type=int, default=0, help="seed of the sample (0)")
+    passage(sub)
     sub.add_argument("--output", metavar="FILE", help="write a figure (.png, .pdf, .svg)")
+
+    sub = add(
+        "report",
+        "the same as one web page, figures and all",
+        "flybystab report Apophis --output apophis.html",
+    )
+    passage(sub)
+    sub.add_argument(
+        "--samples", type=int, default=200, metavar="N", help="draws of the uncertain inputs (200; 1: none)"
+    )
+    sub.add_argument("--output", default="report.html", metavar="FILE", help="the page (report.html)")
 
     sub = add(
         "scenario", "a scripted encounter from a TOML file", "flybystab scenario examples/disruption_p2.toml"

@@ -6,6 +6,7 @@ figures work in greyscale.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -79,22 +80,28 @@ def axes_plot(axes: Any, history: History) -> Any:
     return axes
 
 
-def flyby_figure(result: FlybyResult, title: str, path: str | Path) -> Path:
-    """Write the four panels of a flyby as a picture; returns its path."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
+def flyby_panels(panels: Sequence[Any], result: FlybyResult) -> Sequence[Any]:
+    """Distance, mobilised friction, spin and semi-axes into four axes that share their time."""
     history = result.history
     if history is None:
         raise InvalidInput("result", "without history", "the result of flyby(..., history=True)")
-    figure = Figure(figsize=(7.2, 8.4), layout="constrained")
-    FigureCanvasAgg(figure)
-    panels: Any = figure.subplots(4, 1, sharex=True)
     distance_plot(panels[0], history, result.encounter)
     friction_plot(panels[1], history, result.body.material.friction_angle)
     spin_plot(panels[2], history)
     axes_plot(panels[3], history)
     panels[3].set_xlabel("time from closest approach (h)")
+    return panels
+
+
+def flyby_figure(result: FlybyResult, title: str, path: str | Path) -> Path:
+    """Write the four panels of a flyby as a picture; returns its path."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.2, 8.4), layout="constrained")
+    FigureCanvasAgg(figure)
+    panels: Any = figure.subplots(4, 1, sharex=True)
+    flyby_panels(panels, result)
     panels[0].set_title(title)
     figure.savefig(path, dpi=150)
     return Path(path)

@@ -69,7 +69,9 @@ def scene_plot(
     longest = float(history.semi_axes[rows, 0].max().to_value(u.m)) / 1e6
     if magnification is None:
         gaps = np.linalg.norm(np.diff(places, axis=0), axis=1) if len(places) > 1 else np.array([q / 1e6])
-        magnification = float(f"{0.45 * gaps.min() / longest:.1g}")
+        # neither touching its neighbour nor larger than the planet
+        size = min(0.45 * gaps.min(), encounter.planet.radius / 1e6)
+        magnification = float(f"{size / longest:.1g}")
     planet = surface(np.eye(3) * (encounter.planet.radius / 1e6) ** 2)
     axes.plot_surface(*planet, color=BLUE, **_SOLID)
     axes.plot(*path.T, color=BLACK, lw=0.8)
@@ -77,17 +79,17 @@ def scene_plot(
         shape = turn @ history.shape[row].to_value(u.m**2) @ turn.T * (magnification / 1e6) ** 2
         body = surface(shape) + place[:, None, None]
         axes.plot_surface(*body, color=REGIMES[str(history.regime[row])], **_SOLID)
-    axes.set_xlabel("x (1000 km)", labelpad=6)
-    axes.set_ylabel("y (1000 km)", labelpad=14)
+    axes.set_xlabel("x (1000 km)", labelpad=2)
+    axes.set_ylabel("y (1000 km)", labelpad=16)
     axes.set_zticks([])
     axes.set_title(
         f"{encounter.planet.name} to scale, body {magnification:,.0f} times larger; grey rigid, orange flowing",
         fontsize=9,
     )
     limits = np.array([getattr(axes, f"get_{n}lim")() for n in "xyz"])
-    axes.set_box_aspect(np.ptp(limits, axis=1), zoom=1.15)
+    axes.set_box_aspect(np.ptp(limits, axis=1), zoom=1.05)
     axes.locator_params(axis="x", nbins=4)
-    axes.view_init(elev=60, azim=-50)
+    axes.view_init(elev=60, azim=-30)
     return axes
 
 
