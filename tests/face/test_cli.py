@@ -162,6 +162,20 @@ v_inf = "5 km/s"
         ('density = "2000 kg/m3"', "", "body.density"),
         ('"3 R_earth"', '"nan R_earth"', "finite"),
         ("[encounter]", "[encounter", "valid TOML"),
+        ("[encounter]", '[material]\nbrittle = "no"\n[encounter]', "true or false, without quotes"),
+        ("[encounter]", "[material]\ndilatancy = 2\n[encounter]", "dilatancy"),
+        ("[encounter]", '[material]\nfriction_angle = "90 deg"\n[encounter]', "friction_angle"),
+        ("[encounter]", '[material]\nyield_surface = "mohr"\n[encounter]', "did you mean mohr-coulomb"),
+        ("[encounter]", "[output]\nfigur = 1\n[encounter]", "did you mean figure"),
+        ("[encounter]", '[output]\nfigure = "x.doc"\n[encounter]', "ends in .png"),
+        ("[encounter]", '[attitude]\neuler_zxz = "1, 2 deg"\n[encounter]', "shape (3,)"),
+        ("[encounter]", '[attitude]\nturn = "1 deg"\n[encounter]', "known pole"),
+        ("[body]", "[body]\nphase = 0.5", "without body.asteroid"),
+        ('"3 R_earth"', '"3 R_erth"', "did you mean earth"),
+        ('"3 R_earth"', '"-3 R_earth"', "periapsis"),
+        ('"5 km/s"', '"5 km/s"\nephemeris = "de421"', "encounter.date"),
+        ('"5 km/s"', '"5 km/s"\ndate = 2029-04-13', "no such key beside encounter.date"),
+        ('"5 km/s"', '"5 km/s"\nj2 = "yes"', "true or false"),
         ('"5 km/s"', '"5 km/s"\nplanet = "plannet"', "unknown planet"),
     ],
 )
@@ -176,6 +190,18 @@ def test_scenario_files(capsys, tmp_path, old, new, text):
         assert status == 1
         assert text in err
         assert out == ""
+
+
+def test_radii_of_other_planets_and_a_figure(capsys, tmp_path):
+    file, picture = tmp_path / "scene.toml", tmp_path / "scene.png"
+    text = GOOD.replace("3 R_earth", "1.3 R_jupiter").replace("v_inf", 'planet = "jupiter"\nv_inf')
+    file.write_text(text + f'[output]\nfigure = "{picture}"\n')
+    status, out, err = run(capsys, "scenario", file, "--json")
+    assert status == 0, err
+    d = json.loads(out)
+    assert d["encounter"]["distance_km"] == pytest.approx(1.3 * 71492)
+    assert d["figure"] == str(picture)
+    assert picture.exists()
 
 
 def test_impact_is_reported(capsys, tmp_path):

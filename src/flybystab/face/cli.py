@@ -217,21 +217,23 @@ def scenario_command(options: argparse.Namespace) -> None:
 
     _picture(options.output)
     script = scenario(options.file)
+    figure = options.output or script.figure
+    _picture(figure)
     others = [s for s in (*OTHER_SURFACES, "drucker-prager") if s != script.body.material.yield_surface]
     result = flyby(script.body, script.encounter, script.attitude, surfaces=others)
-    if options.output:
+    if figure:
         from flybystab.face.plotting import flyby_figure
 
-        flyby_figure(result, script.title, options.output)
+        flyby_figure(result, script.title, figure)
     _print(
         options,
-        lambda: document.flyby_document(result, title=script.title, figure=options.output),
+        lambda: document.flyby_document(result, title=script.title, figure=figure),
         lambda: [
             f"scenario   {script.title}",
             *text.encounter_lines(script.encounter),
             *text.flyby_lines(result),
             *text.model_lines(result),
-            *([f"figure     {options.output}"] if options.output else []),
+            *([f"figure     {figure}"] if figure else []),
         ],
     )
 

@@ -18,12 +18,13 @@ from flybystab.aggregate.body import Body, Material
 from flybystab.errors import InvalidInput, UnknownName
 from flybystab.flybys import periapsis_axes
 from flybystab.sky.encounter import Encounter
+from flybystab.sky.planets import planet
 from flybystab.survey.asteroid import Asteroid
-from flybystab.units import R_earth
+from flybystab.units import to_si
 
 #: Allowed keys of each table.
 KEYS: dict[str, tuple[str, ...]] = {
-    "": ("title", "body", "material", "encounter", "attitude"),
+    "": ("title", "body", "material", "encounter", "attitude", "output"),
     "body": ("asteroid", "semi_axes", "density", "spin_period", "spin", "phase"),
     "material": ("friction_angle", "cohesion", "dilatancy", "yield_surface", "brittle"),
     "encounter": (
@@ -38,6 +39,7 @@ KEYS: dict[str, tuple[str, ...]] = {
         "ephemeris",
     ),
     "attitude": ("euler_zxz", "turn"),
+    "output": ("figure",),
 }
 
 
@@ -49,6 +51,7 @@ class Scenario:
     body: Body
     encounter: Encounter
     attitude: np.ndarray
+    figure: str | None = None
 
 
 def scenario(path: str | Path) -> Scenario:
@@ -71,7 +74,7 @@ def scenario(path: str | Path) -> Scenario:
     except tomllib.TOMLDecodeError as reason:
         raise InvalidInput("scenario file", path, f"valid TOML ({reason})") from None
     _check(content, "")
-    for table in ("body", "material", "encounter", "attitude"):
+    for table in (t for t in KEYS if t):
         section = content.setdefault(table, {})
         if not isinstance(section, dict):
             raise InvalidInput(table, section, f"a table: [{table}]")
@@ -80,7 +83,9 @@ def scenario(path: str | Path) -> Scenario:
     asteroid, body = _body(content["body"], material)
     encounter = _encounter(content["encounter"], asteroid)
     attitude = _attitude(content["attitude"], content["body"], asteroid, encounter)
-    return Scenario(str(content.get("title", path.stem)), body, encounter, attitude)
+    title = _typed(content, "", "title", str, path.stem)
+    figure = _typed(content["output"], "output", "figure", str, None)
+    return Scenario(title, body, encounter, attitude, figure)
 
 
 def quantity(value: Any, name: str) -> Quantity:
@@ -89,8 +94,9 @@ def quantity(value: Any, name: str) -> Quantity:
         raise InvalidInput(name, value, 'text with a unit, for example "6 h"')
     text = value.strip()
     scale: Any = 1.0
-    if text.endswith("R_earth"):
-        text, scale = text.removesuffix("R_earth"), R_earth
+    head, mark, where = text.rpartition("R_")
+    if mark:  # radii of a planet
+        text, scale = head, planet(where).radius * u.m
     try:
         if "," in text:
             *first, last = text.split(",")
@@ -118,8 +124,22 @@ def _need(section: dict[str, Any], table: str, key: str) -> Any:
     return section[key]
 
 
+def _typed(section: dict[str, Any], table: str, key: str, kind: type, default: Any) -> Any:
+    """A value that is not a quantity; TOML has its own types, and ``"no"`` is not false."""
+    if key not in section:
+        return default
+    value = section[key]
+    if kind is float and isinstance(value, int) and not isinstance(value, bool):
+        value = float(value)
+    if not isinstance(value, kind):
+        words = {bool: "true or false, without quotes", float: "a number, without quotes", str: "text"}
+        raise InvalidInput(f"{table}.{key}" if table else key, value, words[kind])
+    return value
+
+
 def _material(section: dict[str, Any]) -> Material:
-    plain = {k: v for k, v in section.items() if k in ("dilatancy", "yield_surface", "brittle")}
+    kinds = {"dilatancy": float, "yield_surface": str, "brittle": bool}
+    plain = {k: _typed(section, "material", k, kinds[k], None) for k in section if k in kinds}
     units = {
         k: quantity(v, f"material.{k}") for k, v in section.items() if k in ("friction_angle", "cohesion")
     }
@@ -132,7 +152,9 @@ def _body(section: dict[str, Any], material: Material) -> tuple[Asteroid | None,
         if extra:
             raise InvalidInput(f"body.{extra[0]}", section[extra[0]], "no such key beside body.asteroid")
         asteroid = Asteroid.from_catalogue(section["asteroid"])
-        return asteroid, asteroid.body_with(material, phase=float(section.get("phase", 0.0)))
+        return asteroid, asteroid.body_with(material, phase=_phase(section))
+    if "phase" in section:
+        raise InvalidInput("body.phase", section["phase"], "no phase without body.asteroid")
     spin = {k: quantity(section[k], f"body.{k}") for k in ("spin_period", "spin") if k in section}
     return None, Body(
         semi_axes=quantity(_need(section, "body", "semi_axes"), "body.semi_axes"),
@@ -142,9 +164,27 @@ def _body(section: dict[str, Any], material: Material) -> tuple[Asteroid | None,
     )
 
 
+def _phase(section: dict[str, Any]) -> float:
+    phase = _typed(section, "body", "phase", float, 0.0)
+    if not np.isfinite(phase):
+        raise InvalidInput("body.phase", phase, "a finite number")
+    return float(phase)
+
+
+#: Keys of [encounter] that belong to one of its two kinds only.
+_SCRIPTED = ("periapsis", "v_inf", "j2")
+_REAL = ("asteroid", "date", "ephemeris")
+
+
 def _encounter(section: dict[str, Any], asteroid: Asteroid | None) -> Encounter:
-    planet = section.get("planet", "earth")
+    where = _typed(section, "encounter", "planet", str, "earth")
+    options = {
+        k: quantity(section[k], f"encounter.{k}") for k in ("start_distance", "settle") if k in section
+    }
     if "date" in section:
+        for key in _SCRIPTED:
+            if key in section:
+                raise InvalidInput(f"encounter.{key}", section[key], "no such key beside encounter.date")
         orbiting = Asteroid.from_catalogue(section["asteroid"]) if "asteroid" in section else asteroid
         if orbiting is None:
             raise InvalidInput("encounter.date", section["date"], "an asteroid whose orbit leads there")
@@ -152,15 +192,16 @@ def _encounter(section: dict[str, Any], asteroid: Asteroid | None) -> Encounter:
             time = Time(str(section["date"]), scale="tdb")
         except ValueError:
             raise InvalidInput("encounter.date", section["date"], "a date such as 2029-04-13") from None
-        return Encounter.from_orbit(orbiting.orbit, planet, time, ephemeris=section.get("ephemeris"))
-    options = {
-        k: quantity(section[k], f"encounter.{k}") for k in ("start_distance", "settle") if k in section
-    }
+        ephemeris = _typed(section, "encounter", "ephemeris", str, None)
+        return Encounter.from_orbit(orbiting.orbit, where, time, ephemeris=ephemeris, **options)
+    for key in _REAL:
+        if key in section:
+            raise InvalidInput(f"encounter.{key}", section[key], "encounter.date beside it")
     return Encounter.hyperbolic(
-        planet,
+        where,
         periapsis=quantity(_need(section, "encounter", "periapsis"), "encounter.periapsis"),
         v_inf=quantity(_need(section, "encounter", "v_inf"), "encounter.v_inf"),
-        j2=bool(section.get("j2", False)),
+        j2=_typed(section, "encounter", "j2", bool, False),
         **options,
     )
 
@@ -169,13 +210,14 @@ def _attitude(
     section: dict[str, Any], body: dict[str, Any], asteroid: Asteroid | None, encounter: Encounter
 ) -> np.ndarray:
     if "euler_zxz" in section:
-        angles = quantity(section["euler_zxz"], "attitude.euler_zxz")
-        if angles.shape != (3,):
-            raise InvalidInput("attitude.euler_zxz", section["euler_zxz"], 'three angles, "30, 40, 70 deg"')
-        return Rotation.from_euler("ZXZ", angles.to_value(u.rad)).as_matrix()
+        if "turn" in section:
+            raise InvalidInput("attitude.turn", section["turn"], "no such key beside attitude.euler_zxz")
+        name = "attitude.euler_zxz"
+        angles = to_si(quantity(section["euler_zxz"], name), u.rad, name, shape=(3,))
+        return Rotation.from_euler("ZXZ", angles).as_matrix()
     if asteroid is not None and asteroid.pole is not None and encounter.frame == "ICRF":
-        turn = quantity(section.get("turn", "0 deg"), "attitude.turn")
-        return periapsis_axes(encounter) @ asteroid.attitude(turn, phase=float(body.get("phase", 0.0)))
+        turn = to_si(quantity(section.get("turn", "0 deg"), "attitude.turn"), u.rad, "attitude.turn")
+        return periapsis_axes(encounter) @ asteroid.attitude(turn * u.rad, phase=_phase(body))
     if "turn" in section:
         raise InvalidInput(
             "attitude.turn", section["turn"], "an asteroid with a known pole on its real orbit"
