@@ -1,0 +1,328 @@
+"""How hard a push a granular ellipsoid stands: the least energy and strain over all admissible directions.
+
+A push is a rate of strain ``D = sum_a x_a E_a + (beta/3) 1`` held for a time ``t`` (theory, section 5), with
+``E_a`` an orthonormal basis of the deviators and ``|x| = 1``: ``e t`` is then the strain. While it flows the
+stress does the work ``sigma*:D = (k - beta) p + k c`` per volume and time with the pressure of equilibrium, and
+
+    K(t) - K(0) = t P1 + t^2/2 P2 + t^3/6 P3 + ...
+    P1 = V (s:D' - k (p + c)),    P2 = -Phi'' + V beta [(k - beta)(kappa - p) - k c],
+    P3 = -Phi''' - V beta^2 [(k - beta)(p - 2 kappa) + k c].
+
+Associative flow (``beta = k``, for a slope ``k(theta)`` the support function of the yield section) also admits the
+apex of the yield surface, ``tr D > k |D'|``: that is ``|x| < 1`` at ``tr D = k``, the same formulas on the ball
+instead of the sphere.
+
+Units as in :mod:`flybystab.core.energy`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flybystab.core.ellipsoid import index_symbols
+from flybystab.core.energy import MASS, energy_along, energy_derivatives, path_frame
+from flybystab.core.jit import kernel
+from flybystab.core.rheology import (
+    DRUCKER_PRAGER,
+    EXTENSION_CONE,
+    MOHR_COULOMB,
+    SQRT6,
+    least_slope,
+    lode_angle,
+    slope_over_sine,
+)
+from flybystab.core.statics import rigid_stress
+
+Array = NDArray[np.float64]
+
+SQRT2 = np.sqrt(2.0)
+
+#: Longest strain along which a barrier is looked for.
+LONGEST = 3.0
+
+
+class Pile(NamedTuple):
+    """A granular ellipsoid in the units of this module; `s` is ``S`` with ``det S = 1``."""
+
+    s: Array
+    spin: Array
+    momentum: Array
+    stress: Array  # deviator in the basis of the directions, 5
+    pressure: float
+    one: Array
+    two: Array
+    three: Array
+    code: int
+    sin: float
+    cohesion: float  # Y cos(phi)
+    associative: bool
+    beta: float  # not associative
+    kappa: float
+
+
+@kernel
+def rate_of_strain(x: Array, trace: float, d: Array) -> None:
+    """Write ``d[6]`` of a direction ``x[5]`` and a trace."""
+    a = x[0] / SQRT2
+    b = x[1] / SQRT6
+    d[0] = a + b + trace / 3.0
+    d[1] = -a + b + trace / 3.0
+    d[2] = -2.0 * b + trace / 3.0
+    d[3] = x[2] / SQRT2
+    d[4] = x[3] / SQRT2
+    d[5] = x[4] / SQRT2
+
+
+@kernel
+def direction(c: Array, x: Array) -> None:
+    """Write the components ``x[5]`` of the deviator of ``c[6]``; the inverse of :func:`rate_of_strain`."""
+    x[0] = (c[0] - c[1]) / SQRT2
+    x[1] = (c[0] + c[1] - 2.0 * c[2]) / SQRT6
+    x[2] = SQRT2 * c[3]
+    x[3] = SQRT2 * c[4]
+    x[4] = SQRT2 * c[5]
+
+
+@kernel
+def pile(
+    s1: float,
+    s2: float,
+    s3: float,
+    spin: Array,
+    code: int,
+    phi: float,
+    cohesion: float,
+    dilatancy: float,
+    kappa: float,
+) -> Pile:
+    """Set the scene; `s_i` of any scale, `spin`, `cohesion`, `kappa` in the units of this module.
+
+    `dilatancy` is ``beta / min k``; 1 or more means associative flow, whatever the yield surface.
+    """
+    s = np.empty(3)
+    scale = np.cbrt(s1 * s2 * s3)
+    s[0] = s1 / scale
+    s[1] = s2 / scale
+    s[2] = s3 / scale
+    one = np.empty(3)
+    two = np.empty((3, 3))
+    three = np.empty((3, 3, 3))
+    index_symbols(s[0], s[1], s[2], one, two, three)
+    stress = np.empty(6)
+    rigid_stress(s[0], s[1], s[2], 1.0, 1.0, spin, np.zeros(6), stress)
+    deviator = np.empty(5)
+    direction(stress, deviator)
+    momentum = np.empty(3)
+    trace = s[0] + s[1] + s[2]
+    for i in range(3):
+        momentum[i] = MASS / 5.0 * (trace - s[i]) * spin[i]
+    sin = np.sin(phi)
+    return Pile(
+        s,
+        spin.copy(),
+        momentum,
+        deviator,
+        -(stress[0] + stress[1] + stress[2]) / 3.0,
+        one,
+        two,
+        three,
+        code,
+        sin,
+        cohesion * np.cos(phi),
+        dilatancy >= 1.0,
+        dilatancy * least_slope(code, sin),
+        kappa,
+    )
+
+
+@kernel
+def _unit_determinant(x: Array, r: float) -> float:
+    d = np.empty(6)
+    rate_of_strain(x, 0.0, d)
+    det = (
+        d[0] * (d[1] * d[2] - d[5] * d[5])
+        - d[3] * (d[3] * d[2] - d[5] * d[4])
+        + d[4] * (d[3] * d[5] - d[1] * d[4])
+    )
+    return det / (r * r * r)
+
+
+@kernel
+def slope_of_flow(b: Pile, x: Array) -> tuple[float, float]:
+    """``k`` over ``sin phi`` of the dissipation in the direction `x`, and the dilatancy ``tr D`` at ``|D'| = 1``.
+
+    Associative flow: the support function ``m(D') = max over theta of k(theta) shat(theta):D'`` of the yield
+    section serves as both (maximum dissipation); otherwise ``k`` at the Lode angle of ``D'`` and a fixed ``beta``.
+    """
+    if b.code in (DRUCKER_PRAGER, EXTENSION_CONE):
+        g = slope_over_sine(b.code, b.sin, 0.0)
+        return g, (g * b.sin if b.associative else b.beta)
+    r = np.sqrt(np.sum(x * x))
+    det = _unit_determinant(x, r) if r > 0.0 else 0.0
+    if not b.associative:
+        return slope_over_sine(b.code, b.sin, det), b.beta
+    theta = lode_angle(det)  # of D', with the sign of the stress: +30 deg is compression
+    if b.code == MOHR_COULOMB:  # the vertices of the hexagon: compression and extension
+        g = max(
+            2.0 * SQRT6 / (3.0 - b.sin) * np.cos(np.pi / 6.0 - theta),
+            2.0 * SQRT6 / (3.0 + b.sin) * np.cos(np.pi / 6.0 + theta),
+        )
+        return g, g * b.sin
+    # unimodal in theta: the section is smooth and strictly convex
+    low = -np.pi / 6.0
+    high = np.pi / 6.0
+    golden = 0.3819660112501051
+    x1 = low + golden * (high - low)
+    x2 = high - golden * (high - low)
+    g1 = _section(b, x1) * np.cos(x1 - theta)
+    g2 = _section(b, x2) * np.cos(x2 - theta)
+    for _ in range(45):
+        if g1 > g2:
+            high = x2
+            x2, g2 = x1, g1
+            x1 = low + golden * (high - low)
+            g1 = _section(b, x1) * np.cos(x1 - theta)
+        else:
+            low = x1
+            x1, g1 = x2, g2
+            x2 = high - golden * (high - low)
+            g2 = _section(b, x2) * np.cos(x2 - theta)
+    g = max(g1, g2)
+    return g, g * b.sin
+
+
+@kernel
+def _section(b: Pile, theta: float) -> float:
+    """``k/sin(phi)`` at a Lode angle: ``sin(3 theta) = -3 sqrt6 det``."""
+    return slope_over_sine(b.code, b.sin, -np.sin(3.0 * theta) / (3.0 * SQRT6))
+
+
+@kernel
+def powers(b: Pile, x: Array) -> tuple[float, float, float]:
+    """``P1, P2, P3`` of a direction ``x[5]``, ``|x| <= 1``."""
+    g, beta = slope_of_flow(b, x)
+    k = g * b.sin
+    kc = g * b.cohesion
+    d = np.empty(6)
+    rate_of_strain(x, beta, d)
+    _, f2, f3 = energy_derivatives(b.s[0], b.s[1], b.s[2], b.one, b.two, b.three, b.spin, d)
+    p1 = MASS * (np.sum(b.stress * x) - k * b.pressure - kc)
+    p2 = -f2 + MASS * beta * ((k - beta) * (b.kappa - b.pressure) - kc)
+    p3 = -f3 - MASS * beta * beta * ((k - beta) * (b.pressure - 2.0 * b.kappa) + kc)
+    return p1, p2, p3
+
+
+@kernel
+def second_order(p1: float, p2: float) -> tuple[float, float]:
+    """Critical energy ``P1^2/(2 P2)`` and strain ``-P1/P2``; inf where ``P2 <= 0``."""
+    if p1 >= 0.0:
+        return 0.0, 0.0
+    if p2 <= 0.0:
+        return np.inf, np.inf
+    return 0.5 * p1 * p1 / p2, -p1 / p2
+
+
+@kernel
+def third_order(p1: float, p2: float, p3: float) -> tuple[float, float]:
+    """Critical energy and strain with ``P3``: first ``t > 0`` at which ``P1 + t P2 + t^2/2 P3 = 0``."""
+    if p1 >= 0.0:
+        return 0.0, 0.0
+    root = p2 * p2 - 2.0 * p1 * p3
+    if root < 0.0:
+        return np.inf, np.inf
+    # t = -2 P1/(P2 + sqrt(root)): the smaller positive root, without cancellation
+    q = p2 + np.sqrt(root)
+    if q <= 0.0:
+        return np.inf, np.inf
+    t = -2.0 * p1 / q
+    return -t * (p1 + t * (p2 / 2.0 + t * p3 / 6.0)), t
+
+
+@kernel
+def _work(beta: float, hard: float, soft: float, t: float) -> float:
+    """``int_0^t V e^(beta t) (hard - soft t) dt``: work of the stress, with the volume growing."""
+    z = beta * t
+    if z > 1e-2:
+        grown = np.expm1(z) / beta
+        softened = (t * np.exp(z) - grown) / beta
+    else:
+        grown = t * (1.0 + z / 2.0 + z**2 / 6.0 + z**3 / 24.0 + z**4 / 120.0 + z**5 / 720.0)
+        softened = t * t * (0.5 + z / 3.0 + z**2 / 8.0 + z**3 / 30.0 + z**4 / 144.0 + z**5 / 840.0)
+    return MASS * (hard * grown - soft * softened)
+
+
+@kernel
+def _path(b: Pile, x: Array, rates: Array, frame: Array) -> tuple[float, float, float]:
+    """Set the path of a direction; ``beta``, and the work rate ``hard - soft t`` per volume along it."""
+    g, beta = slope_of_flow(b, x)
+    k = g * b.sin
+    d = np.empty(6)
+    rate_of_strain(x, beta, d)
+    path_frame(b.s[0], b.s[1], b.s[2], d, rates, frame)
+    if b.associative:
+        return beta, g * b.cohesion, 0.0
+    return beta, (k - beta) * b.pressure + g * b.cohesion, (k - beta) * b.kappa * beta
+
+
+@kernel
+def loss_at(b: Pile, x: Array, t: float) -> float:
+    """Energy lost at strain `t`: ``Phi(t) - Phi(0) + int V sigma*:D dt`` along ``F = exp(L t)``."""
+    rates = np.empty(3)
+    frame = np.empty((3, 3))
+    beta, hard, soft = _path(b, x, rates, frame)
+    shape = np.empty(6)
+    rate = np.empty(6)
+    phi0, _ = energy_along(rates, frame, b.momentum, 0.0, shape, rate)
+    phi, _ = energy_along(rates, frame, b.momentum, t, shape, rate)
+    return phi - phi0 + _work(beta, hard, soft, t)
+
+
+@kernel
+def barrier(b: Pile, x: Array, longest: float) -> tuple[float, float]:
+    """First maximum of ``Phi(t) - Phi(0) + int V sigma*:D dt`` along ``F = exp(L t)``, and the strain there.
+
+    Where none is met up to the strain `longest`: ``-Phi(0)`` at infinite strain if the flow dissipates nothing
+    (associative, no cohesion), the energy that disperses the body; inf if it does. The maximum is the first
+    zero of the exact slope, bracketed by steps of 0.1 and refined by the Illinois rule.
+    """
+    rates = np.empty(3)
+    frame = np.empty((3, 3))
+    beta, work, soft = _path(b, x, rates, frame)
+    shape = np.empty(6)
+    rate = np.empty(6)
+    phi0, slope0 = energy_along(rates, frame, b.momentum, 0.0, shape, rate)
+    t0 = 0.0
+    y0 = slope0 + MASS * work
+    if y0 <= 0.0:
+        return 0.0, 0.0
+    t1 = 0.0
+    y1 = y0
+    while y1 > 0.0:
+        t0 = t1
+        y0 = y1
+        t1 = t0 + 0.1
+        if t0 >= longest:
+            return (-phi0 if work <= 0.0 and phi0 < 0.0 else np.inf), np.inf
+        _, slope1 = energy_along(rates, frame, b.momentum, t1, shape, rate)
+        y1 = slope1 + MASS * np.exp(beta * t1) * (work - soft * t1)
+    t = t1
+    phi = phi0
+    for _ in range(40):
+        t = (t0 * y1 - t1 * y0) / (y1 - y0)
+        phi, slope = energy_along(rates, frame, b.momentum, t, shape, rate)
+        y = slope + MASS * np.exp(beta * t) * (work - soft * t)
+        if abs(y) <= 1e-10 * MASS or abs(t1 - t0) < 1e-9:
+            break
+        if y > 0.0:
+            t0 = t
+            if y0 > 0.0:
+                y1 *= 0.5 if y1 < 0.0 and y > 0.5 * y0 else 1.0
+            y0 = y
+        else:
+            t1 = t
+            y0 *= 0.5 if y < 0.5 * y1 else 1.0
+            y1 = y
+    return phi - phi0 + _work(beta, work, soft, t), t
