@@ -188,7 +188,8 @@ def stability(body: Body, *, dilatancy: float | None = 1.0) -> Stability:
         beta,
         kappa / units.stress,
     )
-    classify(*arguments, 5, row, found)
+    arguments_and_out: Any = (*arguments, 5, row, found)
+    classify(*arguments_and_out)
     scene = pile(*arguments)
     e = equilibrium(body)
     energies = Orders(
