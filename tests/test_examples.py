@@ -3,6 +3,7 @@
 import runpy
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
@@ -29,6 +30,46 @@ def test_roche_limit_by_friction():
 def test_pile_at_two_radii():
     # between these the answer hangs on the surface
     assert ran("pile_at_two_radii.py")["robust"] == [1.8, 2.2, 3.0]
+
+
+def test_sl9_at_jupiter():
+    names = ran("sl9_at_jupiter.py")
+    limits, fate = names["limits"], names["fate"]
+    assert limits["drucker-prager"] == pytest.approx(619, abs=10)
+    assert limits["mohr-coulomb"] > limits["drucker-prager"]
+    # a sphere without spin yields below rho = rho_p (Rp/d)^3 (3 - sin phi)/(2 sin phi), the static limit
+    mean = 126686531.9e9 / (4 / 3 * np.pi * 6.6743e-11 * (1.31 * 71492e3) ** 3)
+    sine = np.sin(np.deg2rad(35))
+    static = mean * (3 - sine) / (2 * sine)
+    assert fate(0.999 * static) == "RESHAPED"
+    assert fate(1.001 * static) == "INTACT"
+
+
+def test_anteros_bounds():
+    assert ran("anteros_bounds.py")["worst"] < 1e-9
+
+
+def test_catalogue_on_the_spin_limit(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    names = ran("catalogue_on_the_spin_limit.py")
+    assert names["count"] / names["total"] == pytest.approx(0.81, abs=0.05)
+    # no body that turns above the limit of a sphere at 90 deg, w2 = 4/3, holds
+    assert not np.any(names["holds"] & (names["rate"] > np.sqrt(4 / 3)))
+    assert (tmp_path / "out" / "spin_limit.png").exists()
+
+
+def test_survival_from_target_plane(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    names = ran("survival_from_target_plane.py")
+    assert names["hits"] == names["inside"]
+    assert names["probability"] == pytest.approx(0.713, abs=0.03)
+    assert names["low"] < names["probability"] < names["high"]
+
+
+def test_screening_to_2050():
+    names = ran("screening_to_2050.py")
+    assert (names["name"], names["date"]) == ("Apophis", "2029-04-13")
+    assert names["intact"] == 5
 
 
 def test_every_example_is_tested():

@@ -33,11 +33,13 @@ SCALE: dict[str, tuple[str, str]] = {
     Verdict.MASS_LOSS: ("M", "#a69c75"),
     Verdict.DISRUPTED: ("D", "#767880"),
     Verdict.BEYOND_MODEL: ("X", "#48567a"),
-    Verdict.IMPACT: ("#", "#101f3f"),
+    Verdict.IMPACT: ("H", "#101f3f"),
     Verdict.NOT_IN_EQUILIBRIUM: ("-", "#ffffff"),
     "FAILED": ("?", "#ffffff"),
 }
 _ORDER = list(SCALE)
+#: Markers of points, in the same order.
+MARKERS = "osDPXv^*"
 
 
 @dataclass(frozen=True, eq=False)
@@ -300,10 +302,11 @@ def verdict_points(axes: Any, b: Quantity, verdict: Sequence[str], radius: Quant
     points = b.to_value(u.km)
     names = np.asarray(verdict, dtype=str)
     for name in (n for n in _ORDER if n in names):
-        letter, shade = SCALE[name]
         chosen = names == name
-        axes.plot(*points[chosen].T, ls="none", marker=f"${letter}$", color=shade if letter != "I" else "0.4",
-                  label=f"{name} ({chosen.sum()})")  # fmt: skip
+        axes.plot(
+            *points[chosen].T, MARKERS[_ORDER.index(name)], ls="none", ms=5, mfc=SCALE[name][1], mec="black",
+            mew=0.4, label=f"{name} ({chosen.sum()})",
+        )  # fmt: skip
     if radius is not None:
         from matplotlib.patches import Circle
 
@@ -344,7 +347,7 @@ def _shades() -> dict[str, Any]:
 def _letters(axes: Any, places: Sequence[Array], names: NDArray[np.str_]) -> None:
     for x, y, name in zip(places[0].ravel(), places[1].ravel(), names.ravel(), strict=True):
         letter = SCALE[name][0]
-        dark = letter in "DX#"
+        dark = letter in "DXH"
         if letter != "I":
             axes.text(x, y, letter, ha="center", va="center", fontsize=6, color="white" if dark else "black")
 

@@ -1,0 +1,15 @@
+"""Every passage of the embedded catalogue within 0.02 au of the Earth before 2050, judged on the catalogue's values."""
+
+import astropy.units as u
+import numpy as np
+
+import flybystab as fs
+from flybystab.survey.summary import summary
+
+# the ephemeris that comes with the package ends in 2050 (extra `jpl`: 2650)
+table = fs.screen(None, "2026-01-01", "2049-12-01", within=0.02 * u.au)
+print(summary(table, closest=5).text())
+nearest = table[int(np.argmin(table["distance"]))]
+name, date = str(nearest["asteroid"]), str(nearest["time_tdb"])[:10]
+intact = int(np.count_nonzero(table["verdict"] == "INTACT"))
+print(f"nearest: {name} on {date}, {nearest['distance'].to(u.km):.0f}, {nearest['verdict']}")
