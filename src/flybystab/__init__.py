@@ -35,6 +35,7 @@ _HOME = {
     "periapsis_axes": "flybys",
     "screen": "survey.screening",
     "spin_sample": "spin",
+    "stability": "aggregate.stability",
 }
 
 __all__ = ["__version__", *_HOME]
@@ -42,6 +43,7 @@ __all__ = ["__version__", *_HOME]
 if TYPE_CHECKING:
     from flybystab.aggregate.body import Body, Material
     from flybystab.aggregate.equilibrium import equilibrium
+    from flybystab.aggregate.stability import stability
     from flybystab.errors import FlybystabError
     from flybystab.flybys import FlybyResult, flyby, flyby_many, periapsis_axes
     from flybystab.outcome import Verdict

@@ -277,12 +277,14 @@ def stability_command(options: argparse.Namespace) -> None:
     """``flybystab stability NAME``."""
     import astropy.units as u
 
-    from flybystab.aggregate.equilibrium import equilibrium, spin_limits
+    from flybystab.aggregate.equilibrium import spin_limits
+    from flybystab.aggregate.stability import stability
     from flybystab.face.document import plain
     from flybystab.face.text import equilibrium_lines
 
     asteroid = _asteroid(options)
-    e = equilibrium(asteroid.body)
+    s = stability(asteroid.body)
+    e = s.equilibrium
     limits = spin_limits(asteroid.body).to_value(u.rad / u.s)
     periods = [2.0 * 3.141592653589793 / w / 3600.0 if w > 0 else float("inf") for w in limits]
     _print(
@@ -292,6 +294,11 @@ def stability_command(options: argparse.Namespace) -> None:
                 "flybystab": __version__,
                 "asteroid": asteroid.label,
                 "admissible": e.admissible,
+                "stable_infinitesimal": s.stable_infinitesimal,
+                "critical_strain": {k: getattr(s.critical_strain, k) for k in ("second", "third", "barrier")},
+                "critical_energy_J": {
+                    k: getattr(s.critical_energy, k).to_value(u.J) for k in ("second", "third", "barrier")
+                },
                 "friction_angle_deg": asteroid.body.material.friction_angle.to_value(u.deg),
                 "required_friction_angle_deg": e.required_friction_angle.to_value(u.deg),
                 "margin_deg": e.margin.to_value(u.deg),
@@ -305,6 +312,9 @@ def stability_command(options: argparse.Namespace) -> None:
         ),
         lambda: [
             *equilibrium_lines(asteroid.label, e),
+            f"small perturbations       {'stable' if s.stable_infinitesimal else 'not stable'}",
+            f"critical strain           {s.critical_strain.second:.3g} (second order), "
+            f"{s.critical_strain.third:.3g} (third), {s.critical_strain.barrier:.3g} (barrier)",
             f"holds for spin periods    {min(periods):.3f} to {max(periods):.3f} h about the short axis",
             *(
                 [f"assumed                   {'; '.join(asteroid.assumptions)}"]
