@@ -3,7 +3,7 @@
 PYTHON ?= python3
 PY = .venv/bin/python
 
-.PHONY: demo test check bench clean
+.PHONY: demo test check docs bench clean
 
 .venv/bin/python:
 	$(PYTHON) -m venv .venv
@@ -28,6 +28,13 @@ check: .venv/.test
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
 	$(PY) -m mypy
+
+.venv/.docs: pyproject.toml | .venv/bin/python
+	$(PY) -m pip install --quiet --disable-pip-version-check -e ".[docs]"
+	touch $@
+
+docs: .venv/.docs
+	$(PY) -m sphinx -W --keep-going -b html -q docs out/docs
 
 clean:
 	rm -rf .venv out build dist src/*.egg-info

@@ -1,0 +1,48 @@
+"""Make the pictures of the documentation: ``python docs/pictures.py`` (about a minute)."""
+
+import contextlib
+import os
+import runpy
+import shutil
+import tempfile
+from pathlib import Path
+
+import astropy.units as u
+import numpy as np
+from matplotlib.figure import Figure
+
+import flybystab as fs
+from flybystab.face.cli import main
+from flybystab.face.maps import outcome_map, outcome_plot, target_map, target_plot
+from flybystab.face.scene import scene_plot
+
+DOCS = Path(__file__).resolve().parent
+IMAGES = DOCS / "images"
+PILE = fs.Body(semi_axes=[1400, 850, 750] * u.m, density=2000 * u.kg / u.m**3, spin_period=6 * u.h)
+
+
+def save(name, figure):
+    figure.savefig(IMAGES / name, dpi=110)
+    print(IMAGES / name)
+
+
+main(["flyby", "Apophis", "--output", str(IMAGES / "apophis.png")])
+
+figure = Figure(figsize=(6.4, 4.8), layout="constrained")
+q, v = np.linspace(1.1, 3.2, 15) * fs.R_earth, np.linspace(0, 21, 8) * u.km / u.s
+outcome_plot(figure.subplots(), outcome_map(PILE, q, v, phases=8))
+save("outcome_map.png", figure)
+
+figure = Figure(figsize=(6.0, 6.0), layout="constrained")
+target_plot(figure.subplots(), target_map(PILE, 8 * u.km / u.s, np.linspace(1.1, 3.2, 11) * fs.R_earth, 32))
+save("target_map.png", figure)
+
+figure = Figure(figsize=(6.4, 4.8), layout="constrained")
+result = fs.flyby(PILE, fs.Encounter.hyperbolic("earth", 2.0 * fs.R_earth, 5 * u.km / u.s))
+scene_plot(figure.add_subplot(projection="3d"), result)
+save("scene.png", figure)
+
+with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+    runpy.run_path(str(DOCS.parent / "examples" / "catalogue_on_the_spin_limit.py"))
+    shutil.copy(Path("out") / "spin_limit.png", IMAGES / "spin_limit.png")
+print(os.fspath(IMAGES / "spin_limit.png"))

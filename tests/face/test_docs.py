@@ -1,0 +1,60 @@
+"""Documentation that can be run is run, and what it names exists."""
+
+import re
+from pathlib import Path
+
+import pytest
+
+import flybystab
+from flybystab.face.cli import COMMANDS
+
+ROOT = Path(__file__).resolve().parents[2]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+
+
+@pytest.mark.parametrize("page", ["README.md", "docs/tutorial.md", "docs/howto.md"])
+def test_python_blocks_run(page, monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    blocks = re.findall(r"```python\n(.*?)```", (ROOT / page).read_text(), re.S)
+    assert blocks
+    space = {}
+    for block in blocks:
+        exec(compile(block, page, "exec"), space)
+
+
+def test_the_scenario_of_the_howto_runs(tmp_path, monkeypatch, capsys):
+    from flybystab.face.cli import main
+
+    monkeypatch.chdir(tmp_path)
+    text = re.search(r"```toml\n(.*?)```", (ROOT / "docs/howto.md").read_text(), re.S).group(1)
+    (tmp_path / "scene.toml").write_text(text)
+    assert main(["scenario", "scene.toml"]) == 0
+    assert (tmp_path / "pile.png").exists()
+    capsys.readouterr()
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_what_a_page_names_is_there(page):
+    text = page.read_text()
+    for path in re.findall(r"\]\(((?!http)[^)#]+)\)", text):
+        assert (page.parent / path).exists(), path
+    for path in re.findall(r"\b(?:tests|examples|benchmarks|docs|scripts)/[\w/]+\.(?:py|toml|md)\b", text):
+        assert (ROOT / path).exists(), path
+    for command in re.findall(r"`flybystab ([a-z]+)", text):
+        assert command in COMMANDS, command
+    for name in re.findall(r"\bfs\.(\w+)", text):
+        assert name in flybystab.__all__, name
+
+
+def test_the_gallery_lists_every_example():
+    text = (ROOT / "docs/gallery.md").read_text()
+    for script in (ROOT / "examples").glob("*.py"):
+        assert f"`{script.name}`" in text, script.name
+
+
+def test_the_example_of_the_package():
+    import doctest
+
+    result = doctest.testmod(flybystab)
+    assert result.attempted >= 4
+    assert result.failed == 0
