@@ -1,0 +1,175 @@
+"""Figures of equilibrium and stability. Every function takes matplotlib axes and returns them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import astropy.units as u
+import numpy as np
+from astropy.units import Quantity
+
+from flybystab.aggregate.body import Body, Material
+from flybystab.aggregate.equilibrium import failure_distance, spin_limits
+from flybystab.aggregate.fluids import jacobi, maclaurin
+from flybystab.aggregate.regions import stability_map
+from flybystab.aggregate.stability import push, stability
+from flybystab.constants import G
+
+BLACK, ORANGE, SKY, GREEN, BLUE, RED = "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00"
+STYLES = ("-", "--", ":", "-.")
+ANGLES = (1, 5, 10, 20, 30, 40)
+
+
+def _mark(axes: Any, points: Mapping[str, tuple[float, float]] | None) -> None:
+    for name, (x, y) in (points or {}).items():
+        axes.plot(x, y, "o", ms=3, color=BLACK)
+        axes.annotate(name, (x, y), xytext=(3, 3), textcoords="offset points", fontsize=7)
+
+
+def axis_ratios(bodies: Mapping[str, Body]) -> dict[str, tuple[float, float]]:
+    """``(a2/a1, a3/a1)`` of bodies, to be marked on :func:`regions_plot`."""
+    return {name: (float(b.axes[1] / b.axes[0]), float(b.axes[2] / b.axes[0])) for name, b in bodies.items()}
+
+
+def regions_plot(
+    axes: Any,
+    w2: float = 0.0,
+    angles: Sequence[float] = ANGLES,
+    *,
+    yield_surface: str = "drucker-prager",
+    bodies: Mapping[str, Body] | None = None,
+    cells: int = 200,
+) -> Any:
+    """Friction angle that a shape needs at one spin ``w2 = omega^2/(pi G rho)``, in the plane of axis ratios.
+
+    One contour per angle (deg): with that much friction all shapes between the contours of the same angle
+    stand. Grey: no friction suffices. The fluid shapes are at zero.
+    """
+    ratio = np.linspace(0.05, 1.0, cells)
+    table = stability_map(
+        ratio[None, :],
+        ratio[:, None],
+        w2,
+        40 * u.deg,
+        yield_surface=yield_surface,
+        depth="friction",
+    )
+    shape = table.level >= 0
+    required = np.where(shape, np.minimum(table.required_friction_angle.to_value(u.deg), 90.0), np.nan)
+    if np.nanmax(required) >= 90.0:
+        axes.contourf(ratio, ratio, required, levels=[89.0, 91.0], colors=["0.8"])
+    if np.nanmin(required) < max(angles):
+        lines = axes.contour(ratio, ratio, required, levels=sorted(angles), cmap="viridis", linewidths=1.2)
+        axes.clabel(lines, fmt="%g°", fontsize=7)
+    axes.plot([0, 1], [0, 1], color=BLACK, lw=0.8)
+    _mark(axes, axis_ratios(bodies or {}))
+    axes.set_xlim(0, 1)
+    axes.set_ylim(0, 1)
+    axes.set_xlabel("axis ratio $a_2/a_1$")
+    axes.set_ylabel("axis ratio $a_3/a_1$")
+    axes.set_title(rf"friction angle required, $\omega^2/\pi G\rho = {w2:g}$", fontsize=9)
+    return axes
+
+
+def critical_energy_plot(
+    axes: Any, w2: float, friction_angle: Quantity, *, dilatancy: float = 1.0, cells: int = 100
+) -> Any:
+    """Least critical energy at second order over the plane of axis ratios, in units of the binding energy."""
+    ratio = np.linspace(0.1, 1.0, cells)
+    t = stability_map(ratio[None, :], ratio[:, None], w2, friction_angle, dilatancy=dilatancy, depth="second")
+    energy = np.where(t.level >= 1, np.minimum(t.energy_second.value, 1.0), np.nan)
+    image = axes.pcolormesh(ratio, ratio, energy, shading="nearest", cmap="viridis", vmin=0.0, vmax=1.0)
+    axes.figure.colorbar(image, ax=axes, label="critical energy / binding energy (cut at 1)")
+    axes.plot([0, 1], [0, 1], color=BLACK, lw=0.8)
+    axes.set_xlabel("axis ratio $a_2/a_1$")
+    axes.set_ylabel("axis ratio $a_3/a_1$")
+    return axes
+
+
+def spin_plot(
+    axes: Any,
+    angles: Sequence[float] = ANGLES,
+    *,
+    prolate: bool = False,
+    yield_surface: str = "drucker-prager",
+    bodies: Mapping[str, Body] | None = None,
+) -> Any:
+    """Lower and upper spin limit ``omega^2/(pi G rho)`` against ``a3/a1``, one line per friction angle (deg).
+
+    Oblate bodies ``a1 = a2`` with the Maclaurin and, dashed, the Jacobi fluids; or prolate ones ``a2 = a3``.
+    """
+    ratio = np.linspace(0.1, 1.0, 91)
+    shades = [SKY, BLUE, GREEN, ORANGE, RED, BLACK]
+    rho = 2000.0
+    for i, angle in enumerate(angles):
+        limits = np.empty((len(ratio), 2))
+        for j, r in enumerate(ratio):
+            body = _unit_body((1.0, r, r) if prolate else (1.0, 1.0, r), rho, yield_surface)
+            limits[j] = spin_limits(body, angle * u.deg).to_value(u.rad / u.s) ** 2 / (np.pi * G * rho)
+        style = {"color": shades[i % len(shades)], "ls": STYLES[i // len(shades) % len(STYLES)], "lw": 1.2}
+        axes.plot(ratio, limits[:, 1], label=f"{angle:g}°", **style)
+        axes.plot(ratio, np.where(limits[:, 0] > 0, limits[:, 0], np.nan), **style)
+    if not prolate:
+        axes.plot(ratio, [maclaurin(r).load for r in ratio], color=BLACK, lw=2, label="Maclaurin")
+        fluid = [jacobi(x) for x in np.linspace(0.2, 0.999, 60)]
+        axes.plot(
+            [f.a3_a1 for f in fluid], [f.load for f in fluid], color=BLACK, lw=2, ls="--", label="Jacobi"
+        )
+    marks = {
+        name: (float(b.axes[2] / b.axes[0]), float(b.omega @ b.omega / (np.pi * G * b.rho)))
+        for name, b in (bodies or {}).items()
+    }
+    _mark(axes, marks)
+    axes.set_xlabel("axis ratio $a_3/a_1$" + (" (prolate)" if prolate else " (oblate)"))
+    axes.set_ylabel(r"$\omega^2/\pi G\rho$")
+    axes.legend(frameon=False, fontsize=7)
+    return axes
+
+
+def barrier_plot(axes: Any, body: Body, *, dilatancy: float = 1.0, longest: float = 2.0) -> Any:
+    """Energy that the weakest push loses against its strain: second order, third order, whole path."""
+    s = stability(body, dilatancy=dilatancy)
+    strain = np.linspace(0.0, longest, 201)
+    p = push(body, s.direction, strain, dilatancy=dilatancy)
+    binding = s.binding_energy.to_value(u.J)
+    for loss, name, color, style in zip(
+        p.loss,
+        ("second order", "third order", "whole path"),
+        (SKY, ORANGE, BLACK),
+        (":", "--", "-"),
+        strict=True,
+    ):
+        axes.plot(strain, loss.to_value(u.J) / binding, color=color, ls=style, label=name)
+    axes.set_xlabel("strain of the push")
+    axes.set_ylabel("kinetic energy lost / binding energy")
+    top = max(float(p.loss.barrier.to_value(u.J).max()) / binding, 1e-12)
+    axes.set_ylim(-0.3 * top, 1.6 * top)
+    axes.legend(frameon=False, fontsize=8)
+    return axes
+
+
+def failure_distance_plot(
+    axes: Any,
+    bodies: Mapping[str, Body],
+    mass_parameter: Quantity,
+    radius: Quantity,
+    *,
+    synchronous: bool = False,
+) -> Any:
+    """Static failure distance, in planetary radii, against friction angle, one line per body."""
+    angles = np.linspace(1.0, 60.0, 119) * u.deg
+    for i, (name, body) in enumerate(bodies.items()):
+        d = failure_distance(body, mass_parameter, angles, synchronous=synchronous)
+        color = (BLACK, BLUE, RED, GREEN, ORANGE, SKY)[i % 6]
+        ratio = (d / radius).to_value(u.dimensionless_unscaled)
+        axes.plot(angles.value, ratio, color=color, ls=STYLES[i // 6 % 4], label=name)
+    axes.axhline(1.0, color="0.5", lw=0.8)
+    axes.set_xlabel("friction angle (deg)")
+    axes.set_ylabel("failure distance (planetary radii)")
+    axes.legend(frameon=False, fontsize=8)
+    return axes
+
+
+def _unit_body(ratios: tuple[float, float, float], rho: float, yield_surface: str) -> Body:
+    return Body(np.array(ratios) * u.km, rho * u.kg / u.m**3, material=Material(yield_surface=yield_surface))
