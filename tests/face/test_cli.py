@@ -236,3 +236,64 @@ def test_every_public_name_is_there():
         assert getattr(flybystab, name) is not None
     with pytest.raises(AttributeError, match="no attribute 'flyy'"):
         flybystab.flyy  # noqa: B018
+
+
+DIMENSIONLESS = {
+    "spin_ratio", "bound_fraction", "share", "n", "seed", "q0", "q5", "q50", "q95", "q100",
+    "INTACT", "semi_axes_relative", "spin_relative", "tide_error_relative",
+}  # fmt: skip
+UNITS = ("_deg", "_km", "_m", "_s", "_Pa", "_rad_s", "_km_s")
+
+
+def numbers(value, key=""):
+    if isinstance(value, dict):
+        for k, v in value.items():
+            yield from numbers(v, k)
+    elif isinstance(value, list):
+        for v in value:
+            yield from numbers(v, key)
+    elif isinstance(value, int | float) and not isinstance(value, bool):
+        yield key
+
+
+@pytest.mark.parametrize("name", ["Apophis", "Duende"])
+def test_every_number_says_its_unit(capsys, name):
+    status, out, err = run(capsys, "flyby", name, "--attitudes", 4, "--json")
+    assert status == 0, err
+    keys = set(numbers(json.loads(out)))
+    # keys of the quantiles stand below one that names the unit
+    assert {k for k in keys if k not in DIMENSIONLESS and not k.endswith(UNITS)} == set()
+
+
+def test_an_unknown_pole_is_said(capsys):
+    status, out, _ = run(capsys, "flyby", "Duende", "--attitudes", 2)
+    assert status == 0
+    assert "the pole is not known" in out
+
+
+@pytest.mark.skipif(not Path("/bin/bash").exists(), reason="no bash")
+@pytest.mark.parametrize(
+    ("words", "expected"),
+    [
+        ("flybystab fl", "flyby"),
+        ("flybystab flyby Apop", "Apophis"),
+        ("flybystab flyby Apophis --at", "--attitudes"),
+        ("flybystab completion z", "zsh"),
+    ],
+)
+def test_completion(capsys, words, expected):
+    status, out, _ = run(capsys, "completion", "bash")
+    assert status == 0
+    code = f"""{out}
+COMP_WORDS=({words}); COMP_CWORD=$(( ${{#COMP_WORDS[@]}} - 1 )); _flybystab; printf '%s\\n' "${{COMPREPLY[@]}}"
+"""
+    done = subprocess.run(["/bin/bash", "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == [expected]
+    assert done.stderr == ""
+
+
+def test_zsh_reads_the_script_of_bash(capsys):
+    _, bash, _ = run(capsys, "completion", "bash")
+    _, zsh, _ = run(capsys, "completion", "zsh")
+    assert zsh.endswith(bash)
+    assert "bashcompinit" in zsh

@@ -63,11 +63,25 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
+def _attitude_words(asteroid: Any) -> str:
+    """At which attitude the first result is: the sample is there because it cannot be known."""
+    if asteroid.pole is None:
+        return "one of many: the pole is not known; spin axis along the orbital angular momentum"
+    return "one of many: the catalogued pole, an arbitrary turn about it"
+
+
+def _coloured(line: str) -> str:
+    """The verdict in bold, on a terminal that wants colours."""
+    if not line.startswith("verdict") or os.environ.get("NO_COLOR") or not sys.stdout.isatty():
+        return line
+    return f"\033[1m{line}\033[0m"
+
+
 def _print(options: argparse.Namespace, document: Callable[[], Any], lines: Callable[[], list[str]]) -> None:
     if options.json:
         print(json.dumps(document(), indent=1, allow_nan=False))
     else:
-        print("\n".join(lines()))
+        print("\n".join(_coloured(line) for line in lines()))
 
 
 def _time(text: str, name: str) -> Any:
@@ -157,6 +171,7 @@ def flyby_command(options: argparse.Namespace) -> None:
             asteroid=asteroid.label,
             orbit_solution=asteroid.record.get("orbit_solution"),
             assumed=asteroid.assumptions,
+            attitude=_attitude_words(asteroid),
             distance_error_numerical_km=None
             if encounter.distance_error is None
             else encounter.distance_error.to_value("km"),
@@ -165,6 +180,7 @@ def flyby_command(options: argparse.Namespace) -> None:
         lambda: [
             f"asteroid   {asteroid.label}",
             *text.encounter_lines(encounter),
+            f"attitude   {_attitude_words(asteroid)}",
             *text.flyby_lines(result),
             *text.sample_lines(sample),
             *text.model_lines(result, asteroid.assumptions),
@@ -412,6 +428,21 @@ def cite_command(options: argparse.Namespace) -> None:
     _print(options, lambda: {"flybystab": __version__, "bibtex": list(BIBTEX.values())}, lambda: [cite()])
 
 
+def completion_command(options: argparse.Namespace) -> None:
+    """``flybystab completion SHELL``."""
+    from flybystab.face.completion import script
+
+    _print(
+        options,
+        lambda: {
+            "flybystab": __version__,
+            "shell": options.shell,
+            "script": script(options.shell, _parser()),
+        },
+        lambda: [script(options.shell, _parser())],
+    )
+
+
 COMMANDS: dict[str, Callable[[argparse.Namespace], None]] = {
     "flyby": flyby_command,
     "report": report_command,
@@ -423,6 +454,7 @@ COMMANDS: dict[str, Callable[[argparse.Namespace], None]] = {
     "infer": infer_command,
     "bench": bench_command,
     "cite": cite_command,
+    "completion": completion_command,
 }
 
 
@@ -542,4 +574,7 @@ def _parser() -> argparse.ArgumentParser:
     sub.add_argument("--output", metavar="FILE", help="write the plot (.png, .pdf, .svg)")
 
     add("cite", "BibTeX of the methods and data", "flybystab cite > flybystab.bib")
+
+    sub = add("completion", "completion with the tab key", 'eval "$(flybystab completion bash)"')
+    sub.add_argument("shell", choices=["bash", "zsh"], help="for which shell")
     return parser
