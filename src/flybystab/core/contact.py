@@ -28,11 +28,12 @@ from flybystab.core.motion import (
     W_SINV,
     Buffers,
     dilatancy,
-    invariants,
+    gradient,
+    set_gradient,
 )
 from flybystab.core.rheology import slope_over_sine
 from flybystab.core.steppers import factorise, solve
-from flybystab.core.tensors import inverse, multiply, pack, unpack
+from flybystab.core.tensors import deviator, inverse, multiply, pack, unpack
 from flybystab.core.tide import COMPONENTS
 
 Array = NDArray[np.float64]
@@ -44,18 +45,6 @@ SLIDING = code(2)
 FAILED = code(3)
 
 _N = code(7)
-
-
-@kernel
-def gradient(y: Array, out: Array) -> None:
-    """Velocity gradient ``L = D + W`` of a 15-number state."""
-    unpack(y[6:12], out)
-    out[0, 1] -= y[14]
-    out[1, 0] += y[14]
-    out[0, 2] += y[13]
-    out[2, 0] -= y[13]
-    out[1, 2] -= y[12]
-    out[2, 1] += y[12]
 
 
 @kernel
@@ -83,7 +72,7 @@ def _residual(
     ``D = x + beta |x|/3 1``.
     """
     unit = work.c[2]
-    _, norm, det = invariants(x[0:6], unit)
+    _, norm, det = deviator(x[0:6], unit)
     n, b, sinv = work.m[W_N], work.m[W_B], work.m[W_SINV]
     unpack(unit, n)
     multiply(n, sinv, b)
@@ -150,13 +139,8 @@ def friction_impulse(
     n[2, 1] -= w[0]
     multiply(n, s, a)
     that = work.c[0]
-    that[0], that[1], that[2] = a[0, 0], a[1, 1], a[2, 2]
-    that[3], that[4], that[5] = (
-        0.5 * (a[0, 1] + a[1, 0]),
-        0.5 * (a[0, 2] + a[2, 0]),
-        0.5 * (a[1, 2] + a[2, 1]),
-    )
-    p, norm, det = invariants(that, work.c[2])
+    pack(a, that)
+    p, norm, det = deviator(that, work.c[2])
     g = slope_over_sine(surface, par[SIN_PHI], det)
     if norm <= g * (p * par[SIN_PHI] + cos_c):
         for i in range(6):
@@ -169,7 +153,7 @@ def friction_impulse(
     for i in range(6):
         d_star[i] = y[6 + i] - offset[i]
     trace_sinv = sinv[0, 0] + sinv[1, 1] + sinv[2, 2]
-    mean, start, _ = invariants(d_star, work.c[2])
+    mean, start, _ = deviator(d_star, work.c[2])
     scale = start + abs(mean) + abs(p) * trace_sinv
     excess = (norm - g * (p * par[SIN_PHI] + cos_c)) * trace_sinv / 3.0
     for i in range(6):
@@ -194,12 +178,9 @@ def friction_impulse(
     for i in range(3):
         for j in range(3):
             before[i, j] += x[6] * sinv[i, j] - strength * b[i, j]
-    pack(before, y[6:12])
+    set_gradient(before, y)
     for i in range(6):
         y[6 + i] += offset[i]
-    y[12] = 0.5 * (before[2, 1] - before[1, 2])
-    y[13] = 0.5 * (before[0, 2] - before[2, 0])
-    y[14] = 0.5 * (before[1, 0] - before[0, 1])
     return SLIDING
 
 
@@ -220,7 +201,7 @@ def _newton(
     trial, f, moved = x[11:18], x[18:25], x[25:32]
     for _turn in range(60):
         _residual(x, beta, _chat(par, cos_c, surface, x, work), par, work, d_star, f)
-        _, size, _ = invariants(x[0:6], work.c[2])
+        _, size, _ = deviator(x[0:6], work.c[2])
         if not size > 1e-300:
             return False
         for j in range(7):
@@ -265,5 +246,5 @@ def _chat(par: Array, cos_c: float, surface: int, x: Array, work: Buffers) -> fl
     """Cohesive strength ``chat = (k/sin phi) cos phi c`` in the direction of ``x[:6]``."""
     if cos_c == 0.0:
         return 0.0
-    _, _, det = invariants(x[0:6], work.c[2])
+    _, _, det = deviator(x[0:6], work.c[2])
     return slope_over_sine(surface, par[SIN_PHI], det) * cos_c

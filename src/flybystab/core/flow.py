@@ -6,9 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.core.jit import kernel
-from flybystab.core.motion import COHESION, FLOWING, N_FULL, SIN_PHI, W_SCRATCH, invariants, rate
+from flybystab.core.motion import COHESION, FLOWING, N_FULL, SIN_PHI, W_SCRATCH, rate
 from flybystab.core.steppers import flow_jacobian, implicit_at, implicit_step
-from flybystab.core.tensors import eigensystem
+from flybystab.core.tensors import deviator, eigensystem
 from flybystab.core.tide import TidePanels
 from flybystab.core.workspace import (
     ARREST,
@@ -28,19 +28,16 @@ Array = NDArray[np.float64]
 
 
 @kernel
-def strain_rate(y: Array) -> float:
-    """``|D'|`` of a 15-number state."""
-    m = (y[6] + y[7] + y[8]) / 3.0
-    return np.sqrt(
-        (y[6] - m) ** 2 + (y[7] - m) ** 2 + (y[8] - m) ** 2 + 2.0 * (y[9] ** 2 + y[10] ** 2 + y[11] ** 2)
-    )
-
-
-@kernel
 def axis_ratio2(y: Array, ws: Workspace) -> float:
     """Square of the largest over the least semi-axis."""
     values = ws.work.m[W_SCRATCH, 0]
     eigensystem(y[0:6], values, ws.work.m[W_SCRATCH + 1])
+    return _spread(values)
+
+
+@kernel
+def _spread(values: Array) -> float:
+    """Largest over least of three numbers."""
     return max(values[0], max(values[1], values[2])) / min(values[0], min(values[1], values[2]))
 
 
@@ -54,8 +51,7 @@ def _health(
     distance from the axis ratio where the model is left. ``ws.mark[3]`` keeps the code of the least.
     """
     denominator = rate(FLOWING, t, y, dy, par, tide, ws.work)
-    values = ws.work.m[W_SCRATCH, 0]
-    ratio2 = max(values[0], max(values[1], values[2])) / min(values[0], min(values[1], values[2]))
+    ratio2 = _spread(ws.work.m[W_SCRATCH, 0])  # left there by `rate`
     strength = ws.work.m[W_SCRATCH, 1, 1]
     if par[SIN_PHI] == 0.0 and par[COHESION] == 0.0:
         strength = ws.work.m[W_SCRATCH, 1, 2]
@@ -95,7 +91,7 @@ def follow_flow(
     while t < t1:
         # Here f0 and the stress in `ws.work` belong to (t, y).
         p, strength = ws.work.m[W_SCRATCH, 1, 2], ws.work.m[W_SCRATCH, 1, 1]
-        _, d, det = invariants(y[6:12], ws.stress)
+        _, d, det = deviator(y[6:12], ws.stress)
         record(t, FLOWING, y, par, p, strength, det, ws, hist, count)
         flow_jacobian(t, y, f0, 1e-6, par, tide, ws.work, ws.jac, ws.ft, ws.ys)
         # d|D'|/dt = Dhat : Ddot
@@ -134,7 +130,7 @@ def follow_flow(
             found = 0.5
         else:
             p, strength = ws.work.m[W_SCRATCH, 1, 2], ws.work.m[W_SCRATCH, 1, 1]
-            _, _, det = invariants(ws.ys[6:12], ws.stress)
+            _, _, det = deviator(ws.ys[6:12], ws.stress)
             record(t + 0.5 * h, FLOWING, ws.ys, par, p, strength, det, ws, hist, count)
             if _health(t + h, ws.y1, f0, par, tide, limit2, ws) < 0.0:
                 low, found = 0.5, 1.0
@@ -159,7 +155,8 @@ def follow_flow(
             return reason, t + h
         t = t1 if last else t + h
         copy(ws.y1, y, N_FULL)
-        if strain_rate(y) < D_REST:
+        _, d, _ = deviator(y[6:12], ws.stress)
+        if d < D_REST:
             return ARREST, t
         h *= min(6.0, max(0.2, 0.9 * error ** (-0.2))) if error > 0.0 else 6.0
     return DONE, t

@@ -20,8 +20,9 @@ from numpy.typing import NDArray
 from flybystab.core.ellipsoid import gravity_coefficients
 from flybystab.core.jit import code, kernel
 from flybystab.core.rheology import slope_over_sine
-from flybystab.core.tensors import eigensystem, inverse, multiply, pack, unpack
-from flybystab.core.tide import TidePanels, tide_at
+from flybystab.core.statics import rigid_load
+from flybystab.core.tensors import deviator, eigensystem, inverse, multiply, pack, unpack
+from flybystab.core.tide import COMPONENTS, TidePanels, tide_at
 
 Array = NDArray[np.float64]
 
@@ -128,41 +129,14 @@ def rigid_rate(t: float, y: Array, dy: Array, par: Array, tide: TidePanels, work
 
 
 @kernel
-def rigid_stress_components(kb: Array, w: Array, s: Array, g: Array, out: Array) -> None:
-    """Stress ``T[6]`` that rigidity needs, along the body axes.
-
-    ``T_ij = (K - Omega^2)_ij 2 S_i S_j/(S_i + S_j)``: symmetric part of ``(K - Omegadot - Omega^2) S``
-    once Omegadot obeys Euler. ``kb[6]`` tide, ``w[3]`` spin, ``s[3]`` squared semi-axes, ``g[3]`` gravity.
-    """
-    w2 = w[0] * w[0] + w[1] * w[1] + w[2] * w[2]
-    # Omega^2 = w w - w^2 1
-    out[0] = (g[0] + kb[0] - w[0] * w[0] + w2) * s[0]
-    out[1] = (g[1] + kb[1] - w[1] * w[1] + w2) * s[1]
-    out[2] = (g[2] + kb[2] - w[2] * w[2] + w2) * s[2]
-    out[3] = (kb[3] - w[0] * w[1]) * 2.0 * s[0] * s[1] / (s[0] + s[1])
-    out[4] = (kb[4] - w[0] * w[2]) * 2.0 * s[0] * s[2] / (s[0] + s[2])
-    out[5] = (kb[5] - w[1] * w[2]) * 2.0 * s[1] * s[2] / (s[1] + s[2])
-
-
-@kernel
-def invariants(c: Array, unit: Array) -> tuple[float, float, float]:
-    """Pressure, norm of the deviator and determinant of the unit deviator of ``c[6]``; ``unit[6]`` is set."""
-    p = -(c[0] + c[1] + c[2]) / 3.0
-    a, b, d = c[0] + p, c[1] + p, c[2] + p
-    norm = np.sqrt(a * a + b * b + d * d + 2.0 * (c[3] * c[3] + c[4] * c[4] + c[5] * c[5]))
-    if norm == 0.0:
-        for i in range(6):
-            unit[i] = 0.0
-        return p, 0.0, 0.0
-    f = 1.0 / norm
-    unit[0], unit[1], unit[2] = a * f, b * f, d * f
-    unit[3], unit[4], unit[5] = c[3] * f, c[4] * f, c[5] * f
-    det = (
-        unit[0] * (unit[1] * unit[2] - unit[5] * unit[5])
-        - unit[3] * (unit[3] * unit[2] - unit[5] * unit[4])
-        + unit[4] * (unit[3] * unit[5] - unit[1] * unit[4])
-    )
-    return p, norm, det
+def to_fixed_frame(y: Array, par: Array, m: Array, shape: Array, spin: Array) -> None:
+    """Write ``S`` (``shape[6]``) and ``w`` (``spin[3]``) of a RIGID state; ``m[3, 3]`` gets the rotation."""
+    rotation_matrix(y, m)
+    s1, s2, s3 = par[S1], par[S2], par[S3]
+    for c, (i, j) in enumerate(COMPONENTS):
+        shape[c] = s1 * m[i, 0] * m[j, 0] + s2 * m[i, 1] * m[j, 1] + s3 * m[i, 2] * m[j, 2]
+    for i in range(3):
+        spin[i] = m[i, 0] * y[4] + m[i, 1] * y[5] + m[i, 2] * y[6]
 
 
 @kernel
@@ -181,8 +155,9 @@ def rigid_excess(
     kb = work.c[1]
     tide_at(tide.tau, tide.start, tide.width, tide.coefficients, t, kt)
     rotated_to_body(y, kt, work.m[W_N], kb)
-    rigid_stress_components(kb, y[4:7], par[S1 : S3 + 1], par[G1 : G3 + 1], stress)
-    p, norm, det = invariants(stress, kt)
+    s = (par[S1], par[S2], par[S3])
+    rigid_load(kb, y[4:7], s, (par[G1], par[G2], par[G3]), stress)
+    p, norm, det = deviator(stress, kt)
     # The rigid body keeps the volume sqrt(s1 s2 s3) that it has.
     volume = np.sqrt(par[S1] * par[S2] * par[S3])
     return yield_excess(p, norm, det, volume, par), p, norm, det
@@ -232,6 +207,27 @@ def field(t: float, y: Array, tide: TidePanels, work: Buffers) -> None:
 
 
 @kernel
+def gradient(y: Array, out: Array) -> None:
+    """Velocity gradient ``L = D + W`` of a 15-number state."""
+    unpack(y[6:12], out)
+    out[0, 1] -= y[14]
+    out[1, 0] += y[14]
+    out[0, 2] += y[13]
+    out[2, 0] -= y[13]
+    out[1, 2] -= y[12]
+    out[2, 1] += y[12]
+
+
+@kernel
+def set_gradient(m: Array, y: Array) -> None:
+    """Store ``D`` and ``w`` of a velocity gradient ``m[3, 3]`` in a 15-number state, or of its rate."""
+    pack(m, y[6:12])
+    y[12] = 0.5 * (m[2, 1] - m[1, 2])
+    y[13] = 0.5 * (m[0, 2] - m[2, 0])
+    y[14] = 0.5 * (m[1, 0] - m[0, 1])
+
+
+@kernel
 def dilatancy(volume: float, par: Array) -> tuple[float, float]:
     """``beta`` and ``d beta/dV`` at ``V/V0``: constant, then faded to zero where the material is loosest.
 
@@ -258,15 +254,8 @@ def deformation_rate(regime: int, y: Array, dy: Array, par: Array, work: Buffers
         P = [betadot |D'| - B:R + k c B:(Dhat S^-1)] / [B:((1 - k Dhat) S^-1)].
     """
     d = y[6:12]
-    w0, w1, w2 = y[12], y[13], y[14]
     big_l = work.m[W_L]
-    unpack(d, big_l)
-    big_l[0, 1] -= w2
-    big_l[1, 0] += w2
-    big_l[0, 2] += w1
-    big_l[2, 0] -= w1
-    big_l[1, 2] -= w0
-    big_l[2, 1] += w0
+    gradient(y, big_l)
     r = work.m[W_R]
     multiply(big_l, big_l, r)
     for i in range(3):
@@ -294,7 +283,7 @@ def deformation_rate(regime: int, y: Array, dy: Array, par: Array, work: Buffers
     strength = 0.0  # k P + k c: norm of the deviatoric stress
     if regime == FLOWING:
         unit = work.c[2]
-        _, norm, det = invariants(d, unit)
+        _, norm, det = deviator(d, unit)
         unpack(unit, n)
         g = slope_over_sine(int(par[SURFACE]), par[SIN_PHI], det)
         k = g * par[SIN_PHI]
@@ -326,10 +315,7 @@ def deformation_rate(regime: int, y: Array, dy: Array, par: Array, work: Buffers
         for i in range(3):
             for j in range(3):
                 r[i, j] += pressure * sinv[i, j] - mu * b[i, j]
-    pack(r, dy[6:12])
-    dy[12] = 0.5 * (r[2, 1] - r[1, 2])
-    dy[13] = 0.5 * (r[0, 2] - r[2, 0])
-    dy[14] = 0.5 * (r[1, 0] - r[0, 1])
+    set_gradient(r, dy)
     work.m[W_SCRATCH, 1, 1] = strength
     work.m[W_SCRATCH, 1, 2] = pressure
     return denominator
@@ -349,13 +335,7 @@ def rate(regime: int, t: float, y: Array, dy: Array, par: Array, tide: TidePanel
 def angular_momentum(y: Array, work: Buffers, h: Array) -> None:
     """Angular momentum ``H = axial(L S - S L^T)`` about the centre, per ``m/5``, of a 15-number state."""
     big_l = work.m[W_L]
-    unpack(y[6:12], big_l)
-    big_l[0, 1] -= y[14]
-    big_l[1, 0] += y[14]
-    big_l[0, 2] += y[13]
-    big_l[2, 0] -= y[13]
-    big_l[1, 2] -= y[12]
-    big_l[2, 1] += y[12]
+    gradient(y, big_l)
     unpack(y[0:6], work.m[W_S])
     multiply(big_l, work.m[W_S], work.m[W_A])
     a = work.m[W_A]

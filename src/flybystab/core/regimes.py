@@ -39,13 +39,12 @@ from flybystab.core.motion import (
     S3,
     W_SCRATCH,
     angular_momentum,
-    invariants,
     rigid_excess,
-    rotation_matrix,
     set_rigid_shape,
+    to_fixed_frame,
 )
 from flybystab.core.rigid import follow_rigid
-from flybystab.core.tensors import determinant, eigensystem
+from flybystab.core.tensors import determinant, deviator, eigensystem
 from flybystab.core.tide import COMPONENTS, TidePanels
 from flybystab.core.workspace import (
     ARREST,
@@ -70,27 +69,18 @@ Array = NDArray[np.float64]
 def loosen(y: Array, par: Array, ws: Workspace) -> None:
     """Turn the RIGID state ``y[:7]`` into one that flows along the deviator of ``ws.stress``, barely."""
     m = ws.work.m[0]
-    rotation_matrix(y, m)
-    invariants(ws.stress, ws.ys[:6])
-    s = (par[S1], par[S2], par[S3])
-    w0 = m[0, 0] * y[4] + m[0, 1] * y[5] + m[0, 2] * y[6]
-    w1 = m[1, 0] * y[4] + m[1, 1] * y[5] + m[1, 2] * y[6]
-    w2 = m[2, 0] * y[4] + m[2, 1] * y[5] + m[2, 2] * y[6]
-    u = ws.ys
-    beta = par[BETA]
     out = ws.y1
+    to_fixed_frame(y, par, m, out[0:6], out[12:15])
+    u = ws.ys
+    deviator(ws.stress, u[:6])
     for c, (i, j) in enumerate(COMPONENTS):
-        total = 0.0
-        flow = 0.0
+        flow = par[BETA] / 3.0 if i == j else 0.0
         for a in range(3):
-            total += m[i, a] * m[j, a] * s[a]
             flow += m[i, a] * m[j, a] * u[a]
         flow += (m[i, 0] * m[j, 1] + m[i, 1] * m[j, 0]) * u[3]
         flow += (m[i, 0] * m[j, 2] + m[i, 2] * m[j, 0]) * u[4]
         flow += (m[i, 1] * m[j, 2] + m[i, 2] * m[j, 1]) * u[5]
-        out[c] = total
-        out[6 + c] = 2.0 * D_REST * (flow + (beta / 3.0 if i == j else 0.0))
-    out[12], out[13], out[14] = w0, w1, w2
+        out[6 + c] = 2.0 * D_REST * flow
     copy(out, y, N_FULL)
 
 
@@ -222,7 +212,7 @@ def follow(
             reason, t = follow_flow(t, t1, par, tide, tol, limit, max_steps, ws, hist, count)
             volume = np.sqrt(determinant(ws.y[0:6]))
             if reason in (ARREST, JAM):
-                _, _, det = invariants(ws.y[6:12], ws.stress)
+                _, _, det = deviator(ws.y[6:12], ws.stress)
                 stiffen(ws.y, par, ws)
                 log(reason, t, det, volume, events, count)
                 regime = RIGID

@@ -39,9 +39,13 @@ def yields(t: float, y: Array, par: Array, tide: TidePanels, ws: Workspace) -> f
     yield, the denominator of the pressure for flow along the deviator of the rigid stress.
     """
     excess, p, norm, det = rigid_excess(t, y, par, tide, ws.work, ws.stress)
-    if excess <= 0.0:
-        return excess
-    return min(excess, onset_denominator(p, norm, det, par, ws.stress))
+    return _onset(excess, p, norm, det, par, ws.stress)
+
+
+@kernel
+def _onset(excess: float, p: float, norm: float, det: float, par: Array, stress: Array) -> float:
+    """The onset function from what `rigid_excess` gives."""
+    return excess if excess <= 0.0 else min(excess, onset_denominator(p, norm, det, par, stress))
 
 
 @kernel
@@ -130,7 +134,7 @@ def follow_rigid(
     cohesion = par[COHESION] * np.sqrt(par[S1] * par[S2] * par[S3])
     record(t, RIGID, y, par, p, norm, det, ws, hist, count)
     f = ws.sample
-    f[0, N_SAMPLE] = yields(t, y, par, tide, ws)
+    f[0, N_SAMPLE] = _onset(excess, p, norm, det, par, ws.stress)
     f[1, N_SAMPLE] = required_friction(surface, cohesion, norm, p, det)
     if f[1, N_SAMPLE] > ws.mark[0]:
         ws.mark[0], ws.mark[1] = f[1, N_SAMPLE], t
@@ -158,9 +162,7 @@ def follow_rigid(
             x = j / N_SAMPLE
             explicit_at(x, y, N_RIGID, ws.dense, ws.ys)
             excess, p, norm, det = rigid_excess(t + x * h, ws.ys, par, tide, ws.work, ws.stress)
-            f[0, j] = (
-                excess if excess <= 0.0 else min(excess, onset_denominator(p, norm, det, par, ws.stress))
-            )
+            f[0, j] = _onset(excess, p, norm, det, par, ws.stress)
             f[1, j] = required_friction(surface, cohesion, norm, p, det)
             if not unyielding and f[0, j] > 0.0:
                 end = x
@@ -204,7 +206,6 @@ def follow_rigid(
                     low = mid
                 if (high - low) * h < 1e-14 * max(1.0, abs(t)):
                     break
-            explicit_at(high, y, N_RIGID, ws.dense, ws.ys)
             # Repeat the step up to the root: order 8 instead of the order of the interpolant.
             explicit_step(RIGID, t, y, N_RIGID, high * h, par, tide, ws.work, k, ws.scale, ws.y1)
             t += high * h

@@ -17,9 +17,32 @@ from numpy.typing import NDArray
 from flybystab.core.ellipsoid import gravity_coefficients
 from flybystab.core.jit import kernel
 from flybystab.core.rheology import required_cohesion, required_friction, slope_over_sine
-from flybystab.core.tensors import determinant
+from flybystab.core.tensors import deviator
 
 Array = NDArray[np.float64]
+
+
+@kernel
+def rigid_load(
+    tide: Array,
+    omega: Array,
+    s: tuple[float, float, float],
+    gravity: tuple[float, float, float],
+    out: Array,
+) -> None:
+    """Write ``out[6] = 5 sigma/rho`` that rigidity needs, along the body axes.
+
+    ``(K - Omega^2)_ij 2 S_i S_j/(S_i + S_j)`` with the tide ``tide[6]``, the spin ``omega[3]``, squared semi-axes
+    `s` and self-gravity ``K_g,i`` in `gravity`, in any consistent units.
+    """
+    w2 = omega[0] * omega[0] + omega[1] * omega[1] + omega[2] * omega[2]
+    # (-Omega^2)_ij = omega^2 delta_ij - omega_i omega_j
+    out[0] = (gravity[0] + tide[0] - omega[0] * omega[0] + w2) * s[0]
+    out[1] = (gravity[1] + tide[1] - omega[1] * omega[1] + w2) * s[1]
+    out[2] = (gravity[2] + tide[2] - omega[2] * omega[2] + w2) * s[2]
+    out[3] = (tide[3] - omega[0] * omega[1]) * 2.0 * s[0] * s[1] / (s[0] + s[1])
+    out[4] = (tide[4] - omega[0] * omega[2]) * 2.0 * s[0] * s[2] / (s[0] + s[2])
+    out[5] = (tide[5] - omega[1] * omega[2]) * 2.0 * s[1] * s[2] / (s[1] + s[2])
 
 
 @kernel
@@ -29,41 +52,23 @@ def rigid_stress(
     """Write the stress ``out[6]`` (Pa) that rigidity needs at a spin ``omega[3]`` in a tide ``tide[6]``.
 
     Everything is in principal axes: ``s_i`` squared semi-axes (m2), spin (rad/s), tide (s^-2), density `rho`
-    (kg/m3) and
-    `pi_g_rho` is ``pi G rho`` (s^-2). Any other consistent units do as well.
+    (kg/m3) and `pi_g_rho` is ``pi G rho`` (s^-2). Any other consistent units do as well.
     """
     a1, a2, a3 = gravity_coefficients(s1, s2, s3)
-    c = rho / 5.0
-    w2 = omega[0] * omega[0] + omega[1] * omega[1] + omega[2] * omega[2]
-    # (-Omega^2)_ij = omega^2 delta_ij - omega_i omega_j
-    out[0] = c * s1 * (tide[0] - 2.0 * pi_g_rho * a1 + w2 - omega[0] * omega[0])
-    out[1] = c * s2 * (tide[1] - 2.0 * pi_g_rho * a2 + w2 - omega[1] * omega[1])
-    out[2] = c * s3 * (tide[2] - 2.0 * pi_g_rho * a3 + w2 - omega[2] * omega[2])
-    out[3] = c * (tide[3] - omega[0] * omega[1]) * 2.0 * s1 * s2 / (s1 + s2)
-    out[4] = c * (tide[4] - omega[0] * omega[2]) * 2.0 * s1 * s3 / (s1 + s3)
-    out[5] = c * (tide[5] - omega[1] * omega[2]) * 2.0 * s2 * s3 / (s2 + s3)
+    c = -2.0 * pi_g_rho
+    rigid_load(tide, omega, (s1, s2, s3), (c * a1, c * a2, c * a3), out)
+    for i in range(6):
+        out[i] *= rho / 5.0
 
 
 @kernel
 def invariants(stress: Array) -> tuple[float, float, float]:
     """Pressure ``p``, norm of the deviator ``|s|`` and determinant of ``s/|s|`` (0 where ``s = 0``)."""
-    p = -(stress[0] + stress[1] + stress[2]) / 3.0
-    x = stress[0] + p
-    y = stress[1] + p
-    z = stress[2] + p
-    off = stress[3] * stress[3] + stress[4] * stress[4] + stress[5] * stress[5]
-    s = np.sqrt(x * x + y * y + z * z + 2.0 * off)
+    p, s, det = deviator(stress, np.empty(6))
     # Rounding leaves a deviator of a few ulp in a hydrostatic state; its direction means nothing.
     if s <= 4e-16 * abs(p):
         return p, 0.0, 0.0
-    d = np.empty(6)
-    d[0] = x / s
-    d[1] = y / s
-    d[2] = z / s
-    d[3] = stress[3] / s
-    d[4] = stress[4] / s
-    d[5] = stress[5] / s
-    return p, s, determinant(d)
+    return p, s, det
 
 
 @kernel

@@ -14,9 +14,22 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flybystab.core.contact import FAILED, FREE, REST, SLIDING, friction_impulse, gradient
+from flybystab.core.contact import FAILED, FREE, REST, SLIDING, friction_impulse
 from flybystab.core.jit import kernel
-from flybystab.core.motion import COHESION, N_WORK, W_A, W_B, W_K, W_L, W_S, Buffers, dilatancy, field
+from flybystab.core.motion import (
+    COHESION,
+    N_WORK,
+    W_A,
+    W_B,
+    W_K,
+    W_L,
+    W_S,
+    Buffers,
+    dilatancy,
+    field,
+    gradient,
+    set_gradient,
+)
 from flybystab.core.tensors import determinant, multiply, pack, unpack
 from flybystab.core.tide import TidePanels
 
@@ -56,15 +69,6 @@ def drift(h: float, y: Array, work: Buffers) -> bool:
     multiply(big_l, b, s)
     set_gradient(s, y)
     return True
-
-
-@kernel
-def set_gradient(m: Array, y: Array) -> None:
-    """Store the velocity gradient ``m[3, 3]`` in the state."""
-    pack(m, y[6:12])
-    y[12] = 0.5 * (m[2, 1] - m[1, 2])
-    y[13] = 0.5 * (m[0, 2] - m[2, 0])
-    y[14] = 0.5 * (m[1, 0] - m[0, 1])
 
 
 @kernel

@@ -45,16 +45,6 @@ def multiply(a: Array, b: Array, out: Array) -> None:
 
 
 @kernel
-def contraction(a: Array, b: Array) -> float:
-    """``a : b = sum a_ij b_ij``."""
-    total = 0.0
-    for i in range(3):
-        for j in range(3):
-            total += a[i, j] * b[i, j]
-    return total
-
-
-@kernel
 def determinant(c: Array) -> float:
     """Determinant of a symmetric tensor ``c[6]``."""
     return (
@@ -62,6 +52,25 @@ def determinant(c: Array) -> float:
         - c[3] * (c[3] * c[2] - c[5] * c[4])
         + c[4] * (c[3] * c[5] - c[1] * c[4])
     )
+
+
+@kernel
+def deviator(c: Array, unit: Array) -> tuple[float, float, float]:
+    """``-tr/3``, norm of the deviator and determinant of the unit deviator of ``c[6]``; sets ``unit[6]``.
+
+    Without a deviator `unit` and the determinant are zero. `unit` may be `c`.
+    """
+    p = -(c[0] + c[1] + c[2]) / 3.0
+    a, b, d = c[0] + p, c[1] + p, c[2] + p
+    norm = np.sqrt(a * a + b * b + d * d + 2.0 * (c[3] * c[3] + c[4] * c[4] + c[5] * c[5]))
+    if norm == 0.0:
+        for i in range(6):
+            unit[i] = 0.0
+        return p, 0.0, 0.0
+    f = 1.0 / norm
+    unit[0], unit[1], unit[2] = a * f, b * f, d * f
+    unit[3], unit[4], unit[5] = c[3] * f, c[4] * f, c[5] * f
+    return p, norm, determinant(unit)
 
 
 @kernel

@@ -8,9 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.core.jit import code, kernel
-from flybystab.core.motion import N_WORK, RIGID, S1, S2, S3, W_SCRATCH, Buffers, rotation_matrix
+from flybystab.core.motion import N_WORK, RIGID, W_SCRATCH, Buffers, to_fixed_frame
 from flybystab.core.steppers import N_STAGES
-from flybystab.core.tide import COMPONENTS
 
 Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
@@ -29,7 +28,7 @@ STUCK = code(7)  # more steps or switches than allowed
 N_HISTORY = 20
 #: Columns of the event log: code, time, Lode determinant, volume.
 N_EVENT = 4
-#: Samples in each step: history rows, and the grid on which extrema of the yield function are looked for.
+#: Samples in a rigid step: history rows, and the grid on which extrema of the yield function are looked for.
 N_SAMPLE = 4
 
 #: Rate of strain, in dynamical units, below which the body is at rest.
@@ -53,7 +52,7 @@ class Workspace(NamedTuple):
     stress: Array
     sample: Array
     spare: Array
-    mark: Array  # largest mobilised friction, its time; step size; |D| peak
+    mark: Array  # largest mobilised friction, its time; step size; code of the event nearest in flow
 
 
 @kernel
@@ -112,15 +111,9 @@ def record(
     row[0] = t
     row[1] = regime
     if regime == RIGID:
-        m = ws.work.m[W_SCRATCH]
-        rotation_matrix(y, m)
-        s1, s2, s3 = par[S1], par[S2], par[S3]
-        for c, (i, j) in enumerate(COMPONENTS):
-            row[2 + c] = s1 * m[i, 0] * m[j, 0] + s2 * m[i, 1] * m[j, 1] + s3 * m[i, 2] * m[j, 2]
+        to_fixed_frame(y, par, ws.work.m[W_SCRATCH], row[2:8], row[14:17])
         for i in range(6):
             row[8 + i] = 0.0
-        for i in range(3):
-            row[14 + i] = m[i, 0] * y[4] + m[i, 1] * y[5] + m[i, 2] * y[6]
     else:
         for i in range(15):
             row[2 + i] = y[i]
