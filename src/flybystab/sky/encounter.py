@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Protocol
 
 import astropy.units as u
@@ -164,6 +165,14 @@ class Encounter:
     def radius(self, t: Array | float) -> Array:
         """Distance from the planet's centre, m, shape (n,), at ``t`` s from closest approach."""
         return np.sqrt(np.sum(self.position(t) ** 2, axis=1))
+
+    @cached_property
+    def periapsis_axes(self) -> Array:
+        """Rotation matrix, `frame` -> periapsis frame: x to the asteroid, z along the angular momentum."""
+        state = self.track.states(np.zeros(1))[0]
+        h = np.cross(state[:3], state[3:])
+        x, z = state[:3] / np.linalg.norm(state[:3]), h / np.linalg.norm(h)
+        return np.stack([x, np.cross(z, x), z])
 
     @classmethod
     def hyperbolic(
