@@ -20,7 +20,7 @@ _HOME = {
     "Asteroid": "survey.asteroid",
     "Body": "aggregate.body",
     "Encounter": "sky.encounter",
-    "FlybyResult": "flybys",
+    "FlybyResult": "flyby_results",
     "FlybystabError": "errors",
     "Material": "aggregate.body",
     "Orbit": "sky.orbit",
@@ -45,7 +45,8 @@ if TYPE_CHECKING:
     from flybystab.aggregate.equilibrium import equilibrium
     from flybystab.aggregate.stability import stability
     from flybystab.errors import FlybystabError
-    from flybystab.flybys import FlybyResult, flyby, flyby_many, periapsis_axes
+    from flybystab.flyby_results import FlybyResult
+    from flybystab.flybys import flyby, flyby_many, periapsis_axes
     from flybystab.outcome import Verdict
     from flybystab.sky.encounter import Encounter
     from flybystab.sky.finder import find_encounters

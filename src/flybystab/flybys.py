@@ -5,22 +5,19 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import astropy.units as u
 import numpy as np
-from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.aggregate.body import YIELD_SURFACES, Body
-from flybystab.constants import G
-from flybystab.core.ellipsoid import gravity_coefficients
-from flybystab.core.motion import rigid_stress_components
-from flybystab.core.passage import Passage, passage
+from flybystab.aggregate.equilibrium import stress_components
+from flybystab.core.passage import REGIMES, Passage, passage
 from flybystab.core.rheology import required_friction
 from flybystab.core.statics import demand, overload
 from flybystab.errors import FlybystabError, InvalidInput, NotConverged
+from flybystab.flyby_results import FlybyError, FlybyResult, FlybyTable, History
 from flybystab.outcome import Verdict, bound_fraction, classed
 from flybystab.sky.encounter import TAIL, Encounter
 
@@ -31,149 +28,6 @@ TOLERANCE = 1e-8
 
 #: The looser run that measures the error allows this much more a step.
 LOOSER = 30.0
-
-
-@dataclass(frozen=True, eq=False)
-class History:
-    """The body and its orbit against time; every array has the same first dimension.
-
-    Attributes
-    ----------
-    time : Quantity (n,)
-        Since the start of the encounter.
-    time_from_periapsis : Quantity (n,)
-        Since closest approach.
-    distance : Quantity (n,)
-        Between the centres of asteroid and planet.
-    regime : ndarray of str (n,)
-        "rigid", "flowing" or "dispersed".
-    semi_axes : Quantity (n, 3)
-        Sorted, longest first.
-    spin : Quantity (n, 3)
-        Angular velocity in the frame of the encounter.
-    required_friction_angle : Quantity (n,)
-        Friction angle that the stress mobilises, with the body's cohesion; inf where none would do.
-    pressure : Quantity (n,)
-        Volume-averaged pressure, compression positive.
-    shape, velocity_gradient : Quantity (n, 3, 3)
-        ``S = 5 I/m`` and ``L`` in the frame of the encounter.
-    """
-
-    time: Quantity
-    time_from_periapsis: Quantity
-    distance: Quantity
-    regime: NDArray[np.str_]
-    semi_axes: Quantity
-    spin: Quantity
-    required_friction_angle: Quantity
-    pressure: Quantity
-    shape: Quantity
-    velocity_gradient: Quantity
-
-    def __len__(self) -> int:
-        return len(self.time)
-
-
-@dataclass(frozen=True)
-class FlybyError:
-    """Measured error of a result: its difference from a run with a 30 times larger step tolerance.
-
-    Attributes
-    ----------
-    semi_axes, spin, bound_fraction : float
-        Largest relative difference of the semi-axes, of the spin vector, absolute of the bound share.
-    required_friction_angle, event_times : Quantity
-        Absolute differences; nan if the two runs have different events.
-    verdict_agrees : bool
-        Whether both runs give the same verdict.
-    tide : float
-        Relative error of the stored tide, from the encounter.
-    """
-
-    semi_axes: float
-    spin: float
-    bound_fraction: float
-    required_friction_angle: Quantity
-    event_times: Quantity
-    verdict_agrees: bool
-    tide: float
-
-
-@dataclass(frozen=True, eq=False)
-class FlybyResult:
-    """What an encounter did to a body.
-
-    Attributes
-    ----------
-    verdict : Verdict
-        Compares equal to its text, ``r.verdict == "INTACT"``.
-    verdict_class : str or None
-        "M", "B" or "S" of Richardson et al. (1998) for bodies that lost mass.
-    bound_fraction : float
-        Share of the mass still bound (an upper bound, see :func:`flybystab.outcome.bound_fraction`).
-    semi_axes : Quantity (3,)
-        At the end, longest first.
-    spin : Quantity
-        Spin rate at the end.
-    spin_vector : Quantity (3,)
-        Angular velocity at the end, frame of the encounter.
-    onset_time, arrest_time : Quantity or None
-        First yield and last arrest since the start of the encounter; None if there was none.
-    end_time : Quantity
-        End of the run, since the start of the encounter.
-    max_required_friction_angle : Quantity
-        Largest friction angle that the body mobilises if it stays rigid throughout; inf if none would do.
-    margin : Quantity
-        Friction angle minus that: positive for a body that never yields.
-    required_cohesion : Quantity
-        NOT IN EQUILIBRIUM: the cohesion that would hold the body at its friction angle. Zero otherwise.
-    lode_angle : Quantity or None
-        Lode angle of the stress at first yield (-30 deg: extension, +30 deg: compression).
-    spin_ratio : float
-        Effective spin rate ``2 E/H`` after the encounter over that before it.
-    pole_change : Quantity
-        Angle between the angular momenta before and after; nan for a body without spin.
-    error : FlybyError or None
-        Measured error; None if it was not asked for.
-    verdict_by_surface : dict of str to Verdict
-        Verdicts with the other yield surfaces that were asked for, and with this one.
-    robust : bool or None
-        Whether the verdicts of the surfaces agree; None if only one was run.
-    events : tuple of (str, Quantity)
-        Every switch of regime, since the start of the encounter.
-    body : Body
-        The body afterwards.
-    history : History or None
-    modelled, left_out : tuple
-        What the encounter and the body model contain, and what they leave out with its share.
-    encounter : Encounter
-    """
-
-    verdict: Verdict
-    verdict_class: str | None
-    bound_fraction: float
-    semi_axes: Quantity
-    spin: Quantity
-    spin_vector: Quantity
-    onset_time: Quantity | None
-    arrest_time: Quantity | None
-    end_time: Quantity
-    max_required_friction_angle: Quantity
-    max_required_friction_time: Quantity
-    margin: Quantity
-    required_cohesion: Quantity
-    lode_angle: Quantity | None
-    spin_ratio: float
-    pole_change: Quantity
-    error: FlybyError | None
-    verdict_by_surface: dict[str, Verdict]
-    robust: bool | None
-    events: tuple[tuple[str, Quantity], ...]
-    body: Body
-    history: History | None = field(repr=False)
-    modelled: tuple[str, ...] = field(repr=False)
-    left_out: tuple[tuple[str, float], ...] = field(repr=False)
-    encounter: Encounter = field(repr=False)
 
 
 def flyby(
@@ -227,71 +81,96 @@ def flyby(
         raise InvalidInput("tolerance", tolerance, "a number in [1e-13, 1e-3]")
     rotation = periapsis_axes(encounter).T @ _rotation(attitude)
 
-    def run(surface: str, tol: float, keep: int = 0, unyielding: bool = False) -> Passage:
-        return _run(body, encounter, rotation, surface, tol, max_axis_ratio, keep, unyielding)
+    def carried(tol: float, keep: int = 0) -> _Carried:
+        return _carried(body, encounter, rotation, tol, max_axis_ratio, keep)
 
-    surface = body.material.yield_surface
-    holds, cohesion = _on_its_own(body)
-    # A body that cannot exist on its own is not carried on: its demand at the start is the answer.
-    main = run(surface, tolerance, 20_000 if history else 0, unyielding=not holds)
-    yielded = any(name == "onset" for name, _, _ in main.events)
-    needs = run(surface, tolerance, unyielding=True) if yielded else main
-    verdict, letter, bound = _verdict(main, encounter, body, holds)
-    verdicts = {surface: verdict}
+    main = carried(tolerance, 20_000 if history else 0)
+    run = main.run
+    verdicts = {body.material.yield_surface: main.verdict}
     for other in surfaces:
         if other not in YIELD_SURFACES:
             raise InvalidInput("surfaces", other, f"names out of {YIELD_SURFACES}")
-        if other != surface:
-            other_body = body.with_(material=body.material.with_(yield_surface=other))
-            other_run = run(other, tolerance)
-            verdicts[other] = _verdict(other_run, encounter, body, _on_its_own(other_body)[0])[0]
+        if other not in verdicts:
+            same = body.with_(material=body.material.with_(yield_surface=other))
+            same_run, holds = _run(same, encounter, rotation, tolerance, max_axis_ratio), _on_its_own(same)[0]
+            verdicts[other] = _verdict(same_run, encounter, same, holds)[0]
     measured = None
     if error:
-        loose = run(surface, min(1e-3, tolerance * LOOSER), unyielding=not holds)
-        loose_needs = run(surface, min(1e-3, tolerance * LOOSER), unyielding=True) if yielded else loose
-        loose_verdict = _verdict(loose, encounter, body, holds)
+        loose = carried(min(1e-3, tolerance * LOOSER))
+        difference = 0.0 if main.friction == loose.friction else abs(main.friction - loose.friction)
         measured = FlybyError(
-            semi_axes=float(np.max(np.abs(_axes(loose.shape) / _axes(main.shape) - 1.0))),
-            spin=_relative(_spin(loose.velocity_gradient), _spin(main.velocity_gradient)),
-            bound_fraction=abs(loose_verdict[2] - bound),
-            required_friction_angle=np.rad2deg(_difference(needs.max_friction, loose_needs.max_friction))
-            * u.deg,
-            event_times=_event_difference(main, loose) * u.s,
-            verdict_agrees=loose_verdict[0] == verdict,
+            semi_axes=float(np.max(np.abs(_axes(loose.run.shape) / _axes(run.shape) - 1.0))),
+            spin=_relative(_spin(loose.run.velocity_gradient), _spin(run.velocity_gradient)),
+            bound_fraction=abs(loose.bound - main.bound),
+            required_friction_angle=np.rad2deg(difference) * u.deg,
+            event_times=_event_difference(run, loose.run) * u.s,
+            verdict_agrees=loose.verdict == main.verdict,
             tide=encounter.tide_error,
         )
     start = encounter.t_start
-    onset = next((t for name, t, _ in main.events if name == "onset"), None)
-    arrests = [t for name, t, _ in main.events if name in ("arrest", "jam")]
-    lode = next((angle for name, _, angle in main.events if name == "onset"), None)
-    margin = body.material.phi - needs.max_friction
-    spin_ratio, pole_change = _spin_change(body, rotation, main)
+    onset = next((t for name, t, _ in run.events if name == "onset"), None)
+    arrests = [t for name, t, _ in run.events if name in ("arrest", "jam")]
+    lode = next((angle for name, _, angle in run.events if name == "onset"), None)
+    spin_ratio, pole_change = _spin_change(body, rotation, run)
     return FlybyResult(
-        verdict=verdict,
-        verdict_class=letter,
-        bound_fraction=bound,
-        semi_axes=_axes(main.shape) * u.m,
-        spin=float(np.linalg.norm(_spin(main.velocity_gradient))) * u.rad / u.s,
-        spin_vector=_spin(main.velocity_gradient) * u.rad / u.s,
+        verdict=main.verdict,
+        verdict_class=main.letter,
+        bound_fraction=main.bound,
+        semi_axes=_axes(run.shape) * u.m,
+        spin=float(np.linalg.norm(_spin(run.velocity_gradient))) * u.rad / u.s,
+        spin_vector=_spin(run.velocity_gradient) * u.rad / u.s,
         onset_time=None if onset is None else (onset - start) * u.s,
         arrest_time=(arrests[-1] - start) * u.s if arrests else None,
-        end_time=(main.time - start) * u.s,
-        max_required_friction_angle=np.rad2deg(needs.max_friction) * u.deg,
-        max_required_friction_time=(needs.max_friction_time - start) * u.s,
-        margin=np.rad2deg(margin) * u.deg,
-        required_cohesion=(0.0 if holds else cohesion) * u.Pa,
+        end_time=(run.time - start) * u.s,
+        max_required_friction_angle=np.rad2deg(main.friction) * u.deg,
+        max_required_friction_time=(main.friction_time - start) * u.s,
+        margin=np.rad2deg(body.material.phi - main.friction) * u.deg,
+        required_cohesion=main.cohesion * u.Pa,
         lode_angle=None if lode is None else np.rad2deg(lode) * u.deg,
         spin_ratio=spin_ratio,
         pole_change=pole_change * u.deg,
         error=measured,
         verdict_by_surface=verdicts,
         robust=None if len(verdicts) == 1 else len(set(verdicts.values())) == 1,
-        events=tuple((name, (t - start) * u.s) for name, t, _ in main.events),
-        body=_body_after(body, main, yielded),
-        history=_history(main, encounter, body) if history else None,
+        events=tuple((name, (t - start) * u.s) for name, t, _ in run.events),
+        body=_body_after(body, run, onset is not None),
+        history=_history(run, encounter, body) if history else None,
         modelled=(*encounter.forces, *_modelled(body)),
         left_out=encounter.left_out,
         encounter=encounter,
+    )
+
+
+class _Carried(NamedTuple):
+    """A run with its verdict and the friction that the body would need to stay rigid throughout."""
+
+    run: Passage
+    verdict: Verdict
+    letter: str | None
+    bound: float
+    friction: float  # rad
+    friction_time: float  # s, clock of the tide
+    cohesion: float  # Pa; what a body that cannot exist on its own lacks, else zero
+
+
+def _carried(
+    body: Body,
+    encounter: Encounter,
+    rotation: Array,
+    tolerance: float,
+    max_axis_ratio: float,
+    keep: int = 0,
+) -> _Carried:
+    """Carry a body through an encounter and judge it; `rotation` takes body axes to the encounter's frame."""
+    holds, cohesion = _on_its_own(body)
+    # A body that cannot exist on its own is not carried on: its demand at the start is the answer.
+    run = _run(body, encounter, rotation, tolerance, max_axis_ratio, keep, unyielding=not holds)
+    needs = run
+    if any(name == "onset" for name, _, _ in run.events):
+        needs = _run(body, encounter, rotation, tolerance, max_axis_ratio, unyielding=True)
+    lacks = 0.0 if holds else cohesion
+    return _Carried(
+        run, *_verdict(run, encounter, body, holds), needs.max_friction, needs.max_friction_time, lacks
     )
 
 
@@ -299,7 +178,6 @@ def _run(
     body: Body,
     encounter: Encounter,
     rotation: Array,
-    surface: str,
     tolerance: float,
     max_axis_ratio: float,
     keep: int = 0,
@@ -322,7 +200,7 @@ def _run(
         phi=material.phi,
         cohesion=material.c_pa,
         dilatancy=material.dilatancy,
-        surface=YIELD_SURFACES.index(surface),
+        surface=material.surface_code,
         brittle=material.brittle,
         unyielding=unyielding,
         tolerance=tolerance,
@@ -335,27 +213,6 @@ def _run(
             f"{result.regime} regime after {result.steps} steps (tolerance {tolerance:g})"
         )
     return result
-
-
-@dataclass(frozen=True, eq=False)
-class FlybyTable:
-    """Results of many encounters as arrays; attributes as in :class:`FlybyResult`, first dimension n.
-
-    A row that could not be computed has the verdict "FAILED", its reason in `failure` and nan elsewhere.
-    """
-
-    verdict: NDArray[np.str_]
-    bound_fraction: Array
-    semi_axes: Quantity
-    spin: Quantity
-    max_required_friction_angle: Quantity
-    margin: Quantity
-    spin_ratio: Array
-    pole_change: Quantity
-    failure: NDArray[np.str_]
-
-    def __len__(self) -> int:
-        return len(self.verdict)
 
 
 def flyby_many(
@@ -431,18 +288,12 @@ def _row(
     body: Body, encounter: Encounter, attitude: Any, tolerance: float, max_axis_ratio: float
 ) -> tuple[str, Array]:
     rotation = periapsis_axes(encounter).T @ _rotation(attitude)
-    surface = body.material.yield_surface
-    holds = _on_its_own(body)[0]
-    run = _run(body, encounter, rotation, surface, tolerance, max_axis_ratio, unyielding=not holds)
-    needed = run.max_friction
-    if any(name == "onset" for name, _, _ in run.events):
-        needed = _run(
-            body, encounter, rotation, surface, tolerance, max_axis_ratio, unyielding=True
-        ).max_friction
-    verdict, _, bound = _verdict(run, encounter, body, holds)
+    found = _carried(body, encounter, rotation, tolerance, max_axis_ratio)
+    run = found.run
     ratio, turn = _spin_change(body, rotation, run)
     spin = float(np.linalg.norm(_spin(run.velocity_gradient)))
-    return str(verdict), np.array([bound, *_axes(run.shape), spin, np.rad2deg(needed), ratio, turn])
+    values = [found.bound, *_axes(run.shape), spin, np.rad2deg(found.friction), ratio, turn]
+    return str(found.verdict), np.array(values)
 
 
 def periapsis_axes(encounter: Encounter) -> Array:
@@ -450,10 +301,7 @@ def periapsis_axes(encounter: Encounter) -> Array:
 
     An attitude ``A`` (body axes -> ICRF) of a real encounter is ``periapsis_axes(encounter) @ A`` to `flyby`.
     """
-    r = encounter.position(0.0)[0]
-    h = np.cross(r, encounter.velocity(0.0)[0])
-    x, z = r / np.linalg.norm(r), h / np.linalg.norm(h)
-    return np.stack([x, np.cross(z, x), z])
+    return encounter.periapsis_axes
 
 
 def _rotation(attitude: Any) -> Array:
@@ -473,11 +321,7 @@ def _rotation(attitude: Any) -> Array:
 
 def _on_its_own(body: Body) -> tuple[bool, float]:
     """Whether the body can exist far from any planet, and the cohesion (Pa) that it needs there."""
-    s = body.axes**2
-    gravity = -2.0 * np.pi * G * body.rho * np.array(gravity_coefficients(*s))
-    stress = np.zeros(6)
-    rigid_stress_components(np.zeros(6), body.omega, s, gravity, stress)
-    stress *= body.rho / 5.0
+    stress = stress_components(body)
     m = body.material
     excess = overload(m.surface_code, m.phi, m.c_pa, stress)
     holds = excess <= 1e-12 * float(np.abs(stress).max())
@@ -557,10 +401,6 @@ def _relative(a: Array, b: Array) -> float:
     return float(np.linalg.norm(a - b) / norm) if norm > 0.0 else float(np.linalg.norm(a))
 
 
-def _difference(a: float, b: float) -> float:
-    return 0.0 if a == b else abs(a - b)
-
-
 def _event_difference(a: Passage, b: Passage) -> float:
     if [e[0] for e in a.events] != [e[0] for e in b.events]:
         return float("nan")
@@ -611,7 +451,7 @@ def _history(run: Passage, encounter: Encounter, body: Body) -> History | None:
         time=(h["time"] - encounter.t_start) * u.s,
         time_from_periapsis=h["time"] * u.s,
         distance=(encounter.radius(h["time"]) * u.m).to(u.km),
-        regime=np.array(["rigid", "flowing", "dispersed", "fluid"])[h["regime"]],
+        regime=np.array(REGIMES)[h["regime"]],
         semi_axes=_axes(h["shape"]) * u.m,
         spin=_spin(h["velocity_gradient"]) * u.rad / u.s,
         required_friction_angle=np.rad2deg(required) * u.deg,

@@ -11,7 +11,7 @@ from astropy.table import QTable
 from astropy.time import Time
 
 from flybystab import __version__
-from flybystab.flybys import FlybyResult
+from flybystab.flyby_results import FlybyResult
 from flybystab.sky.encounter import Encounter
 from flybystab.spin import SpinSample
 

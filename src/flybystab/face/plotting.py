@@ -14,7 +14,7 @@ import astropy.units as u
 import numpy as np
 
 from flybystab.errors import InvalidInput
-from flybystab.flybys import FlybyResult, History
+from flybystab.flyby_results import FlybyResult, History
 from flybystab.sky.encounter import Encounter
 
 BLACK, ORANGE, SKY, GREEN, BLUE, RED = "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00"

@@ -22,7 +22,7 @@ from flybystab import __version__
 from flybystab.face.plotting import BLUE, flyby_panels
 from flybystab.face.scene import scene_plot
 from flybystab.face.text import MEANING, angle
-from flybystab.flybys import FlybyResult
+from flybystab.flyby_results import FlybyResult
 from flybystab.sky.ephemeris import ephemeris
 from flybystab.spin import SpinSample
 from flybystab.survey.asteroid import Asteroid

@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 
 from flybystab.errors import InvalidInput
 from flybystab.face.plotting import BLACK, BLUE, ORANGE, RED
-from flybystab.flybys import FlybyResult, History, periapsis_axes
+from flybystab.flyby_results import FlybyResult, History
+from flybystab.flybys import periapsis_axes
 
 Array = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ import astropy.units as u
 import numpy as np
 
 from flybystab.aggregate.equilibrium import Equilibrium
-from flybystab.flybys import FlybyResult
+from flybystab.flyby_results import FlybyResult
 from flybystab.sky.encounter import Encounter
 from flybystab.spin import SpinSample
 
