@@ -1,0 +1,98 @@
+"""What several commands share: arguments, dates, asteroids, and the two ways of printing a result."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+from collections.abc import Callable
+from typing import Any
+
+from flybystab.errors import InvalidInput
+
+#: Other yield surfaces that a verdict is checked on.
+OTHER_SURFACES = ("drucker-prager-extension", "mohr-coulomb", "matsuoka-nakai")
+
+
+def material_arguments(sub: argparse.ArgumentParser) -> None:
+    """Add the material: friction, cohesion, yield surface."""
+    sub.add_argument("--friction", type=float, default=35.0, metavar="DEG", help="friction angle (35 deg)")
+    sub.add_argument("--cohesion", type=float, default=0.0, metavar="PA", help="cohesion (0 Pa)")
+    surface_argument(sub)
+
+
+def surface_argument(sub: argparse.ArgumentParser) -> None:
+    """Add the yield surface."""
+    sub.add_argument("--surface", default="drucker-prager", help="yield surface (drucker-prager)")
+
+
+def dates_arguments(sub: argparse.ArgumentParser, start: str, stop: str) -> None:
+    """Add the first and the last date."""
+    sub.add_argument("--from", dest="start", default=start, metavar="DATE", help=f"TDB ({start})")
+    sub.add_argument("--to", dest="stop", default=stop, metavar="DATE", help=f"TDB ({stop})")
+
+
+def span_arguments(sub: argparse.ArgumentParser, start: str, stop: str) -> None:
+    """Add what a search for encounters needs: dates, planets, largest distance."""
+    dates_arguments(sub, start, stop)
+    sub.add_argument("--planet", action="append", help="planet to look for; repeat for more (earth)")
+    sub.add_argument("--within", type=float, default=0.05, metavar="AU", help="largest distance (0.05 au)")
+
+
+def figure_argument(sub: argparse.ArgumentParser) -> None:
+    """Add the file of a figure."""
+    sub.add_argument("--output", metavar="FILE", help="write a figure (.png, .pdf, .svg)")
+
+
+def show(options: argparse.Namespace, document: Callable[[], Any], lines: Callable[[], list[str]]) -> None:
+    """Print a result: one JSON document with ``--json``, else lines for people."""
+    if options.json:
+        print(json.dumps(document(), indent=1, allow_nan=False))
+    else:
+        print("\n".join(_coloured(line) for line in lines()))
+
+
+def _coloured(line: str) -> str:
+    """The verdict in bold, on a terminal that wants colours."""
+    if not line.startswith("verdict") or os.environ.get("NO_COLOR") or not sys.stdout.isatty():
+        return line
+    return f"\033[1m{line}\033[0m"
+
+
+def tdb(text: str, name: str) -> Any:
+    """A date in words as an astropy Time."""
+    from astropy.time import Time
+
+    try:
+        return Time(text, scale="tdb")
+    except ValueError:
+        raise InvalidInput(name, text, "a date such as 2029-04-13, read as TDB") from None
+
+
+def asteroid_of(options: argparse.Namespace) -> Any:
+    """The asteroid named, with the material asked for."""
+    import astropy.units as u
+
+    from flybystab.aggregate.body import Material
+    from flybystab.survey.asteroid import Asteroid
+
+    material = Material(
+        friction_angle=options.friction * u.deg,
+        cohesion=options.cohesion * u.Pa,
+        yield_surface=options.surface,
+    )
+    return Asteroid.from_catalogue(options.name, material=material)
+
+
+def check_picture(path: str | None, endings: tuple[str, ...] = (".png", ".pdf", ".svg")) -> None:
+    """Find out that a picture (or page) cannot be written before computing it."""
+    if path is None:
+        return
+    from pathlib import Path
+
+    target = Path(path)
+    if target.suffix.lower() not in endings:
+        raise InvalidInput("--output", path, f"a file that ends in {' or '.join(endings)}")
+    if not target.parent.is_dir() or not os.access(target.parent, os.W_OK):
+        raise InvalidInput("--output", path, "a folder that exists and can be written")

@@ -1,0 +1,45 @@
+"""``flybystab scenario FILE.toml``: a scripted encounter from a TOML file."""
+
+from __future__ import annotations
+
+import argparse
+
+from flybystab.face.commands.common import OTHER_SURFACES, check_picture, figure_argument, show
+
+HELP = "a scripted encounter from a TOML file"
+EXAMPLE = "flybystab scenario examples/disruption_p2.toml"
+
+
+def arguments(sub: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    sub.add_argument("file", help="scenario file")
+    figure_argument(sub)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Answer the command."""
+    from flybystab.face import document, text
+    from flybystab.face.scenario import scenario
+    from flybystab.flybys import flyby
+
+    check_picture(options.output)
+    script = scenario(options.file)
+    figure = options.output or script.figure
+    check_picture(figure)
+    others = [s for s in (*OTHER_SURFACES, "drucker-prager") if s != script.body.material.yield_surface]
+    result = flyby(script.body, script.encounter, script.attitude, surfaces=others)
+    if figure:
+        from flybystab.face.plotting import flyby_figure
+
+        flyby_figure(result, script.title, figure)
+    show(
+        options,
+        lambda: document.flyby_document(result, title=script.title, figure=figure),
+        lambda: [
+            f"scenario   {script.title}",
+            *text.encounter_lines(script.encounter),
+            *text.flyby_lines(result),
+            *text.model_lines(result),
+            *([f"figure     {figure}"] if figure else []),
+        ],
+    )
