@@ -3,7 +3,7 @@
 PYTHON ?= python3
 PY = .venv/bin/python
 
-.PHONY: demo test check docs bench clean
+.PHONY: demo test check docs dist clean
 
 .venv/bin/python:
 	$(PYTHON) -m venv .venv
@@ -35,6 +35,12 @@ check: .venv/.test
 
 docs: .venv/.docs
 	$(PY) -m sphinx -W --keep-going -b html -q docs out/docs
+
+# Wheel and sdist, installed in clean environments and tried outside the repository.
+dist: .venv/.test
+	rm -rf dist
+	$(PY) -m build --outdir dist . > /dev/null
+	$(PY) scripts/smoke_test.py dist
 
 clean:
 	rm -rf .venv out build dist src/*.egg-info
