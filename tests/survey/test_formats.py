@@ -1,6 +1,7 @@
 """Orbit tables from elsewhere."""
 
 import os
+import pickle
 from pathlib import Path
 
 import astropy.units as u
@@ -24,6 +25,7 @@ END_OF_HEADER
  MAG  24.047  0.150
  NGR   0.00000000000000E+00 -2.9E-04
 """
+KE1_ROW = "name,epoch_jd_tdb,a_au,e,i_deg,node_deg,peri_deg,M_deg\nX,2461000.5,1.3,.3,1,2,3,4\n"
 
 
 def test_sbdb_query(tmp_path):
@@ -83,3 +85,66 @@ def test_agencies_agree_on_apophis_and_bennu():
         assert float(a.row["i_deg"]) == pytest.approx(float(ours.row["i_deg"]), abs=5e-3)
         if a.row["epoch_jd_tdb"] == ours.row["epoch_jd_tdb"]:
             assert float(a.row["a_au"]) == pytest.approx(float(ours.row["a_au"]), abs=1e-8)
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="the source tables are not here")
+@pytest.mark.parametrize("name", ["99942", "101955", "433", "65803", "2024YR4"])
+def test_neocc_covariance_has_the_published_sigmas(name):
+    path = SHARED / "neocc" / f"{name}.ke1"
+    (a,) = catalogue(path)
+    covariance = a.orbit.covariance
+    rms = next(line.split()[2:] for line in path.read_text().splitlines() if line.startswith("! RMS"))
+    units = [u.au, u.one, *[u.deg] * 4, 1e-10 * u.au / u.d**2]
+    published = [(float(x) * k).si.value for x, k in zip(rms, units[: len(rms)], strict=True)]
+    np.testing.assert_allclose(covariance.sigma, published, rtol=1e-4)
+    assert covariance.names == ("a", "e", "i", "node", "peri", "M", "A2")[: len(rms)]
+    assert covariance.correlated
+    # The correlations that the file prints for readers are those of the matrix.
+    upper = [c for line in path.read_text().splitlines() if line.startswith(" COR") for c in line.split()[1:]]
+    ours = covariance.matrix / np.outer(covariance.sigma, covariance.sigma)
+    np.testing.assert_allclose(ours[np.triu_indices(len(rms))], np.array(upper, dtype=float), atol=1e-9)
+
+
+def test_neocc_covariance_that_does_not_fit_is_refused(tmp_path):
+    path = tmp_path / "yr4.ke1"
+    path.write_text(KE1 + " COV 1.0 2.0 3.0\n")
+    with pytest.raises(InvalidInput, match="COV"):
+        catalogue(path)
+
+
+def test_sbdb_answer_with_its_covariance(tmp_path):
+    from importlib import resources
+
+    text = resources.files("flybystab.data").joinpath("covariances", "99942.json").read_text()
+    path = tmp_path / "apophis.json"
+    path.write_text(text)
+    (a,) = catalogue(path)
+    assert (a.name, a.number, a.designation, a.epoch.jd) == ("Apophis", 99942, "2004 MN4", 2461000.5)
+    assert a.quantity("A1_au_d2").value == 5e-13
+    covariance = pickle.loads(pickle.dumps(a)).orbit.covariance
+    assert covariance.names == ("e", "q", "tp", "node", "peri", "i", "A1", "A2")
+    assert covariance.epoch.jd == 2459215.5
+    days = covariance.sigma[covariance.names.index("tp")] / 86400
+    assert days == pytest.approx(6.49530087949757e-07, rel=1e-9)
+    assert np.rad2deg(covariance.sigma[3]) == pytest.approx(3.06869659837637e-06, rel=1e-9)
+    assert covariance.values[2] == pytest.approx((2459101.039422462638 - 2459215.5) * 86400, abs=1e-3)
+    path.write_text(text.replace('"tp"', '"tperi"'))
+    with pytest.raises(InvalidInput, match="tp"):
+        catalogue(path)
+    path.write_text("{}")
+    with pytest.raises(InvalidInput, match="SBDB"):
+        catalogue(path)
+
+
+def test_sigmas_alone_are_marked(tmp_path):
+    ours = Asteroid.from_catalogue("Toutatis")
+    covariance = ours.orbit.covariance
+    assert not covariance.correlated
+    assert "without correlations" in covariance.source
+    np.testing.assert_allclose(covariance.sigma[0], ours.quantity("sigma_a_au").to_value(u.m))
+    assert Asteroid.from_catalogue("Apophis").orbit.covariance.correlated
+    assert Asteroid.from_catalogue("Bennu").orbit.covariance.source == "ESA NEOCC (101955.ke1)"
+    path = tmp_path / "plain.csv"
+    path.write_text(KE1_ROW)
+    (a,) = catalogue(path)
+    assert a.orbit.covariance is None

@@ -11,55 +11,19 @@ from astropy.time import Time
 from astropy.units import Quantity
 from numpy.typing import NDArray
 
-from flybystab.constants import DAY, OBLIQUITY_J2000
+from flybystab.constants import DAY
 from flybystab.errors import InvalidInput, UnknownName
+from flybystab.sky.covariance import Covariance
+from flybystab.sky.elements import GM_SUN, ecliptic_to_icrf, state_from_elements
 from flybystab.sky.ephemeris import BODIES, Ephemeris, Window, ephemeris
 from flybystab.sky.forces import FORCES, NonGravitational, model
-from flybystab.sky.kepler import states_at_times
-from flybystab.sky.planets import PLANETS
 from flybystab.sky.reboundry import Flight
 from flybystab.units import to_si
 
 Array = NDArray[np.float64]
 
-#: Sun's GM behind the osculating elements of JPL (DE440/441), m3/s2.
-GM_SUN = PLANETS["sun"].gm
-
 _AU_D2 = u.au / u.d**2
 _ZERO = 0.0 * _AU_D2
-
-
-def ecliptic_to_icrf() -> Array:
-    """Rotation from the J2000 ecliptic of small-body elements to ICRF axes."""
-    c, s = np.cos(OBLIQUITY_J2000), np.sin(OBLIQUITY_J2000)
-    return np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
-
-
-def state_from_elements(
-    q: float, e: float, i: float, node: float, peri: float, since: float, gm: float = GM_SUN
-) -> Array:
-    """Heliocentric ICRF state (m, m/s), shape (6,), from elements of the J2000 ecliptic.
-
-    Parameters
-    ----------
-    q : float
-        Perihelion distance, m.
-    e : float
-        Eccentricity; any conic.
-    i, node, peri : float
-        Inclination, longitude of the node, argument of perihelion, rad.
-    since : float
-        Time since perihelion, s.
-    gm : float
-        GM of the Sun that the elements were made with, m3/s2.
-    """
-    x, y, vx, vy = states_at_times(gm, q, e - 1.0, np.array([since]))[0]
-    cn, sn, ci, si = np.cos(node), np.sin(node), np.cos(i), np.sin(i)
-    cw, sw = np.cos(peri), np.sin(peri)
-    p = np.array([cn * cw - sn * sw * ci, sn * cw + cn * sw * ci, sw * si])
-    w = np.array([-cn * sw - sn * cw * ci, -sn * sw + cn * cw * ci, cw * si])
-    turn = ecliptic_to_icrf()
-    return np.concatenate([turn @ (x * p + y * w), turn @ (vx * p + vy * w)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,8 +44,8 @@ class Orbit:
         A1, A2, A3 and their law of distance.
     name : str
         Free text, shown in tables.
-    covariance : object or None
-        Uncertainty of the elements, carried along; nothing here samples it yet.
+    covariance : Covariance or None
+        How well the elements are known; see :meth:`clones`.
     """
 
     epoch: Time
@@ -90,7 +54,7 @@ class Orbit:
     centre: str = "sun"
     nongrav: NonGravitational = field(default_factory=NonGravitational)
     name: str = ""
-    covariance: Any = None
+    covariance: Covariance | None = None
 
     @classmethod
     def from_elements(
@@ -107,7 +71,7 @@ class Orbit:
         A3: Quantity = _ZERO,
         law: str = "asteroid",
         name: str = "",
-        covariance: Any = None,
+        covariance: Covariance | None = None,
     ) -> Orbit:
         """Orbit from heliocentric osculating elements, J2000 ecliptic and equinox (as JPL gives them).
 
@@ -123,6 +87,10 @@ class Orbit:
             Radial, transverse and normal non-gravitational acceleration at 1 au.
         law : {"asteroid", "comet"}
             Dependence of A1, A2, A3 on distance.
+        name : str
+            Shown in tables.
+        covariance : Covariance, optional
+            Of any set of elements at any epoch.
 
         Raises
         ------
@@ -160,7 +128,7 @@ class Orbit:
         A3: Quantity = _ZERO,
         law: str = "asteroid",
         name: str = "",
-        covariance: Any = None,
+        covariance: Covariance | None = None,
     ) -> Orbit:
         """Orbit from a state.
 
@@ -213,7 +181,9 @@ class Orbit:
             epsilon,
         )
 
-    def at(self, time: Time, centre: str = "sun", ephemeris: str | None = None) -> tuple[Quantity, Quantity]:
+    def at(
+        self, time: Time, centre: str = "sun", ephemeris: str | Ephemeris | None = None
+    ) -> tuple[Quantity, Quantity]:
         """Position and velocity at another time, ICRF, relative to `centre`, with all forces.
 
         Raises
@@ -231,6 +201,71 @@ class Orbit:
                 raise UnknownName("centre", centre, [], known=f"(known: ssb, {', '.join(BODIES)})")
             state = state - window.states(BODIES.index(where), np.array([t]))[0]
         return (state[:3] * u.m).to(u.km), (state[3:] * u.m / u.s).to(u.km / u.s)
+
+    def clones(self, n: int, seed: int = 0, ephemeris: str | Ephemeris | None = None) -> tuple[Orbit, ...]:
+        """Orbits drawn from the covariance, at its epoch.
+
+        The deviations from the mean of the covariance are added to this orbit, taken to the epoch of the
+        covariance with all forces where that differs; A1, A2, A3 are drawn along where they were estimated.
+
+        Parameters
+        ----------
+        n : int
+            How many.
+        seed : int
+            Clone k depends on the seed and k alone.
+        ephemeris : str or Ephemeris, optional
+            For the way to the epoch of the covariance.
+
+        Raises
+        ------
+        InvalidInput
+            The orbit has no covariance.
+        OutOfSpan
+            The ephemeris does not cover the epoch of the covariance.
+        """
+        covariance = self._known("clones")
+        parameters, _ = covariance.samples(_count(n), seed)
+        return self._deviated(*covariance.deviations(parameters), "clone", ephemeris)
+
+    def sigma_points(self, ephemeris: str | Ephemeris | None = None) -> tuple[tuple[Orbit, ...], ...]:
+        """Pairs of orbits, plus and minus one sigma along each principal axis of the correlations.
+
+        Half of the difference that a pair makes anywhere is a column F of the linear map: the covariance
+        there is ``F F^T``. Half of their sum less the nominal measures what the linear map leaves out.
+        """
+        covariance = self._known("sigma points")
+        ways = covariance.factor.T
+        steps = np.concatenate([covariance.values + ways, covariance.values - ways])
+        found = self._deviated(*covariance.deviations(steps), "sigma point", ephemeris)
+        return tuple(zip(found[: len(ways)], found[len(ways) :], strict=True))
+
+    def _known(self, what: str) -> Covariance:
+        if not isinstance(self.covariance, Covariance):
+            raise InvalidInput("covariance", self.covariance, f"a Covariance: {what} are drawn from it")
+        return self.covariance
+
+    def _deviated(
+        self, states: Array, pushes: Array, label: str, ephemeris: str | Ephemeris | None
+    ) -> tuple[Orbit, ...]:
+        """The orbit at the epoch of its covariance plus each of the deviations, SI, (m, 6) and (m, 3)."""
+        covariance = self._known(label)
+        position, velocity, centre = self.position, self.velocity, self.centre
+        if abs(seconds(covariance.epoch, self.epoch)) > 1e-3:
+            centre = "sun"
+            position, velocity = self.at(covariance.epoch, centre, ephemeris)
+        r, v, a = position.to_value(u.m), velocity.to_value(u.m / u.s), np.array(self.nongrav.a)
+        return tuple(
+            Orbit(
+                covariance.epoch,
+                (r + ds[:3]) * u.m,
+                (v + ds[3:]) * u.m / u.s,
+                centre,
+                NonGravitational(tuple((a + da).tolist()), self.nongrav.law),
+                f"{self.name} {label} {k}".strip(),
+            )
+            for k, (ds, da) in enumerate(zip(states, pushes, strict=True))
+        )
 
 
 def default_forces(orbit: Orbit, *bodies: str) -> tuple[str, ...]:
@@ -266,6 +301,12 @@ def _epoch(epoch: Any) -> Time:
     if not isinstance(epoch, Time) or epoch.shape != () or not np.isfinite(epoch.jd):
         raise InvalidInput("epoch", epoch, "one astropy Time")
     return epoch.tdb
+
+
+def _count(n: int) -> int:
+    if isinstance(n, bool) or not isinstance(n, int | np.integer) or n < 1:
+        raise InvalidInput("n", n, "a whole number of 1 or more")
+    return int(n)
 
 
 def _angle(value: Any) -> Any:

@@ -20,8 +20,10 @@ from astropy.units import Quantity
 from flybystab.aggregate.body import Body, Material
 from flybystab.errors import InvalidInput
 from flybystab.survey.attitude import attitude_matrix, ecliptic_direction, free_spin, tumbling_state
+from flybystab.survey.covariances import embedded_covariance
 
 if TYPE_CHECKING:
+    from flybystab.sky.covariance import Covariance
     from flybystab.sky.orbit import Orbit
 
 #: Version of the embedded table: the date of its newest source.
@@ -66,6 +68,7 @@ TEXTS = (
 )
 
 _ORBIT = ("epoch_jd_tdb", "a_au", "e", "i_deg", "node_deg", "peri_deg", "M_deg")
+_ORBIT_SI = np.array([UNITS[c].si.scale for c in _ORBIT[1:]])
 #: Columns of an orbit: kept as they are when a row is completed from another.
 _ORBITAL = frozenset(
     {*_ORBIT, "A1_au_d2", "A2_au_d2", "A3_au_d2", "frame", "sigma_source", "nongrav_source"}
@@ -96,11 +99,14 @@ class Asteroid:
         What the body is made of: a choice, not catalogue data. 35 degrees of friction by default.
     file : str
         Where the row comes from.
+    covariance : Covariance or None
+        How well the orbit is known, where a file says so; else see :attr:`orbit`.
     """
 
     row: Mapping[str, str]
     material: Material = field(default_factory=Material)
     file: str = f"embedded catalogue {CATALOGUE_DATE}"
+    covariance: Covariance | None = field(default=None, repr=False)
 
     @classmethod
     def from_catalogue(cls, name: str | int, material: Material | None = None) -> Asteroid:
@@ -135,7 +141,7 @@ class Asteroid:
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Without what was built from the row: it is rebuilt where it is needed.
-        return Asteroid, (dict(self.row), self.material, self.file)
+        return Asteroid, (dict(self.row), self.material, self.file, self.covariance)
 
     def __repr__(self) -> str:
         return f"<Asteroid {self.label}>"
@@ -244,7 +250,11 @@ class Asteroid:
 
     @cached_property
     def orbit(self) -> Orbit:
-        """The orbit, from the elements of the row with every digit, and A1, A2, A3 (zero where not known)."""
+        """The orbit, from the elements of the row with every digit, and A1, A2, A3 (zero where not known).
+
+        Its covariance is the asteroid's own; else the one embedded for it; else the diagonal of the row's
+        1-sigmas, marked as uncorrelated; else None.
+        """
         epoch = self.epoch
         a, e, i, node, peri, mean = (self.quantity(c) for c in _ORBIT[1:])
         a1, a2, a3 = (
@@ -265,6 +275,28 @@ class Asteroid:
             A2=a2,
             A3=a3,
             name=self.name,
+            covariance=self._covariance(epoch),
+        )
+
+    def _covariance(self, epoch: Time) -> Covariance | None:
+        if self.covariance is not None:
+            return self.covariance
+        if self.file.startswith("embedded") and (known := embedded_covariance(self.row.get("number", ""))):
+            return known
+        sigmas = tuple("sigma_" + c for c in _ORBIT[1:])
+        if not self.knows(*sigmas):
+            return None
+        from flybystab.sky.covariance import SETS, Covariance
+
+        sigma = np.array([self._number(c) for c in sigmas]) * _ORBIT_SI
+        source = self.row.get("sigma_source") or self.row.get("orbit_source") or self.file
+        return Covariance(
+            epoch,
+            SETS["keplerian"],
+            np.array([self._number(c) for c in _ORBIT[1:]]) * _ORBIT_SI,
+            np.diag(sigma**2),
+            f"1-sigmas without correlations, {source}",
+            correlated=False,
         )
 
     @property

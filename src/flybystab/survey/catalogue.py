@@ -18,7 +18,7 @@ from astropy.table import QTable
 
 from flybystab.errors import InvalidInput, UnknownName
 from flybystab.survey.asteroid import CATALOGUE_DATE, TEXTS, UNITS, Asteroid, key_of
-from flybystab.survey.formats import from_mpc, from_neocc, from_sbdb, kind_of
+from flybystab.survey.formats import from_mpc, from_neocc, from_sbdb, from_sbdb_answer, kind_of
 
 __all__ = ["CATALOGUE_DATE", "TEXTS", "UNITS", "Asteroid", "catalogue", "catalogue_table", "find", "key_of"]
 
@@ -70,7 +70,8 @@ def catalogue(path: str | Path | None = None) -> tuple[Asteroid, ...]:
     """All asteroids of the embedded catalogue, or of a file, in their order.
 
     A file has the catalogue's columns, or those of a JPL SBDB query or of an MPC table
-    (:mod:`flybystab.survey.formats`), and may be gzipped; or it is one NEOCC orbit (``.ke1``). It needs only
+    (:mod:`flybystab.survey.formats`), and may be gzipped; or it is one orbit with its
+    covariance, of NEOCC (``.ke1``) or of the SBDB API (``.json``). It needs only
     the columns that are used: a name, ``epoch_jd_tdb, a_au, e, i_deg, node_deg, peri_deg, M_deg`` for orbits,
     ``semi_axis_{a,b,c}_m, density_kg_m3, spin_period_h`` for bodies.
 
@@ -88,8 +89,10 @@ def catalogue(path: str | Path | None = None) -> tuple[Asteroid, ...]:
         text = (gzip.decompress(raw) if raw[:2] == b"\x1f\x8b" else raw).decode("utf-8")
     except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
         raise InvalidInput("catalogue file", path, f"a readable CSV file ({error})") from None
-    if Path(path).suffix == ".ke1":
-        return (Asteroid(from_neocc(text, Path(path).name), file=str(path)),)
+    one = {".ke1": from_neocc, ".json": from_sbdb_answer}.get(Path(path).suffix)
+    if one is not None:
+        row, covariance = one(text, Path(path).name)
+        return (Asteroid(row, file=str(path), covariance=covariance),)
     return _read(text, str(path))
 
 

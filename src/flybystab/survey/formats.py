@@ -1,4 +1,4 @@
-"""Tables of orbits from elsewhere, read as catalogue rows: JPL SBDB queries, MPC, NEOCC.
+"""Tables of orbits from elsewhere, read as catalogue rows: JPL SBDB queries and answers, MPC, NEOCC.
 
 Only the columns that are understood are used. A size, shape or spin that such a table does not give is drawn
 (:mod:`flybystab.survey.population`), or taken from the embedded catalogue by `with_physical_data`.
@@ -6,12 +6,14 @@ Only the columns that are understood are used. A size, shape or spin that such a
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from flybystab.errors import InvalidInput
 
 if TYPE_CHECKING:
+    from flybystab.sky.covariance import Covariance
     from flybystab.survey.asteroid import Asteroid
 
 FRAME = "heliocentric, ecliptic J2000, TDB"
@@ -98,13 +100,20 @@ def from_mpc(row: Mapping[str, str], file: str) -> dict[str, str]:
     return out | {"frame": FRAME, "orbit_source": f"MPC ({file})"}
 
 
-def from_neocc(text: str, file: str) -> dict[str, str]:
-    """An orbit file of ESA's NEO Coordination Centre (OEF2, Keplerian elements, ``.ke1``) as a catalogue row.
+def from_neocc(text: str, file: str) -> tuple[dict[str, str], Covariance | None]:
+    """An orbit file of ESA's NEO Coordination Centre (OEF2, Keplerian elements, ``.ke1``).
+
+    Returns
+    -------
+    dict
+        A catalogue row.
+    Covariance or None
+        Upper triangle of its ``COV`` lines: au, degrees, and 1e-10 au/d2 for A2, as the ``RMS`` line shows.
 
     Raises
     ------
     InvalidInput
-        The file is not one.
+        The file is not one, or its covariance is not that of the parameters that it lists.
     """
     lines = [line.strip() for line in text.splitlines()]
     try:
@@ -125,12 +134,149 @@ def from_neocc(text: str, file: str) -> dict[str, str]:
     else:
         out["designation"] = f"{designation[:4]} {designation[4:]}".strip()
     out["name"] = out.get("designation", designation)
+    # TT and TDB differ by less than 2 ms.
     out["epoch_jd_tdb"] = repr(day + 2400000.5)
     if "MAG" in words:
         out["H_mag"] = words["MAG"][0]
     if len(words.get("NGR", [])) == 2:
         out["A2_au_d2"] = repr(float(words["NGR"][1]) * 1e-10)
-    return out | {"frame": FRAME, "orbit_source": f"ESA NEOCC ({file})", "orbit_solution": "NEOCC OEF2"}
+    out |= {"frame": FRAME, "orbit_source": f"ESA NEOCC ({file})", "orbit_solution": "NEOCC OEF2"}
+    return out, _neocc_covariance(body, words, out, file)
+
+
+def _neocc_covariance(
+    body: Sequence[str], words: Mapping[str, Sequence[str]], row: Mapping[str, str], file: str
+) -> Covariance | None:
+    import astropy.units as u
+    import numpy as np
+
+    from flybystab.sky.covariance import Covariance
+
+    cells = [c for line in body if line.startswith("COV") for c in line.split()[1:]]
+    if not cells:
+        return None
+    names = ["a", "e", "i", "node", "peri", "M"]
+    units: list[u.UnitBase] = [u.au, u.dimensionless_unscaled, *[u.deg] * 4]
+    try:
+        upper = [float(c) for c in cells]
+        # LSP: model, number of parameters, dimension, list of those solved for (2: Yarkovsky).
+        solved = words.get("LSP", [])[3:]
+        n = 6 + len(solved)
+        if len(upper) != n * (n + 1) // 2 or any(s not in ("1", "2") for s in solved):
+            raise ValueError
+        matrix = np.zeros((n, n))
+        matrix[np.triu_indices(n)] = upper
+        matrix += np.triu(matrix, 1).T
+        values = [float(row[c]) for c in ("a_au", "e", "i_deg", "node_deg", "peri_deg", "M_deg")]
+        keep = list(range(6))
+        if "2" in solved:  # the area-to-mass ratio is marginalised: solar radiation is not modelled
+            keep.append(6 + solved.index("2"))
+            names.append("A2")
+            units.append(1e-10 * u.au / u.d**2)
+            values.append(float(words["NGR"][1]))
+        rms = [float(c) for c in words.get("RMS", [])] or np.sqrt(np.diag(matrix))
+        if len(rms) != n or not np.allclose(np.sqrt(np.diag(matrix)), rms, rtol=1e-4):
+            raise ValueError
+    except (ValueError, IndexError):
+        raise InvalidInput(
+            "orbit file",
+            file,
+            "COV lines that agree with the LSP and RMS lines, A2 at most beside the elements",
+        ) from None
+    epoch = _tdb(float(row["epoch_jd_tdb"]))
+    return Covariance.in_units(epoch, names, values, matrix[np.ix_(keep, keep)], units, f"ESA NEOCC ({file})")
+
+
+_SBDB_PHYS = {"H": "H_mag", "rot_per": "spin_period_h"}
+_SBDB_NAMES = {"om": "node", "w": "peri"}
+
+
+def from_sbdb_answer(text: str, file: str) -> tuple[dict[str, str], Covariance | None]:
+    """One object's answer of the JPL SBDB API (JSON, with ``cov=mat`` for the covariance).
+
+    Returns
+    -------
+    dict
+        A catalogue row: elements of the answer at their epoch.
+    Covariance or None
+        At the epoch of its own, around the elements that the answer gives for that epoch; au, days, degrees.
+
+    Raises
+    ------
+    InvalidInput
+    """
+    try:
+        record: dict[str, Any] = json.loads(text)
+        orbit, thing = record["orbit"], record["object"]
+        elements = {item["name"]: item for item in orbit["elements"]}
+        pushes = {p["name"]: p for p in orbit.get("model_pars") or [] if p["name"] in ("A1", "A2", "A3")}
+        row = {mine: str(elements[c]["value"]) for c, mine in _SBDB.items() if c in elements}
+        row |= {
+            _SBDB["sigma_" + c]: str(elements[c]["sigma"])
+            for c in ("a", "e", "i", "om", "w", "ma")
+            if elements[c].get("sigma")
+        }
+        row |= {f"{name}_au_d2": str(p["value"]) for name, p in pushes.items()}
+        row["epoch_jd_tdb"] = str(orbit["epoch"])
+        full = str(thing["fullname"])
+        key = str(thing["des"])
+    except (json.JSONDecodeError, KeyError, TypeError) as error:
+        raise InvalidInput(
+            "orbit file", file, f"an answer of the SBDB API with full precision ({error})"
+        ) from None
+    designation = full.partition("(")[2].rstrip(") ")
+    row["number"] = key if key.isdigit() else ""
+    row["designation"] = designation or ("" if key.isdigit() else key)
+    name = full.partition("(")[0].strip()
+    row["name"] = name.removeprefix(key).strip() if key.isdigit() else row["designation"]
+    row["name"] = row["name"] or row["designation"] or key
+    row["orbit_class"] = (thing.get("orbit_class") or {}).get("code", "")
+    row["pha"] = {True: "Y", False: "N"}.get(thing.get("pha"), "")
+    for item in record.get("phys_par") or []:
+        if item["name"] in _SBDB_PHYS and item.get("value"):
+            row[_SBDB_PHYS[item["name"]]] = str(item["value"])
+        elif item["name"] == "diameter" and item.get("value"):
+            row["diameter_m"] = _thousandfold(str(item["value"]), "diameter", file)
+    solution = str(orbit.get("orbit_id", ""))
+    row |= {"frame": FRAME, "orbit_solution": f"JPL {solution}", "orbit_source": f"JPL SBDB ({file})"}
+    row["condition_code"] = str(orbit.get("condition_code") or "")
+    return row, _sbdb_covariance(orbit, pushes, f"JPL SBDB, solution {solution} ({file})", file)
+
+
+def _sbdb_covariance(
+    orbit: Mapping[str, Any], pushes: Mapping[str, Any], source: str, file: str
+) -> Covariance | None:
+    import astropy.units as u
+    import numpy as np
+
+    from flybystab.sky.covariance import Covariance
+
+    found = orbit.get("covariance")
+    if not found:
+        return None
+    unit = {"e": u.dimensionless_unscaled, "q": u.au, "tp": u.d} | dict.fromkeys(("node", "peri", "i"), u.deg)
+    unit |= dict.fromkeys(("A1", "A2", "A3"), u.au / u.d**2)
+    try:
+        names = [_SBDB_NAMES.get(str(n), str(n)) for n in found["labels"]]
+        epoch = float(found["epoch"])
+        mean = {_SBDB_NAMES.get(e["name"], e["name"]): str(e["value"]) for e in found["elements"]}
+        mean |= {name: str(p["value"]) for name, p in pushes.items()}
+        # Digits of the time of perihelion are lost neither as a Julian date nor as a difference.
+        whole, _, rest = mean["tp"].partition(".")
+        values = [float(mean[n]) if n != "tp" else (float(whole) - epoch) + float("0." + rest) for n in names]
+        matrix = np.array([[float(c) for c in line] for line in found["data"]])
+        units = [unit[n] for n in names]
+    except (KeyError, TypeError, ValueError) as error:
+        raise InvalidInput(
+            "covariance", file, f"labels out of e, q, tp, node, peri, i, A1, A2, A3 ({error})"
+        ) from None
+    return Covariance.in_units(_tdb(epoch), names, values, matrix, units, source)
+
+
+def _tdb(day: float) -> Any:
+    from astropy.time import Time
+
+    return Time(day, format="jd", scale="tdb")
 
 
 def _thousandfold(text: str, name: str, file: str) -> str:
