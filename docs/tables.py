@@ -1,0 +1,39 @@
+"""Make the tables of the documentation: ``python docs/tables.py [NAME ...]``, all of them without a name.
+
+Each is the output of a command, kept with the command in ``docs/tables/NAME.txt`` and shown by a page. Those with
+times in them want a quiet machine. A new table is one new entry.
+"""
+
+import subprocess
+import sys
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[1]
+TABLES = {
+    "apophis": "python benchmarks/sky.py apophis",
+    "flyby": "flybystab bench flyby",
+    "grains": "python benchmarks/piles.py grains",
+    "outcomes": "python benchmarks/piles.py map",
+    "stability": "python benchmarks/stability.py",
+}
+
+
+def table(name):
+    command = TABLES[name]
+    program, *words = command.split()
+    here = Path(sys.executable).parent
+    done = subprocess.run([here / program, *words], cwd=ROOT, capture_output=True, text=True)
+    if done.returncode != 0:
+        sys.exit(f"{command} ended with {done.returncode}:\n{done.stderr}")
+    path = ROOT / "docs" / "tables" / f"{name}.txt"
+    lines = [line.rstrip() for line in done.stdout.strip().splitlines()]
+    path.write_text("\n".join([f"$ {command}", *lines]) + "\n")
+    print(path)
+
+
+if __name__ == "__main__":
+    unknown = [name for name in sys.argv[1:] if name not in TABLES]
+    if unknown:
+        sys.exit(f"no table {', '.join(unknown)}; there are {', '.join(TABLES)}")
+    for name in sys.argv[1:] or TABLES:
+        table(name)
