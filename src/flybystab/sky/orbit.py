@@ -84,7 +84,7 @@ class Orbit:
         i, node, peri, M : Quantity
             Inclination, longitude of the node, argument of perihelion, mean anomaly.
         A1, A2, A3 : Quantity
-            Radial, transverse and normal non-gravitational acceleration at 1 au.
+            Radial, transverse and normal non-gravitational acceleration at 1 au; a plain 0 means none.
         law : {"asteroid", "comet"}
             Dependence of A1, A2, A3 on distance.
         name : str
@@ -315,7 +315,9 @@ def _angle(value: Any) -> Any:
 
 def _nongrav(a1: Quantity, a2: Quantity, a3: Quantity, law: str) -> NonGravitational:
     unit = u.m / u.s**2
-    values = tuple(to_si(v, unit, n) for v, n in ((a1, "A1"), (a2, "A2"), (a3, "A3")))
+    # A plain zero is no push in any unit.
+    pairs = ((a1, "A1"), (a2, "A2"), (a3, "A3"))
+    values = tuple(0.0 if isinstance(v, int | float) and v == 0 else to_si(v, unit, n) for v, n in pairs)
     out = NonGravitational((values[0], values[1], values[2]), law)
     _ = out.constants  # refuses an unknown law
     return out
