@@ -19,6 +19,7 @@ from flybystab.aggregate.body import Body
 from flybystab.errors import InvalidInput
 from flybystab.flybys import flyby_many, periapsis_axes
 from flybystab.outcome import Verdict
+from flybystab.sky.b_plane import capture_radius
 from flybystab.sky.encounter import Encounter
 from flybystab.sky.planets import Planet, planet
 from flybystab.units import to_si
@@ -148,38 +149,6 @@ def outcome_plot(axes: Any, outcomes: OutcomeMap) -> Any:
     return axes
 
 
-def b_plane(encounter: Encounter, north: Sequence[float] = (0.0, 0.0, 1.0)) -> Quantity:
-    """Target-plane vector ``(B.T, B.R)`` of the two-body hyperbola at closest approach, shape (2,), km.
-
-    With the direction S of the incoming asymptote, ``T = S x N/|S x N|`` and ``R = S x T`` (Kizner 1961). B points
-    from the planet's centre to the asymptote and is as long as the impact parameter.
-
-    Parameters
-    ----------
-    encounter : Encounter
-        With v_inf above zero.
-    north : sequence of float
-        The direction N in the frame of the encounter: +z by default, the Earth's equator in ICRF.
-
-    Raises
-    ------
-    InvalidInput
-        If v_inf is zero, or S points north.
-    """
-    r, v = encounter.position(0.0)[0], encounter.velocity(0.0)[0]
-    h = np.cross(r, v)
-    pull = np.cross(v, h) / encounter.planet.gm - r / np.linalg.norm(r)  # eccentricity vector
-    e = float(np.linalg.norm(pull))
-    speed = encounter.v_inf.to_value(u.m / u.s)
-    if not (e > 1.0 and speed > 0.0):
-        raise InvalidInput("v_inf", encounter.v_inf, "a speed above zero: a bound orbit has no target plane")
-    w, p = h / np.linalg.norm(h), pull / e
-    s = p / e + np.sqrt(1.0 - 1.0 / e**2) * np.cross(w, p)
-    b = np.linalg.norm(h) / speed * np.cross(s, w)
-    t, r_axis = _target_axes(s, north)
-    return (np.array([b @ t, b @ r_axis]) * u.m).to(u.km)
-
-
 @dataclass(frozen=True, eq=False)
 class TargetMap:
     """Verdicts over the target plane of one direction of arrival.
@@ -204,9 +173,8 @@ class TargetMap:
     @property
     def capture_radius(self) -> Quantity:
         """Impact parameter of a path that grazes the atmosphere (surface, without one)."""
-        d = self.planet.impact_distance
         v = self.v_inf.to_value(u.m / u.s)
-        return (d * np.sqrt(1.0 + 2.0 * self.planet.gm / (d * v * v)) * u.m).to(u.km)
+        return (capture_radius(self.planet.gm, self.planet.impact_distance, v) * u.m).to(u.km)
 
 
 def target_map(
@@ -244,7 +212,7 @@ def target_map(
     if attitude is None:
         turn = turn @ np.diag([1.0, -1.0, -1.0])
     angles = 2.0 * np.pi * np.arange(directions) / directions
-    impact = q * np.sqrt(1.0 + 2.0 * where.gm / (q * v * v))
+    impact = capture_radius(where.gm, q, v)
     encounters, rotations = [], []
     for x in q:
         encounter = Encounter.hyperbolic(where, x * u.m, v * u.m / u.s)
@@ -314,15 +282,6 @@ def verdict_points(axes: Any, b: Quantity, verdict: Sequence[str], radius: Quant
     axes.set(xlabel="B.T (km)", ylabel="B.R (km)")
     axes.legend(frameon=False, fontsize=8)
     return axes
-
-
-def _target_axes(s: Array, north: Sequence[float]) -> tuple[Array, Array]:
-    t = np.cross(s, np.asarray(north, dtype=float))
-    size = np.linalg.norm(t)
-    if not size > 1e-12 * np.linalg.norm(north):
-        raise InvalidInput("north", north, "a direction other than that of the asymptote")
-    t = t / size
-    return t, np.cross(s, t)
 
 
 def _about_z(angle: float) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Protocol
@@ -26,6 +26,7 @@ from flybystab.sky.approach import (
     periapsis_time,
     relative,
 )
+from flybystab.sky.b_plane import NORTH, checked, target_plane
 from flybystab.sky.ephemeris import BODIES, Ephemeris, Window
 from flybystab.sky.forces import FORCES, model, shares
 from flybystab.sky.kepler import states_at_times, time_at_distance
@@ -173,6 +174,23 @@ class Encounter:
         h = np.cross(state[:3], state[3:])
         x, z = state[:3] / np.linalg.norm(state[:3]), h / np.linalg.norm(h)
         return np.stack([x, np.cross(z, x), z])
+
+    def b_plane(self, north: Sequence[float] = NORTH) -> Quantity:
+        """Target-plane coordinates ``(B.T, B.R)`` of the two-body hyperbola at closest approach, shape (2,).
+
+        Parameters
+        ----------
+        north : sequence of float
+            The direction N in `frame` (:mod:`flybystab.sky.b_plane`): +z, in ICRF the Earth's equator.
+
+        Raises
+        ------
+        InvalidInput
+            For a bound passage, which has no target plane, or if the asymptote points north.
+        """
+        when = 0.0 if self.impact_time is None else min(0.0, self.impact_time)
+        b, v_inf = target_plane(self.track.states(np.array([when])), self.planet.gm, north)
+        return (checked(b[0], float(v_inf[0]), north) * u.m).to(u.km)
 
     @classmethod
     def hyperbolic(

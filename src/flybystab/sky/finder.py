@@ -26,7 +26,8 @@ from flybystab.constants import DAY
 from flybystab.core.jit import kernel
 from flybystab.errors import InvalidInput, NotConverged
 from flybystab.sky.approach import _measure, relative
-from flybystab.sky.ephemeris import BODIES, Ephemeris, body_states
+from flybystab.sky.b_plane import target_plane
+from flybystab.sky.ephemeris import BODIES, Ephemeris, Window, body_states
 from flybystab.sky.forces import _GM, FORCES, acceleration_among, bodies, model, push
 from flybystab.sky.kepler import time_at_distance
 from flybystab.sky.orbit import Orbit, _ephemeris, default_forces, later, seconds
@@ -385,9 +386,10 @@ def find_encounters(
     -------
     QTable
         One row per encounter, sorted by asteroid and time: ``asteroid``, ``planet``, ``time`` (TDB),
-        ``distance`` (km), ``v_rel`` and ``v_inf`` (km/s; 0 for a bound passage), ``impact``, ``index`` (of
-        the asteroid), ``position`` and ``velocity`` (ICRF, relative to the planet). On an impact, distance and
-        time are those of the two-body orbit without a surface, position and velocity are from the step
+        ``distance`` (km), ``v_rel`` and ``v_inf`` (km/s; 0 for a bound passage), ``b_t`` and ``b_r`` (km;
+        target plane, north +z of ICRF, :mod:`flybystab.sky.b_plane`; nan for a bound passage), ``impact``,
+        ``index`` (of the asteroid), ``position`` and ``velocity`` (ICRF, relative to the planet). On
+        an impact, distance and time are those of the two-body orbit without a surface, position and velocity are from the step
         before, and the search ends for that asteroid. Metadata: ephemeris, forces, frame, time scale,
         tolerance.
 
@@ -460,21 +462,23 @@ def find_encounters(
             results = list(pool.map(one, enumerate(rows)))
     else:
         results = [one(item) for item in enumerate(rows)]
-    return _table(rows, results, middle, window.name, chosen, tolerance)
+    return _table(rows, results, middle, window, chosen, tolerance)
 
 
 def _table(
     rows: list[tuple[str, Orbit]],
     results: Iterable[tuple[int, Array]],
     origin: Time,
-    ephemeris_name: str,
+    window: Window,
     forces: tuple[str, ...],
     tolerance: float,
 ) -> QTable:
     kept = [(i, raw) for i, raw in results if len(raw)]
     index = np.concatenate([np.full(len(raw), i) for i, raw in kept]) if kept else np.zeros(0, dtype=int)
     raw = np.concatenate([raw for _, raw in kept]) if kept else np.zeros((0, WIDTH))
-    speed2 = raw[:, 9] + 2.0 * np.array([planet(BODIES[int(b)]).gm for b in raw[:, 0]]) / raw[:, 8]
+    gm = window.gm[raw[:, 0].astype(int)]
+    speed2 = raw[:, 9] + 2.0 * gm / raw[:, 8]
+    b, _ = target_plane(raw[:, 2:8], gm)
     out = QTable()
     out["asteroid"] = np.array([rows[i][0] for i in index], dtype=str)
     out["planet"] = np.array([BODIES[int(b)] for b in raw[:, 0]], dtype=str)
@@ -483,12 +487,13 @@ def _table(
     out["distance"] = (raw[:, 8] * u.m).to(u.km)
     out["v_rel"] = (np.sqrt(np.maximum(speed2, 0.0)) * u.m / u.s).to(u.km / u.s)
     out["v_inf"] = (np.sqrt(np.maximum(raw[:, 9], 0.0)) * u.m / u.s).to(u.km / u.s)
+    out["b_t"], out["b_r"] = (b[:, 0] * u.m).to(u.km), (b[:, 1] * u.m).to(u.km)
     out["impact"] = raw[:, 10] > 0.0
     out["index"] = index
     out["position"] = (raw[:, 2:5] * u.m).to(u.km)
     out["velocity"] = (raw[:, 5:8] * u.m / u.s).to(u.km / u.s)
     out.meta = {
-        "ephemeris": ephemeris_name,
+        "ephemeris": window.name,
         "forces": list(forces),
         "frame": "ICRF",
         "time_scale": "TDB",
