@@ -27,6 +27,7 @@ _HOME = {
     "R_earth": "units",
     "Verdict": "outcome",
     "catalogue": "survey.catalogue",
+    "cite": "face.cite",
     "equilibrium": "aggregate.equilibrium",
     "find_encounters": "sky.finder",
     "flyby": "flybys",
@@ -45,6 +46,7 @@ if TYPE_CHECKING:
     from flybystab.aggregate.equilibrium import equilibrium
     from flybystab.aggregate.stability import stability
     from flybystab.errors import FlybystabError
+    from flybystab.face.cite import cite
     from flybystab.flyby_results import FlybyResult
     from flybystab.flybys import flyby, flyby_many, periapsis_axes
     from flybystab.outcome import Verdict

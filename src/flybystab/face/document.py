@@ -45,6 +45,7 @@ def encounter_document(encounter: Encounter) -> dict[str, Any]:
         "v_periapsis_km_s": encounter.v_periapsis.to_value(u.km / u.s),
         "impact": encounter.impact_level if encounter.impact else None,
         "frame": encounter.frame,
+        "ephemeris": encounter.ephemeris,
         "tide_error_relative": encounter.tide_error,
     }
 

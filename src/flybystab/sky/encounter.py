@@ -132,6 +132,8 @@ class Encounter:
     distance_error, time_error : Quantity or None
         For a real orbit: change of distance and time of closest approach when the integration is made 100
         times tighter plus the change when every known force is on. The orbit's own uncertainty is not in it.
+    ephemeris : str or None
+        Where the planets of a real orbit are from; None for a scripted encounter.
     """
 
     planet: Planet
@@ -154,6 +156,7 @@ class Encounter:
     t_periapsis: float = 0.0
     distance_error: Quantity | None = None
     time_error: Quantity | None = None
+    ephemeris: str | None = None
 
     def position(self, t: Array | float) -> Array:
         """Asteroid from the planet's centre, m, shape (n, 3), in `frame`, ``t`` s from closest approach."""
@@ -574,6 +577,7 @@ def _around(
         track=track,
         distance_error=(errors[0] * u.m).to(u.km),
         time_error=errors[1] * u.s,
+        ephemeris=window.name,
     )
 
 

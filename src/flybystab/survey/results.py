@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import astropy.units as u
 import numpy as np
-from astropy.table import QTable
+from astropy.table import MaskedColumn, QTable
 
 from flybystab.errors import InvalidInput, MissingExtra
 
@@ -274,7 +274,7 @@ def read_results(path: str | Path) -> QTable:
             return _read_parquet(file)
         table = QTable.read(file, format="ascii.ecsv")
         for name in table.colnames:  # an empty text counts as missing in ECSV
-            if getattr(table[name], "mask", None) is not None and table[name].dtype.kind == "U":
+            if isinstance(table[name], MaskedColumn) and table[name].dtype.kind == "U":
                 about = table[name].info.description
                 table[name] = table[name].filled("")
                 table[name].info.description = about

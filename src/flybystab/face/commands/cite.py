@@ -1,23 +1,45 @@
-"""``flybystab cite``: BibTeX of the methods and data."""
+"""``flybystab cite [FILE]``: BibTeX of the methods and data."""
 
 from __future__ import annotations
 
 import argparse
+from typing import Any
 
 from flybystab import __version__
 from flybystab.face.commands.common import show
 
-HELP = "BibTeX of the methods and data"
-EXAMPLE = "flybystab cite > flybystab.bib"
+HELP = "BibTeX of the methods and data, of all or of those behind a result"
+EXAMPLE = "flybystab cite screening.ecsv > flybystab.bib"
 
 
 def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
-    del sub  # none but --json
+    sub.add_argument(
+        "file", nargs="?", help="a table (.ecsv, .parquet) or JSON document (.json) that a command wrote"
+    )
 
 
 def run(options: argparse.Namespace) -> None:
     """Answer the command."""
-    from flybystab.face.cite import BIBTEX, cite
+    from flybystab.face.cite import BIBTEX, cited
 
-    show(options, lambda: {"flybystab": __version__, "bibtex": list(BIBTEX.values())}, lambda: [cite()])
+    entries = [BIBTEX[key] for key in cited(_result(options.file))]
+    show(options, lambda: {"flybystab": __version__, "bibtex": entries}, lambda: ["\n\n".join(entries)])
+
+
+def _result(path: str | None) -> Any:
+    if path is None:
+        return None
+    if not path.endswith(".json"):
+        from flybystab.survey.results import read_results
+
+        return read_results(path)
+    import json
+    from pathlib import Path
+
+    from flybystab.errors import InvalidInput
+
+    try:
+        return json.loads(Path(path).read_text(encoding="utf-8"))
+    except ValueError as reason:
+        raise InvalidInput("file", path, f"a JSON document ({reason})") from None
