@@ -11,7 +11,8 @@ from scripted import NAMES, SPAN, day, screening, three
 from flybystab.aggregate.body import Material
 from flybystab.constants import AU, R_EARTH
 from flybystab.errors import InvalidInput, OutOfSpan, UnknownName
-from flybystab.sky.encounter import Encounter
+from flybystab.sky.encounter import Encounter, usual_start
+from flybystab.sky.planets import planet
 from flybystab.survey.catalogue import Asteroid
 from flybystab.survey.columns import COLUMNS, VERDICTS, share_of
 from flybystab.survey.judging import Passage, contributors, judge, wilson
@@ -112,14 +113,16 @@ def test_bound_from_distance_and_speed_covers_the_tide():
     a = Asteroid.from_catalogue("Apophis")
     for distance, v in ((0.01, 3000.0), (0.02, 12000.0), (0.049, 25000.0)):
         p = Passage(a, "earth", day(2461000.5), distance * AU, v)
+        start = usual_start(planet("earth"), distance * AU)
         e = Encounter.hyperbolic(
-            "earth", periapsis=distance * u.au, v_inf=v * u.m / u.s, start_distance=10 * distance * u.au
+            "earth", periapsis=distance * u.au, v_inf=v * u.m / u.s, start_distance=start * u.m
         )
-        bound, exact = p.bounds(), tide_size(e.tide, e.t_start, -e.t_start)
+        bound, exact = p.bounds(), tide_size(e.tide, e.t_start, e.t_stop)
         assert all(b >= x for b, x in zip(bound, exact, strict=True))
         assert bound[0] < 1.1 * exact[0] + 3e-13  # the Sun's share is taken at 0.7 au
-    # Near the Moon's orbit distance alone says nothing.
-    assert Passage(a, "earth", p.time, 4e8, 6000.0).bounds() == (np.inf,) * 3
+    # Near the Moon's orbit, and where the Sun bends a slow path, distance and speed say nothing.
+    assert Passage(a, "earth", p.time, 4e8, 6000.0).bounds() == (np.inf, np.inf)
+    assert Passage(a, "earth", p.time, 0.05 * AU, 2000.0).bounds() == (np.inf, np.inf)
     assert Passage(a, "venus", p.time, 4e8, 6000.0).bounds()[0] < 1e-8
 
 

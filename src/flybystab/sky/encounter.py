@@ -39,6 +39,8 @@ Array = NDArray[np.float64]
 
 #: Time after the end of the encounter that the tide still covers, s: a body that flows can be followed.
 TAIL = 100.0 * HOUR
+#: Time to settle after an encounter, unless another is asked for, s.
+SETTLE = 4.0 * HOUR
 
 
 class Track(Protocol):
@@ -202,7 +204,7 @@ class Encounter:
         periapsis: Quantity,
         v_inf: Quantity,
         start_distance: Quantity | None = None,
-        settle: Quantity = 4 * u.h,
+        settle: Quantity = SETTLE * u.s,
         j2: bool = False,
         pole: tuple[float, float, float] = (0.0, 0.0, 1.0),
     ) -> Encounter:
@@ -290,7 +292,7 @@ class Encounter:
         *,
         error: Quantity = 0.1 * u.km,
         start_distance: Quantity | None = None,
-        settle: Quantity = 4 * u.h,
+        settle: Quantity = SETTLE * u.s,
         search: Quantity = 30 * u.d,
         within: Quantity | None = None,
         ephemeris: str | Ephemeris | None = None,
@@ -341,7 +343,7 @@ class Encounter:
         if body.name not in BODIES or body.name == "sun":
             raise InvalidInput("planet", body.name, f"one of {', '.join(BODIES[1:])}")
         reach = to_si(search, u.s, "search", low=0.0, open_low=True)
-        largest = _far(body) if within is None else to_si(within, u.m, "within", low=0.0, open_low=True)
+        largest = far_enough(body) if within is None else to_si(within, u.m, "within", low=0.0, open_low=True)
         accuracy = to_si(error, u.m, "error", low=0.0, open_low=True)
         wait = to_si(settle, u.s, "settle", low=0.0)
         start = None if start_distance is None else to_si(start_distance, u.m, "start_distance", low=0.0)
@@ -381,7 +383,7 @@ def _left_out(body: Planet, q: float, j2: bool) -> tuple[tuple[str, float], ...]
     return tuple(out)
 
 
-def _far(body: Planet) -> float:
+def far_enough(body: Planet) -> float:
     """Distance that still counts as an encounter, m."""
     return min(20.0 * hill_radius(body), AU)
 
@@ -391,6 +393,11 @@ def hill_radius(body: Planet) -> float:
     if body.name == "moon":
         return float(3.844e8 * (body.gm / (3.0 * PLANETS["earth"].gm)) ** (1.0 / 3.0))
     return float(body.orbit_radius * (body.gm / (3.0 * PLANETS["sun"].gm)) ** (1.0 / 3.0))
+
+
+def usual_start(body: Planet, q: float) -> float:
+    """Distance, m, at which an encounter with closest distance `q` (m) on a real orbit starts and ends."""
+    return max(10.0 * body.radius, 1.5 * q, min(10.0 * q, hill_radius(body)))
 
 
 @dataclass(frozen=True)
@@ -528,7 +535,7 @@ def _around(
     v_p = float(np.sqrt(speed2 + 2.0 * gm / q))
     tau = max(q, 0.01 * body.radius) / v_p
     if start is None:
-        start = max(10.0 * body.radius, 1.5 * q, min(10.0 * q, hill_radius(body)))
+        start = usual_start(body, q)
     elif start <= q:
         raise InvalidInput("start_distance", start * u.m, f"more than the closest approach, {q:.6g} m")
     t_in, t_out = _ends(passage.log, window, index, start, zero if entry is None else entry)

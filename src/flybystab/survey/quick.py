@@ -14,10 +14,12 @@ two short axes; then the stress turns with it, but for terms in ``S_2 - S_3``, a
 
 If every stress within that distance ``d`` of the undisturbed one is inside the yield surface,
 ``|s| + d sqrt(1 + k^2/3) <= k (p + c)`` with the least ``k``, the body cannot yield: INTACT is proved without
-integrating anything. Where the test fails nothing is said; the dynamics decides.
+integrating anything. Where the test fails nothing is said; the dynamics decides. The attitude, the phase of the
+spin, the sources of the tide and the material beyond first yield do not enter: the body is rigid until then.
+``python benchmarks/honesty.py`` attacks the bound with random bodies and passages.
 
-The unwanted opposite is proved the same way: a free body whose stress is outside the yield surface by more
-than the tide at the start can mend is not in equilibrium.
+A body whose stress is outside the yield surface far from any planet is not in equilibrium: that needs no
+dynamics either.
 """
 
 from __future__ import annotations
@@ -130,7 +132,6 @@ def quick_margins(
     code: int,
     peak: float,
     impulse: float,
-    start: float,
     friction: Array,
     verdict: NDArray[np.int64],
 ) -> None:
@@ -144,8 +145,8 @@ def quick_margins(
         kg/m3, rad, Pa.
     code : int
         Yield surface.
-    peak, impulse, start : float
-        Largest norm of the tide, s^-2; its time integral, 1/s; its norm at the start, s^-2.
+    peak, impulse : float
+        Largest norm of the tide, s^-2, and its time integral, 1/s; infinite where nothing is known of it.
     friction : ndarray (n, 2)
         Out: friction angle mobilised by the free body at the start, and a bound on the largest one during the
         passage, rad; inf where there is none.
@@ -162,18 +163,18 @@ def quick_margins(
         rigid_stress(s1, s2, s3, rho[i], rate2, omega[i], none, stress)
         p, s, det = invariants(stress)
         friction[i, 0] = required_friction(code, cohesion[i], s, p, det)
-        # The overload is Lipschitz in the stress with this constant.
-        sin = np.sin(phi[i])
-        steep = (3.0 + sin) / (2.0 * np.sqrt(6.0)) + sin / np.sqrt(3.0)
-        out = overload(code, phi[i], cohesion[i], stress) - steep * scale * s1 * start
+        if overload(code, phi[i], cohesion[i], stress) > 1e-9 * np.abs(stress).max():
+            verdict[i], friction[i, 1] = NOT_IN_EQUILIBRIUM, np.inf
+            continue
+        if not np.isfinite(peak):
+            verdict[i], friction[i, 1] = UNDECIDED, np.inf
+            continue
         d, centre = disturbance(axes[i], rate2, omega[i], peak, impulse)
         spin[2] = np.sqrt(centre)
         rigid_stress(s1, s2, s3, rho[i], rate2, spin, none, stress)
         p, s, det = invariants(stress)
         friction[i, 1] = _friction_bound(code, phi[i], cohesion[i], s, p, scale * d)
-        if out > 1e-9 * (abs(p) + cohesion[i]):
-            verdict[i] = NOT_IN_EQUILIBRIUM
-        elif _holds(code, phi[i], cohesion[i], s, p, scale * d):
+        if _holds(code, phi[i], cohesion[i], s, p, scale * d):
             verdict[i] = INTACT
         else:
             verdict[i] = UNDECIDED
@@ -187,10 +188,8 @@ def _norms(tau: float, start: float, width: float, coefficients: Array, t: Array
         out[i] = np.sqrt(k[0] ** 2 + k[1] ** 2 + k[2] ** 2 + 2.0 * (k[3] ** 2 + k[4] ** 2 + k[5] ** 2))
 
 
-def tide_size(
-    tide: TidePanels, t_start: float, t_stop: float, points: int = 4001
-) -> tuple[float, float, float]:
-    """Bounds on the norm of a tide: largest (s^-2), time integral (1/s), and at the start (s^-2).
+def tide_size(tide: TidePanels, t_start: float, t_stop: float, points: int = 4001) -> tuple[float, float]:
+    """Bounds on the norm of a tide: largest (s^-2) and time integral (1/s).
 
     The norm varies on a scale of one in ``u = asinh(t/tau)``; the steps in u are a few 1e-3, and the
     bounds are raised by 0.1 percent to cover what lies between them.
@@ -200,4 +199,4 @@ def tide_size(
     _norms(tide.tau, tide.start, tide.width, tide.coefficients, tide.tau * np.sinh(u), norm)
     rate = norm * tide.tau * np.cosh(u)
     impulse = float(np.sum(0.5 * (rate[1:] + rate[:-1]))) * float(u[1] - u[0])
-    return 1.001 * float(norm.max()), 1.001 * impulse, 1.001 * float(norm[0])
+    return 1.001 * float(norm.max()), 1.001 * impulse

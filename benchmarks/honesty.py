@@ -1,0 +1,176 @@
+"""Attacks the quick bound: no body that it calls INTACT may yield in the full dynamics.
+
+python benchmarks/honesty.py scripted [--encounters N] [--bodies N] [--seed N]
+    random hyperbolas and parabolas of six planets with J2, from grazing to distant; spheres, spheroids and
+    triaxial bodies, exact and nearly so, at rest, slow, beyond the spin limit, tumbling about any axis; all yield
+    surfaces, cohesion, brittle or not. Most friction angles are put where the bound only just decides.
+python benchmarks/honesty.py real [--every N] [--seed N]
+    passages of catalogued asteroids by six planets: the bound from distance and speed alone against the tide of the
+    encounter that was followed among all bodies; samples by the bound against the same samples by the dynamics.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from typing import NamedTuple
+
+import astropy.units as u
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from flybystab.aggregate.body import Material
+from flybystab.constants import G
+from flybystab.core.passage import passage
+from flybystab.errors import FlybystabError
+from flybystab.sky.encounter import Encounter
+from flybystab.sky.planets import planet
+from flybystab.survey.catalogue import catalogue
+from flybystab.survey.judging import judge
+from flybystab.survey.population import Attitudes, draws
+from flybystab.survey.quick import INTACT, NOT_IN_EQUILIBRIUM, quick_margins, tide_size
+from flybystab.survey.screening import passages, settings
+
+PLANETS = ("earth", "moon", "venus", "mars", "mercury", "jupiter")
+Sample = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
+def bodies(n: int, rng: np.random.Generator) -> Sample:
+    """Semi-axes (m), density, angular velocity along the axes (rad/s), friction (rad), cohesion (Pa)."""
+    ratio = np.sort(rng.uniform(0.17, 1.0, (n, 2)), axis=1)[:, ::-1].copy()
+    kind = rng.integers(0, 8, n)
+    nearly = 1.0 - 10.0 ** rng.uniform(-8, -1.5, n)
+    ratio[kind == 0] = 1.0
+    ratio[kind == 1] = np.column_stack([nearly, nearly**2])[kind == 1]
+    ratio[kind == 2, 0] = 1.0
+    ratio[kind == 3, 0] = nearly[kind == 3]
+    ratio[kind == 4, 1] = ratio[kind == 4, 0]
+    ratio[kind == 5, 1] = (ratio[:, 0] * nearly)[kind == 5]
+    ratio[:, 1] = np.minimum(ratio[:, 0], ratio[:, 1])
+    axes = 10.0 ** rng.uniform(1, 3.7, (n, 1)) * np.column_stack([np.ones(n), ratio])
+    rho = rng.uniform(800, 5000, n)
+    # Up to 1.26 sqrt(pi G rho): beyond the limit of every cohesionless body.
+    rate = np.sqrt(np.pi * G * rho) * rng.choice([0.0, 1.0, 1.0, 1.0], n) * 10.0 ** rng.uniform(-3, 0.1, n)
+    wobble = 10.0 ** rng.uniform(-4, 1, n) * rng.choice([0, 1, 1], n)
+    axis = rng.normal(size=(n, 3)) * wobble[:, None] + [0.0, 0.0, 1.0]
+    axis[rng.random(n) < 0.1] = [1.0, 0.0, 0.0]
+    axis[rng.random(n) < 0.05] = [0.0, 1.0, 0.0]
+    omega = (rate / np.linalg.norm(axis, axis=1))[:, None] * axis
+    cohesion = rng.choice([0, 0, 1], n) * 10.0 ** rng.uniform(-1, 3, n)
+    return axes, rho, omega, np.radians(rng.uniform(5, 60, n)), cohesion
+
+
+def encounter(rng: np.random.Generator) -> Encounter:
+    """A scripted encounter: 1.02 to 100 radii, 0 to 30 km/s, with J2 or not."""
+    body = planet(rng.choice(PLANETS))
+    q = 1.01 * body.impact_distance + body.radius * 10.0 ** rng.uniform(-2, 2)
+    v = rng.choice([0.0, 10.0 ** rng.uniform(-2, 1.5)])
+    return Encounter.hyperbolic(
+        body.name,
+        periapsis=q * u.m,
+        v_inf=v * u.km / u.s,
+        start_distance=max(10 * body.radius, q * rng.uniform(1.5, 12)) * u.m,
+        j2=bool(rng.integers(2)),
+        pole=tuple(rng.normal(size=3)),
+    )
+
+
+class Count(NamedTuple):
+    """What a campaign found; `used` is the share of the bound's rise that the dynamics reaches, per sample."""
+
+    samples: int
+    intact: int
+    not_in_equilibrium: int
+    false: int
+    used: np.ndarray
+
+
+def campaign(seed: int, encounters: int, each: int) -> Count:
+    """Random bodies in random encounters: what the bound says against what the dynamics does."""
+    rng = np.random.default_rng(seed)
+    intact = standing = false = 0
+    used: list[float] = []
+    for _ in range(encounters):
+        enc = encounter(rng)
+        axes, rho, omega, phi, cohesion = bodies(each, rng)
+        code = int(rng.integers(4))
+        size = tide_size(enc.tide, enc.t_start, enc.t_stop)
+        friction, verdict = np.empty((each, 2)), np.empty(each, dtype=np.int64)
+        for angle in (np.full(each, np.radians(60)), phi):
+            quick_margins(axes, rho, omega, angle, cohesion, code, *size, friction, verdict)
+            # Just enough friction, for most of those that can have it.
+            tight = (rng.random(each) < 0.7) & (friction[:, 1] < np.radians(65))
+            if angle is not phi:
+                phi[tight] = np.maximum(friction[tight, 1], 1e-3) + 1e-9
+        standing += int(np.sum(verdict == NOT_IN_EQUILIBRIUM))
+        for i in np.flatnonzero(verdict == INTACT):
+            turn = Rotation.random(random_state=int(rng.integers(2**31))).as_matrix()
+            way = axes[i], rho[i], omega[i], turn, enc.t_start, enc.t_stop, enc.tide
+            material = {"phi": phi[i], "cohesion": cohesion[i], "surface": code, "tolerance": 1e-8}
+            run = passage(*way, **material, brittle=bool(rng.integers(2)), max_axis_ratio=8.0)
+            yielded = any(name == "onset" for name, _, _ in run.events) or run.reason != "done"
+            intact += 1
+            most = passage(*way, **material, unyielding=True, max_axis_ratio=8.0).max_friction
+            false += yielded or most > friction[i, 1] + 1e-9
+            rest, bound = friction[i]
+            if np.isfinite(rest) and bound - rest > 1e-3:
+                used.append((most - rest) / (bound - rest))
+    return Count(encounters * each, intact, standing, false, np.array(used))
+
+
+def scripted(args: argparse.Namespace) -> int:
+    began = time.perf_counter()
+    c = campaign(args.seed, args.encounters, args.bodies)
+    print(f"{c.samples} samples in {args.encounters} encounters, {time.perf_counter() - began:.0f} s")
+    print(f"decided by the bound: {c.intact} INTACT, {c.not_in_equilibrium} NOT IN EQUILIBRIUM")
+    print(f"called INTACT, and something else in the dynamics: {c.false}")
+    q = np.quantile(c.used, [0.5, 0.9, 1.0])
+    print(
+        f"share of the bound that the dynamics reaches: median {q[0]:.3f}, 90 % {q[1]:.3f}, largest {q[2]:.4f}"
+    )
+    return int(c.false > 0)
+
+
+def real(args: argparse.Namespace) -> int:
+    wanted = settings("2026-01-01", "2050-01-01", planets=PLANETS, within=0.1 * u.au, samples=20)
+    ratios, false, samples, dynamic = [], 0, 0, 0
+    for asteroid in catalogue()[:: args.every]:
+        d = draws(asteroid, wanted.samples, args.seed)
+        for p in passages(asteroid, wanted):
+            blind = p.bounds()
+            try:
+                size = p.close_bounds()
+                where = Attitudes.at(asteroid, d, args.seed, p.planet, p.time.jd)
+                fast = judge(p, d, where, Material())
+                full = judge(p, d, where, Material(), quick=False)
+            except FlybystabError as reason:
+                print(f"{asteroid.name} {p.planet} {p.time.isot}: {reason}")
+                continue
+            if np.isfinite(blind[0]):
+                ratios.append([b / x for b, x in zip(blind, size, strict=True)])
+            samples += wanted.samples
+            dynamic += int(fast.dynamic.sum())
+            false += sum(a != b for a, b in zip(fast.verdict, full.verdict, strict=True))
+    least = np.min(ratios, axis=0)
+    print(f"{samples} samples, {dynamic} of them by the dynamics; another verdict in the dynamics: {false}")
+    print(f"bound without following over the tide followed, {len(ratios)} passages, least:")
+    print(f"peak {least[0]:.3f}, integral {least[1]:.3f} (below 1: false)")
+    return int(false > 0 or bool(np.any(least < 1.0)))
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("what", choices=("scripted", "real"))
+    parser.add_argument("--encounters", type=int, default=200)
+    parser.add_argument("--bodies", type=int, default=80)
+    parser.add_argument("--every", type=int, default=4, help="every Nth asteroid of the catalogue")
+    parser.add_argument("--seed", type=int, default=0)
+    args = parser.parse_args()
+    return scripted(args) if args.what == "scripted" else real(args)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
