@@ -389,8 +389,8 @@ def find_encounters(
         ``distance`` (km), ``v_rel`` and ``v_inf`` (km/s; 0 for a bound passage), ``b_t`` and ``b_r`` (km;
         target plane, north +z of ICRF, :mod:`flybystab.sky.b_plane`; nan for a bound passage), ``impact``,
         ``index`` (of the asteroid), ``position`` and ``velocity`` (ICRF, relative to the planet). On
-        an impact, distance and time are those of the two-body orbit without a surface, position and velocity are from the step
-        before, and the search ends for that asteroid. Metadata: ephemeris, forces, frame, time scale,
+        an impact, distance and time are those of the two-body orbit without a surface, position and velocity
+        are from the step before, and the search ends for that asteroid. Metadata: ephemeris, forces, frame, time scale,
         tolerance.
 
     Raises
