@@ -27,6 +27,7 @@ _HOME = {
     "R_earth": "units",
     "Verdict": "outcome",
     "catalogue": "survey.catalogue",
+    "encounter_distribution": "sky.distribution",
     "cite": "face.cite",
     "equilibrium": "aggregate.equilibrium",
     "find_encounters": "sky.finder",
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
     from flybystab.flyby_results import FlybyResult
     from flybystab.flybys import flyby, flyby_many, periapsis_axes
     from flybystab.outcome import Verdict
+    from flybystab.sky.distribution import encounter_distribution
     from flybystab.sky.encounter import Encounter
     from flybystab.sky.finder import find_encounters
     from flybystab.sky.orbit import Orbit
