@@ -117,7 +117,7 @@ BY_KEY = {
     "time_scale": ("HairerNorsettWanner1993",),
 }
 
-#: Behind an orbit that was followed through an encounter: its forces are named "orbit: ...".
+#: Behind an orbit that was followed through an encounter: the Sun is among its forces.
 ORBIT = ("ReinLiu2012", "ReinSpiegel2015")
 
 
@@ -158,7 +158,7 @@ def cited(result: FlybyResult | QTable | Mapping[str, Any] | None = None) -> tup
         found.update(BY_WORD.get(key, ()))
         if isinstance(value, str):
             found.update(BY_WORD.get(value, ()))
-            followed = key in ("modelled", "forces") and value.startswith("orbit: ")
+            followed = key in ("modelled", "forces") and "orbit: sun point mass" in value
             found.update(ORBIT if followed else ())
     return tuple(key for key in BIBTEX if key in found)
 

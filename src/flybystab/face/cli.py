@@ -56,6 +56,14 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
+class _Help(argparse.RawDescriptionHelpFormatter):
+    """Examples as they are written, and no line broken after the name of a command."""
+
+    def __init__(self, prog: str) -> None:
+        super().__init__(prog, max_help_position=26)
+        self._action_max_length = 16  # argparse forgets that the commands are indented
+
+
 def command_parser() -> argparse.ArgumentParser:
     """The parser of every command."""
     parser = argparse.ArgumentParser(
@@ -63,7 +71,7 @@ def command_parser() -> argparse.ArgumentParser:
         description="Do rubble-pile asteroids survive their close planetary encounters?",
         epilog="examples:\n  flybystab flyby Apophis --output apophis.png\n  flybystab scenario p2.toml --json\n"
         "  flybystab screen --from 2026-01-01 --to 2036-01-01",
-        formatter_class=argparse.RawDescriptionHelpFormatter,
+        formatter_class=_Help,
     )
     parser.add_argument("--version", action="version", version=f"flybystab {__version__}")
     commands = parser.add_subparsers(dest="command", metavar="COMMAND")
@@ -73,7 +81,7 @@ def command_parser() -> argparse.ArgumentParser:
             help=command.HELP,
             description=command.HELP,
             epilog=f"example:\n  {command.EXAMPLE}",
-            formatter_class=argparse.RawDescriptionHelpFormatter,
+            formatter_class=_Help,
         )
         sub.add_argument(
             "--json", action="store_true", help="print one JSON document, with units in its keys"

@@ -262,7 +262,7 @@ class Encounter:
 
         stop = half + wait
         panels, error = tide_panels(tide, -half, stop + TAIL, q / speed)
-        forces = [f"{body.name} point mass"] + ([f"{body.name} J2 (tide only)"] if j2 else [])
+        forces = ["orbit: two-body", f"tide: {body.name}"] + ([f"tide: {body.name} J2"] if j2 else [])
         return cls(
             planet=body,
             time=None,
