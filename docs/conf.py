@@ -4,6 +4,7 @@ from flybystab import __version__
 
 project = "flybystab"
 author = "The flybystab developers"
+copyright = "the flybystab developers, GPL-3.0-or-later"
 release = __version__
 extensions = ["sphinx.ext.autodoc", "sphinx.ext.napoleon", "myst_parser", "sphinx-mathjax-offline"]
 myst_enable_extensions = ["dollarmath", "deflist"]

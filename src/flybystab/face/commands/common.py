@@ -24,7 +24,10 @@ def material_arguments(sub: argparse.ArgumentParser) -> None:
 
 def surface_argument(sub: argparse.ArgumentParser) -> None:
     """Add the yield surface."""
-    sub.add_argument("--surface", default="drucker-prager", help="yield surface (drucker-prager)")
+    names = ", ".join(OTHER_SURFACES)
+    sub.add_argument(
+        "--surface", default="drucker-prager", metavar="NAME", help=f"yield surface (drucker-prager; {names})"
+    )
 
 
 def dates_arguments(sub: argparse.ArgumentParser, start: str, stop: str) -> None:
