@@ -27,8 +27,8 @@ from flybystab.errors import FlybystabError
 from flybystab.sky.encounter import Encounter
 from flybystab.sky.planets import planet
 from flybystab.survey.catalogue import catalogue
+from flybystab.survey.draws import Attitudes, draws
 from flybystab.survey.judging import judge
-from flybystab.survey.population import Attitudes, draws
 from flybystab.survey.quick import INTACT, NOT_IN_EQUILIBRIUM, quick_margins, tide_size
 from flybystab.survey.screening import passages, settings
 

@@ -7,15 +7,10 @@ import pytest
 from flybystab.aggregate.body import Material
 from flybystab.errors import InvalidInput, UnknownName
 from flybystab.survey.catalogue import Asteroid, catalogue
-from flybystab.survey.population import (
-    Attitudes,
-    Distribution,
-    Population,
-    draws,
-    nominal,
-    stream,
-    truncated_normal,
-)
+from flybystab.survey.distributions import Distribution, truncated_normal
+from flybystab.survey.draws import Attitudes, draws, nominal, stream
+from flybystab.survey.lightcurves import periods_like
+from flybystab.survey.population import Population
 
 APOPHIS = Asteroid.from_catalogue("Apophis")
 ANTEROS = Asteroid.from_catalogue("Anteros")
@@ -56,6 +51,12 @@ def test_truncation_keeps_the_shape_inside():
         ({"albedo": {"kind": "lognormal", "median": -1.0, "sigma": 1.0}}, InvalidInput, "positive scale"),
         ({"albedo": {"kind": "normal", "mean": float("nan"), "sd": 1.0}}, InvalidInput, "finite"),
         ({"replace_assumed": 1}, InvalidInput, "true or false"),
+        ({"cohesion_Pa": {"kind": "normal", "mean": 50, "sd": 50}}, InvalidInput, "low and high to cut"),
+        ({"flattening": 1.2}, InvalidInput, "within"),
+        ({"albedo": {"kind": "catalogue"}}, InvalidInput, "numbers of its own"),
+        ({"density_by_class_kg_m3": {"S-type": 2000}}, InvalidInput, "first letters"),
+        ({"density_by_class_kg_m3": {"S": {"kind": "normal", "mean": 3}}}, InvalidInput, "S.sd"),
+        ({"log_elongation_sigma": "wide"}, InvalidInput, "0 to 1"),
     ],
 )
 def test_bad_population_is_named(data, error, match):
@@ -73,8 +74,13 @@ def test_population_from_toml(tmp_path):
     assert np.all(d.cohesion == 0)
     assert np.degrees(d.phi).mean() == pytest.approx(33, abs=0.3)
     assert "33" in p.stated()["friction_angle_deg"]
-    with pytest.raises(InvalidInput, match="TOML"):
+    with pytest.raises(InvalidInput, match="readable"):
         Population.from_file(tmp_path / "missing.toml")
+    path.write_text("cohesion_Pa = = 3")
+    with pytest.raises(InvalidInput, match="TOML"):
+        Population.from_file(path)
+    path.write_text(Population().toml())
+    assert Population.from_file(path) == Population()
 
 
 def test_a_draw_depends_on_seed_and_asteroid_only():
@@ -144,9 +150,25 @@ def test_body_from_absolute_magnitude_alone(tmp_path):
     # D = 1329 km / sqrt(0.14) 10^(-H/5) = 141 m
     assert np.median(2 * np.cbrt(np.prod(d.axes, axis=1))) == pytest.approx(141, rel=0.05)
     assert {"diameter (from H and albedo)", "density", "spin period", "elongation"} <= set(d.drawn)
-    assert np.median(d.period) / 3600 == pytest.approx(5, abs=3)
+    assert np.median(d.period) / 3600 == pytest.approx(np.median(periods_like(22.0)), rel=0.15)
     with pytest.raises(InvalidInput, match="H_mag"):
         draws(nothing, 1, 0)
+
+
+def test_what_the_catalogue_lacks_comes_from_class_lightcurve_and_size(tmp_path):
+    path = tmp_path / "h.csv"
+    path.write_text("name,H_mag,taxonomic_class,amplitude_mag\nStony,18,Sq,1.0\nDark,18,Cb,\nBare,27,,\n")
+    stony, dark, bare = (draws(a, 3000, 0) for a in catalogue(path))
+    assert stony.rho.mean() == pytest.approx(2300, rel=0.02)
+    assert dark.rho.std() == pytest.approx(300, rel=0.05)
+    assert bare.rho.mean() == pytest.approx(2080, rel=0.02)  # 2000 +- 700 cut at 800 and 4000
+    assert "density (from the class)" in stony.drawn
+    ratio = stony.axes[:, 0] / stony.axes[:, 1]
+    assert np.median(np.log10(ratio)) == pytest.approx(0.2, abs=0.01)
+    # small bodies turn fast: the LCDB's median at H = 27 is minutes, at 18 hours
+    assert np.median(bare.period) < 0.2 * np.median(dark.period)
+    given = draws(catalogue(path)[0], 5, 0, Population.from_mapping({"density_kg_m3": 1500}))
+    assert np.all(given.rho == 1500)
 
 
 def test_assumed_values_can_be_replaced():

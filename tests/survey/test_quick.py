@@ -12,8 +12,8 @@ from flybystab.constants import GM_EARTH, R_EARTH, G
 from flybystab.core.statics import demand, rigid_stress
 from flybystab.sky.encounter import Encounter
 from flybystab.survey.catalogue import Asteroid
+from flybystab.survey.draws import Attitudes, draws
 from flybystab.survey.judging import judge as judged
-from flybystab.survey.population import Attitudes, draws
 from flybystab.survey.quick import INTACT, NOT_IN_EQUILIBRIUM, UNDECIDED, quick_margins, tide_size
 from flybystab.survey.screening import passages, settings
 

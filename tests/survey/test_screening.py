@@ -15,8 +15,9 @@ from flybystab.sky.encounter import Encounter, usual_start
 from flybystab.sky.planets import planet
 from flybystab.survey.catalogue import Asteroid
 from flybystab.survey.columns import COLUMNS, VERDICTS, share_of
+from flybystab.survey.draws import Attitudes, draws
 from flybystab.survey.judging import Passage, contributors, judge, wilson
-from flybystab.survey.population import Attitudes, Population, draws
+from flybystab.survey.population import Population
 from flybystab.survey.quick import tide_size
 from flybystab.survey.results import read_results
 from flybystab.survey.screening import Screening, screen, settings

@@ -29,7 +29,7 @@ from flybystab.sky.encounter import Encounter
 from flybystab.sky.finder import find_encounters
 from flybystab.survey.attitude import attitude_matrix, isotropic_direction
 from flybystab.survey.catalogue import Asteroid
-from flybystab.survey.population import identity, stream
+from flybystab.survey.draws import identity, stream
 from flybystab.units import to_si
 
 _TOLERANCE = 1e-7

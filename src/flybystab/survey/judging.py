@@ -17,7 +17,7 @@ from flybystab.outcome import Verdict
 from flybystab.sky.encounter import SETTLE, Encounter, far_enough, usual_start
 from flybystab.sky.planets import PLANETS, planet
 from flybystab.survey.catalogue import Asteroid
-from flybystab.survey.population import Attitudes, Draws
+from flybystab.survey.draws import Attitudes, Draws
 from flybystab.survey.quick import INTACT, UNDECIDED, quick_margins, tide_size
 
 Array = NDArray[np.float64]

@@ -35,8 +35,10 @@ from flybystab.sky.ephemeris import ephemeris
 from flybystab.sky.planets import planet
 from flybystab.survey.catalogue import Asteroid, catalogue
 from flybystab.survey.columns import COLUMNS, SAMPLE_COLUMNS, VERDICTS, YIELDED, share_of
+from flybystab.survey.draws import Attitudes, Draws, draws, identity, nominal
+from flybystab.survey.formats import foreign, with_physical_data
 from flybystab.survey.judging import Judged, Passage, contributors, inputs, judge, wilson
-from flybystab.survey.population import Attitudes, Draws, Population, draws, identity, nominal
+from flybystab.survey.population import Population
 from flybystab.survey.results import Journal, check_output, table_of, write_rows
 from flybystab.units import to_si
 
@@ -505,7 +507,7 @@ def settings(
 
 
 def screen(
-    asteroids: str | Path | Sequence[Asteroid | str | int] | None,
+    asteroids: str | Path | Sequence[Asteroid | str | int | Path] | None,
     start: Time | str,
     stop: Time | str,
     planets: Sequence[str] = ("earth",),
@@ -525,7 +527,8 @@ def screen(
     Parameters
     ----------
     asteroids : sequence of Asteroid, str or int, or a path, or None
-        Asteroids or their names in the embedded catalogue; a catalogue file; None for the embedded catalogue.
+        Asteroids, their names in the embedded catalogue, or paths of catalogue files (:func:`catalogue`); None
+        for the embedded catalogue.
     start, stop : Time or str
         Span; text is read as TDB.
     planets : sequence of str
@@ -573,15 +576,25 @@ def screen(
     return table_of((r for i in sorted(found) for r in found[i]), COLUMNS, run.meta())
 
 
-def listed(asteroids: str | Path | Sequence[Asteroid | str | int] | None) -> tuple[Asteroid, ...]:
-    """Asteroids from what `screen` accepts."""
-    if asteroids is None or isinstance(asteroids, str | Path):
-        return catalogue(asteroids)
-    out = tuple(a if isinstance(a, Asteroid) else Asteroid.from_catalogue(a) for a in asteroids)
-    if not out:
+def listed(asteroids: str | Path | Sequence[Asteroid | str | int | Path] | None) -> tuple[Asteroid, ...]:
+    """Asteroids from what `screen` accepts; bodies of tables of orbits are completed from the embedded tables."""
+    if asteroids is None:
+        return catalogue()
+    if isinstance(asteroids, str | Path):
+        asteroids = [Path(asteroids)]
+    found: list[Asteroid] = []
+    for a in asteroids:
+        if isinstance(a, Asteroid):
+            found.append(a)
+        elif isinstance(a, Path):
+            rows = catalogue(a)
+            found += with_physical_data(rows) if any(map(foreign, rows)) else rows
+        else:
+            found.append(Asteroid.from_catalogue(a))
+    if not found:
         raise InvalidInput("asteroids", asteroids, "at least one asteroid")
-    keys = Counter(identity(a) for a in out)
+    keys = Counter(identity(a) for a in found)
     twice = [k for k, n in keys.items() if n > 1]
     if twice:
         raise InvalidInput("asteroids", ", ".join(twice), "every asteroid once")
-    return out
+    return tuple(found)

@@ -1,10 +1,10 @@
-"""``flybystab screen [FILE]``: a whole catalogue through its encounters."""
+"""``flybystab screen [FILE or NAME ...]``: a whole catalogue through its encounters."""
 
 from __future__ import annotations
 
 import argparse
 
-from flybystab.face.commands.common import show, span_arguments, tdb
+from flybystab.face.commands.common import material_arguments, show, span_arguments, tdb
 
 HELP = "a whole catalogue through its encounters"
 EXAMPLE = "flybystab screen --from 2026-01-01 --to 2036-01-01 --samples 100 --jobs 2"
@@ -12,31 +12,50 @@ EXAMPLE = "flybystab screen --from 2026-01-01 --to 2036-01-01 --samples 100 --jo
 
 def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
-    sub.add_argument("file", nargs="?", help="catalogue file; the embedded catalogue if left out")
+    sub.add_argument(
+        "asteroids",
+        nargs="*",
+        metavar="FILE",
+        help="catalogue files (own CSV, JPL SBDB, MPC, NEOCC .ke1) or names; the embedded catalogue if left out",
+    )
     span_arguments(sub, "2026-01-01", "2036-01-01")
+    material_arguments(sub)
     sub.add_argument(
         "--samples", type=int, default=1, metavar="N", help="draws of the uncertain inputs (1: none)"
     )
     sub.add_argument("--seed", type=int, default=0, help="fixes every draw (0)")
+    sub.add_argument(
+        "--population", metavar="FILE", help="distributions to draw from, TOML; what it leaves out is default"
+    )
+    sub.add_argument("--population-default", action="store_true", help="print the default as TOML, and stop")
     sub.add_argument("--jobs", type=int, default=1, metavar="N", help="processes (1)")
     sub.add_argument("--dask", metavar="ADDRESS", help="a dask scheduler instead of processes")
     sub.add_argument("--output", default="screening.ecsv", metavar="FILE", help="table, .ecsv or .parquet")
+    sub.add_argument("--samples-output", metavar="FILE", help="table of all samples, .ecsv or .parquet")
 
 
 def run(options: argparse.Namespace) -> None:
     """Answer the command."""
+    from pathlib import Path
+
     import astropy.units as u
 
+    from flybystab.aggregate.body import Material
     from flybystab.face.document import table_document
     from flybystab.survey.executors import workers
+    from flybystab.survey.population import Population
     from flybystab.survey.progress import ProgressBar
     from flybystab.survey.results import check_output, read_results
     from flybystab.survey.screening import Screening, listed, settings
     from flybystab.survey.summary import summary
 
+    if options.population_default:
+        print(Population().toml(), end="")
+        return
     output = check_output(options.output)
+    names = [Path(a) if _is_file(a) else a for a in options.asteroids]
     screening = Screening(
-        listed(options.file),
+        listed(names or None),
         settings(
             tdb(options.start, "--from"),
             tdb(options.stop, "--to"),
@@ -44,12 +63,27 @@ def run(options: argparse.Namespace) -> None:
             within=options.within * u.au,
             samples=options.samples,
             seed=options.seed,
+            material=Material(
+                friction_angle=options.friction * u.deg,
+                cohesion=options.cohesion * u.Pa,
+                yield_surface=options.surface,
+            ),
+            population=Population.from_file(options.population) if options.population else None,
+            keep_samples=options.samples_output is not None,
         ),
     )
     with workers(options.jobs, options.dask) as executor:
-        screening.run(output, executor=executor, progress=ProgressBar())
+        screening.run(
+            output, samples_output=options.samples_output, executor=executor, progress=ProgressBar()
+        )
     show(
         options,
         lambda: table_document(read_results(output)),
         lambda: [summary(output).text(), f"table      {output}"],
     )
+
+
+def _is_file(word: str) -> bool:
+    from pathlib import Path
+
+    return Path(word).exists() or Path(word).suffix in (".csv", ".gz", ".ke1", ".json") or "/" in word
