@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 import flybystab as fs
 from flybystab.face.cli import main
 from flybystab.face.maps import outcome_map, outcome_plot, target_map, target_plot
-from flybystab.face.scene import scene_plot
+from flybystab.face.scene import animation, scene_plot
 
 DOCS = Path(__file__).resolve().parent
 IMAGES = DOCS / "images"
@@ -41,6 +41,8 @@ figure = Figure(figsize=(6.4, 4.8), layout="constrained")
 result = fs.flyby(PILE, fs.Encounter.hyperbolic("earth", 2.0 * fs.R_earth, 5 * u.km / u.s))
 scene_plot(figure.add_subplot(projection="3d"), result)
 save("scene.png", figure)
+animation(result, IMAGES / "pile.gif", "2.0 Earth radii at 5 km/s", frames=45, rate=10)
+print(IMAGES / "pile.gif")
 
 with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
     runpy.run_path(str(DOCS.parent / "examples" / "catalogue_on_the_spin_limit.py"))

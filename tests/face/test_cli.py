@@ -105,6 +105,14 @@ def test_screen_and_show(capsys, tmp_path):
     assert any("Apophis" in str(row["asteroid"]) or "Apophis" in str(row) for row in rows)
 
 
+def test_an_ending_asks_for_a_film(capsys, tmp_path):
+    film = tmp_path / "p2.gif"
+    status, out, err = run(capsys, "scenario", EXAMPLES / "disruption_p2.toml", "--output", film)
+    assert status == 0, err
+    assert "to stay rigid, the material has 35 deg" in out
+    assert film.read_bytes()[:6] == b"GIF89a"
+
+
 def test_cite(capsys):
     status, out, _ = run(capsys, "cite")
     assert status == 0

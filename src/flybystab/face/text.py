@@ -52,10 +52,13 @@ def flyby_lines(r: FlybyResult) -> list[str]:
             f"{m.friction_angle.to_value(u.deg):g} deg a cohesion of {r.required_cohesion.to_value(u.Pa):.3g} Pa"
         )
         return out
-    out.append(
-        f"friction   mobilised {angle(r.max_required_friction_angle)} of {m.friction_angle.to_value(u.deg):g} deg"
-        + (f", margin {angle(r.margin)}" if r.margin > 0 * u.deg else "")
-    )
+    has = f"{m.friction_angle.to_value(u.deg):g} deg"
+    if r.margin > 0 * u.deg:
+        out.append(
+            f"friction   mobilised {angle(r.max_required_friction_angle)} of {has}, margin {angle(r.margin)}"
+        )
+    else:
+        out.append(f"friction   {angle(r.max_required_friction_angle)} to stay rigid, the material has {has}")
     if r.onset_time is not None:
         a = r.semi_axes.to_value(u.m)
         lode = "" if r.lode_angle is None else f", Lode angle {r.lode_angle.to_value(u.deg):.1f} deg"

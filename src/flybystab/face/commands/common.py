@@ -43,9 +43,15 @@ def span_arguments(sub: argparse.ArgumentParser, start: str, stop: str) -> None:
     sub.add_argument("--within", type=float, default=0.05, metavar="AU", help="largest distance (0.05 au)")
 
 
-def figure_argument(sub: argparse.ArgumentParser) -> None:
-    """Add the file of a figure."""
-    sub.add_argument("--output", metavar="FILE", help="write a figure (.png, .pdf, .svg)")
+#: Endings of figures, and of animations.
+FIGURES = (".png", ".pdf", ".svg")
+FILMS = (".gif", ".mp4")
+
+
+def figure_argument(sub: argparse.ArgumentParser, films: bool = False) -> None:
+    """Add the file of a figure, or of an animation."""
+    film = f" or an animation ({', '.join(FILMS)})" if films else ""
+    sub.add_argument("--output", metavar="FILE", help=f"write a figure ({', '.join(FIGURES)}){film}")
 
 
 def show(options: argparse.Namespace, document: Callable[[], Any], lines: Callable[[], list[str]]) -> None:
@@ -88,7 +94,7 @@ def asteroid_of(options: argparse.Namespace) -> Any:
     return Asteroid.from_catalogue(options.name, material=material)
 
 
-def check_picture(path: str | None, endings: tuple[str, ...] = (".png", ".pdf", ".svg")) -> None:
+def check_picture(path: str | None, endings: tuple[str, ...] = FIGURES) -> None:
     """Find out that a picture (or page) cannot be written before computing it."""
     if path is None:
         return
@@ -99,3 +105,15 @@ def check_picture(path: str | None, endings: tuple[str, ...] = (".png", ".pdf", 
         raise InvalidInput("--output", path, f"a file that ends in {' or '.join(endings)}")
     if not target.parent.is_dir() or not os.access(target.parent, os.W_OK):
         raise InvalidInput("--output", path, "a folder that exists and can be written")
+
+
+def write_picture(result: Any, title: str, path: str) -> None:
+    """Write the panels of a flyby, or its animation, as the ending says."""
+    if path.lower().endswith(FILMS):
+        from flybystab.face.scene import animation
+
+        animation(result, path, title)
+    else:
+        from flybystab.face.plotting import flyby_figure
+
+        flyby_figure(result, title, path)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from flybystab.face.commands.common import check_picture, figure_argument, show
+from flybystab.face.commands.common import FIGURES, FILMS, check_picture, figure_argument, show, write_picture
 from flybystab.face.commands.flown import attitude_words, flown, passage_arguments
 
 HELP = "one asteroid through one encounter"
@@ -14,20 +14,18 @@ EXAMPLE = "flybystab flyby Apophis --output apophis.png"
 def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     passage_arguments(sub)
-    figure_argument(sub)
+    figure_argument(sub, films=True)
 
 
 def run(options: argparse.Namespace) -> None:
     """Answer the command."""
     from flybystab.face import document, text
 
-    check_picture(options.output)
+    check_picture(options.output, FIGURES + FILMS)
     asteroid, result, sample = flown(options)
     encounter = result.encounter
     if options.output:
-        from flybystab.face.plotting import flyby_figure
-
-        flyby_figure(result, f"{asteroid.label}, {encounter.time.tdb.iso[:10]}", options.output)
+        write_picture(result, f"{asteroid.label}, {encounter.time.tdb.iso[:10]}", options.output)
     show(
         options,
         lambda: document.flyby_document(

@@ -4,7 +4,15 @@ from __future__ import annotations
 
 import argparse
 
-from flybystab.face.commands.common import OTHER_SURFACES, check_picture, figure_argument, show
+from flybystab.face.commands.common import (
+    FIGURES,
+    FILMS,
+    OTHER_SURFACES,
+    check_picture,
+    figure_argument,
+    show,
+    write_picture,
+)
 
 HELP = "a scripted encounter from a TOML file"
 EXAMPLE = "flybystab scenario examples/disruption_p2.toml"
@@ -13,7 +21,7 @@ EXAMPLE = "flybystab scenario examples/disruption_p2.toml"
 def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     sub.add_argument("file", help="scenario file")
-    figure_argument(sub)
+    figure_argument(sub, films=True)
 
 
 def run(options: argparse.Namespace) -> None:
@@ -22,16 +30,14 @@ def run(options: argparse.Namespace) -> None:
     from flybystab.face.scenario import scenario
     from flybystab.flybys import flyby
 
-    check_picture(options.output)
+    check_picture(options.output, FIGURES + FILMS)
     script = scenario(options.file)
     figure = options.output or script.figure
-    check_picture(figure)
+    check_picture(figure, FIGURES + FILMS)
     others = [s for s in (*OTHER_SURFACES, "drucker-prager") if s != script.body.material.yield_surface]
     result = flyby(script.body, script.encounter, script.attitude, surfaces=others)
     if figure:
-        from flybystab.face.plotting import flyby_figure
-
-        flyby_figure(result, script.title, figure)
+        write_picture(result, script.title, figure)
     show(
         options,
         lambda: document.flyby_document(result, title=script.title, figure=figure),
