@@ -175,9 +175,13 @@ class Encounter:
     @cached_property
     def periapsis_axes(self) -> Array:
         """Rotation matrix, `frame` -> periapsis frame: x to the asteroid, z along the angular momentum."""
-        state = self.track.states(np.zeros(1))[0]
-        h = np.cross(state[:3], state[3:])
-        x, z = state[:3] / np.linalg.norm(state[:3]), h / np.linalg.norm(h)
+        # A track that ends on the planet has no periapsis: that of the two-body orbit it ends on.
+        ended = self.impact and self.t_stop < 0.0
+        state = self.track.states(np.array([self.t_stop if ended else 0.0]))[0]
+        r, v = state[:3], state[3:]
+        h = np.cross(r, v)
+        x = np.cross(v, h) / self.planet.gm - r / np.linalg.norm(r) if ended else r
+        x, z = x / np.linalg.norm(x), h / np.linalg.norm(h)
         return np.stack([x, np.cross(z, x), z])
 
     def b_plane(self, north: Sequence[float] = NORTH) -> Quantity:

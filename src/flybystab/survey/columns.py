@@ -52,6 +52,9 @@ COLUMNS: dict[str, Column] = {
     "p_yield": Column(float, None, "share of the samples in equilibrium that yield, or hit the planet"),
     "p_yield_low": Column(float, None, "95 % interval (Wilson) of that probability"),
     "p_yield_high": Column(float, None, "95 % interval (Wilson) of that probability"),
+    "distance_sigma": Column(
+        float, u.km, "1-sigma of the distance, from the orbit's covariance; nan where none is known"
+    ),
     "contributors": Column(
         str, None, "inputs that the mobilised friction follows most, with rank correlation"
     ),
@@ -75,6 +78,7 @@ SAMPLE_COLUMNS: dict[str, Column] = {
     "planet": Column(str, None, "planet encountered"),
     "jd_tdb": Column(float, u.d, "closest approach, Julian date, TDB"),
     "sample": Column(int, None, "number of the sample"),
+    "distance": Column(float, u.au, "at closest approach, of the sample's orbit"),
     "semi_axis_a": Column(float, u.m, "long semi-axis"),
     "semi_axis_b": Column(float, u.m, "middle semi-axis"),
     "semi_axis_c": Column(float, u.m, "short semi-axis"),

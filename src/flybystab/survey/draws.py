@@ -69,6 +69,11 @@ class Draws(NamedTuple):
     phase: Array
     drawn: tuple[str, ...]
 
+    def only(self, i: int) -> Draws:
+        """Sample `i` alone."""
+        arrays = {name: getattr(self, name)[i : i + 1] for name in self._fields if name != "drawn"}
+        return self._replace(**arrays)
+
     def body(self, i: int, material: Material) -> Body:
         """Sample `i` as a body; friction and cohesion are the sample's, the rest is of `material`."""
         return Body(
@@ -223,6 +228,10 @@ class Attitudes:
         """Attitudes that depend on the seed, the asteroid and the encounter only."""
         numbers = stream(seed, "attitude", identity(asteroid), *encounter).random((len(draws.rho), 3))
         return cls(asteroid, draws, numbers)
+
+    def only(self, i: int) -> Attitudes:
+        """Attitude of sample `i` alone."""
+        return Attitudes(self.asteroid, self.draws.only(i), self.uniform[i : i + 1])
 
     def pole(self, i: int) -> Array:
         """Direction of the angular momentum of sample `i`, ICRF."""

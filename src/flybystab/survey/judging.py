@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import astropy.units as u
@@ -11,10 +12,12 @@ from numpy.typing import NDArray
 from scipy.stats import rankdata
 
 from flybystab.aggregate.body import Material
-from flybystab.errors import FlybystabError
+from flybystab.constants import AU
+from flybystab.errors import FlybystabError, NoEncounter
 from flybystab.flybys import LOOSER, flyby_many, periapsis_axes
 from flybystab.outcome import Verdict
 from flybystab.sky.encounter import SETTLE, Encounter, far_enough, usual_start
+from flybystab.sky.orbit import Orbit
 from flybystab.sky.planets import PLANETS, planet
 from flybystab.survey.catalogue import Asteroid
 from flybystab.survey.draws import Attitudes, Draws
@@ -32,7 +35,23 @@ _SQRT6 = np.sqrt(6.0)
 
 @dataclass
 class Passage:
-    """One encounter of one asteroid during its screening; the tide is made when it is first needed."""
+    """One encounter of one asteroid during its screening; the tide is made when it is first needed.
+
+    Attributes
+    ----------
+    asteroid : Asteroid
+    planet : str
+    time : Time
+        Closest approach.
+    distance, v_inf : float
+        m, m/s.
+    encounter : Encounter or None
+        Once it has been followed; given for a scripted one.
+    orbit : Orbit or None
+        A clone, instead of the asteroid's own orbit.
+    missed : bool
+        The clone does not come nearer than `distance`, and has no passage to follow.
+    """
 
     asteroid: Asteroid
     planet: str
@@ -40,6 +59,8 @@ class Passage:
     distance: float
     v_inf: float
     encounter: Encounter | None = None
+    orbit: Orbit | None = None
+    missed: bool = False
 
     def bounds(self) -> tuple[float, float]:
         """Bounds on the tide, as of :func:`tide_size`, from distance and speed alone; infinite where unknown.
@@ -81,9 +102,11 @@ class Passage:
 
     def meet(self) -> Encounter:
         """The encounter, followed with all forces."""
+        if self.missed:
+            raise NoEncounter(f"the clone has no passage within {self.distance / AU:.3g} au of {self.planet}")
         if self.encounter is None:
             self.encounter = Encounter.from_orbit(
-                self.asteroid.orbit,
+                self.orbit or self.asteroid.orbit,
                 self.planet,
                 self.time,
                 within=max(1.5 * self.distance, far_enough(planet(self.planet))) * u.m,
@@ -197,6 +220,28 @@ def judge(
             pair = [t.max_required_friction_angle[0].to_value(u.deg) for t in (looser, table)]
             out.numerical = 0.0 if pair[0] == pair[1] else float(abs(pair[0] - pair[1]))
     return out
+
+
+def judge_each(
+    passages: Sequence[Passage],
+    draw: Draws,
+    attitudes: Attitudes,
+    material: Material,
+    *,
+    tolerance: float = 1e-7,
+) -> Judged:
+    """Verdicts on bodies, each in a passage of its own (arguments as of :func:`judge`)."""
+    one = [
+        judge(p, draw.only(i), attitudes.only(i), material, tolerance=tolerance)
+        for i, p in enumerate(passages)
+    ]
+    return Judged(
+        [j.verdict[0] for j in one],
+        np.array([j.margin[0] for j in one]),
+        np.array([j.rest[0] for j in one]),
+        np.array([j.dynamic[0] for j in one]),
+        [j.error[0] for j in one],
+    )
 
 
 def wilson(successes: int, trials: int, z: float = 1.959964) -> tuple[float, float]:

@@ -37,9 +37,10 @@ from flybystab.survey.catalogue import Asteroid, catalogue
 from flybystab.survey.columns import COLUMNS, SAMPLE_COLUMNS, VERDICTS, YIELDED, share_of
 from flybystab.survey.draws import Attitudes, Draws, draws, identity, nominal
 from flybystab.survey.formats import foreign, with_physical_data
-from flybystab.survey.judging import Judged, Passage, contributors, inputs, judge, wilson
+from flybystab.survey.judging import Judged, Passage, contributors, inputs, judge, judge_each, wilson
 from flybystab.survey.population import Population
 from flybystab.survey.results import Journal, check_output, table_of, write_rows
+from flybystab.survey.spread import Spread, spread
 from flybystab.units import to_si
 
 Array = NDArray[np.float64]
@@ -145,7 +146,12 @@ def screen_passage(passage: Passage, settings: Settings) -> tuple[dict[str, Any]
         return row, []
     draw = draws(asteroid, settings.samples, settings.seed, settings.population)
     attitudes = Attitudes.at(asteroid, draw, settings.seed, *where)
-    result = judge(passage, draw, attitudes, material, tolerance=settings.tolerance)
+    orbits = spread(passage, settings.samples, settings.seed)
+    if orbits.passages is None:
+        result = judge(passage, draw, attitudes, material, tolerance=settings.tolerance)
+    else:
+        result = judge_each(orbits.passages, draw, attitudes, material, tolerance=settings.tolerance)
+    distances = _distances(passage, orbits, settings.samples)
     counts = Counter(result.verdict)
     judged = settings.samples - counts[""]
     stands = judged - counts[Verdict.NOT_IN_EQUILIBRIUM]
@@ -158,13 +164,24 @@ def screen_passage(passage: Passage, settings: Settings) -> tuple[dict[str, Any]
         "p_yield": yielded / stands if stands else np.nan,
         "p_yield_low": low,
         "p_yield_high": high,
-        "contributors": contributors(inputs(draw), result.margin),
-        "drawn": "; ".join(draw.drawn),
+        "distance_sigma": orbits.sigma / 1000.0,
+        "contributors": contributors(inputs(draw) | {"distance": distances}, result.margin),
+        "drawn": "; ".join((*draw.drawn, *(("orbit",) if orbits.passages else ()))),
+        "assumed": "; ".join(filter(None, (row["assumed"], orbits.note))),
     }
     failures = [e for e in result.error if e]
     if failures and not row["error"]:
         row["error"] = f"{len(failures)} samples: {failures[0]}"
-    return row, list(_samples(passage, draw, attitudes, result)) if settings.keep_samples else []
+    if not settings.keep_samples:
+        return row, []
+    return row, list(_samples(passage, distances, draw, attitudes, result))
+
+
+def _distances(passage: Passage, orbits: Spread, samples: int) -> Array:
+    """Distance of each sample's passage, m."""
+    if orbits.passages is None:
+        return np.full(samples, passage.distance)
+    return np.array([p.distance for p in orbits.passages])
 
 
 def _rise(most: float, rest: float) -> float:
@@ -172,7 +189,9 @@ def _rise(most: float, rest: float) -> float:
     return most - rest if np.isfinite(rest) else np.nan
 
 
-def _samples(passage: Passage, draw: Draws, attitudes: Attitudes, result: Judged) -> Iterator[dict[str, Any]]:
+def _samples(
+    passage: Passage, distances: Array, draw: Draws, attitudes: Attitudes, result: Judged
+) -> Iterator[dict[str, Any]]:
     for i in range(len(draw.rho)):
         pole = attitudes.pole(i)
         yield {
@@ -180,6 +199,7 @@ def _samples(passage: Passage, draw: Draws, attitudes: Attitudes, result: Judged
             "planet": passage.planet,
             "jd_tdb": float(passage.time.tdb.jd),
             "sample": i,
+            "distance": float(distances[i]) / AU,
             **{f"semi_axis_{x}": float(a) for x, a in zip("abc", draw.axes[i], strict=True)},
             "density": float(draw.rho[i]),
             "spin_period": float(draw.period[i]) / 3600.0,
@@ -336,6 +356,8 @@ class Screening:
         digest = hashlib.sha256()
         for a in self.asteroids:
             digest.update(json.dumps(sorted(a.row.items())).encode())
+            if a.covariance is not None:
+                digest.update(a.covariance.values.tobytes() + a.covariance.matrix.tobytes())
         settings = json.dumps(self.settings.stated() | {"ephemeris": ephemeris().name}, sort_keys=True)
         digest.update(settings.encode())
         return {"flybystab": __version__, "run": digest.hexdigest(), "samples": self.settings.keep_samples}
@@ -428,8 +450,8 @@ class Screening:
         rows = 0
         complete = False
 
-        def tell() -> Progress:
-            state = Progress(
+        def state() -> Progress:
+            return Progress(
                 len(journal.where),
                 len(self.asteroids),
                 resumed,
@@ -437,9 +459,10 @@ class Screening:
                 dict(counts),
                 clock.monotonic() - began,
             )
+
+        def tell() -> None:
             if progress is not None:
-                progress(state)
-            return state
+                progress(state())
 
         for task in journal.tasks():
             rows += len(task["rows"])
@@ -458,7 +481,7 @@ class Screening:
             if extra is not None:
                 write_rows((r for t in journal.tasks() for r in t["samples"]), extra, SAMPLE_COLUMNS, meta)
             journal.close(remove=complete)
-        return tell()
+        return state()
 
 
 def settings(
