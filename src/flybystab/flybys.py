@@ -431,6 +431,8 @@ def _modelled(body: Body) -> tuple[str, ...]:
         + (" (brittle)" if m.brittle and m.c_pa > 0.0 else ""),
         "volume-preserving flow"
         if m.dilatancy == 0.0
+        else "associative flow, its dilation fading out before V/V0 = 1.5"
+        if m.dilatancy == 1.0
         else f"dilatancy {m.dilatancy:g} of the largest, fading out before V/V0 = 1.5",
     ]
     return tuple(text)

@@ -128,3 +128,107 @@ def test_load_interval_agrees_with_a_scan(code):
             found += 1
             assert np.array_equal(borne, (x >= low) & (x <= high))
     assert found > 10
+
+
+LODE = [rheology.MOHR_COULOMB, rheology.MATSUOKA_NAKAI]
+SINES = [0.05, 0.4, 0.5736, 0.8]
+
+
+def unit_deviator(theta):
+    """Unit deviator, sorted, at a Lode angle."""
+    return np.sqrt(2.0 / 3.0) * np.cos(theta + np.pi / 6.0 - np.array([0.0, 2.0, 4.0]) * np.pi / 3.0)
+
+
+def isotropic(a, b, u):
+    return a * u + b * (u @ u - np.eye(3) / 3.0)
+
+
+def random_deviators(n, seed):
+    rng = np.random.default_rng(seed)
+    m = rng.standard_normal((n, 3, 3))
+    m = m + np.swapaxes(m, 1, 2)
+    m -= np.trace(m, axis1=1, axis2=2)[:, None, None] / 3.0 * np.eye(3)
+    return m / np.linalg.norm(m, axis=(1, 2))[:, None, None]
+
+
+def admissible_stresses(code, sin, n, seed):
+    """Stresses inside and on the yield surface without cohesion, at any pressure."""
+    rng = np.random.default_rng(seed)
+    for u in random_deviators(n, seed):
+        p = rng.exponential()
+        k = rheology.slope(code, sin, np.linalg.det(u))
+        yield -p * np.eye(3) + rng.choice([1.0, rng.uniform()]) * k * p * u
+
+
+@pytest.mark.parametrize("code", CODES)
+@pytest.mark.parametrize("sin", SINES)
+def test_maximum_dissipation(code, sin):
+    """The true normal dissipates nothing without cohesion, and no admissible stress does more work on it."""
+    stresses = np.array(list(admissible_stresses(code, sin, 400, 1)))
+    for u in random_deviators(200, 2):
+        det = np.linalg.det(u)
+        a, b, support, g, stress_det = rheology.normal(code, sin, det)
+        n = isotropic(a, b, u)
+        assert np.linalg.norm(n) == pytest.approx(g, rel=1e-9)
+        assert np.linalg.det(n / g) == pytest.approx(stress_det, abs=1e-9)
+        assert g == pytest.approx(rheology.slope_over_sine(code, sin, stress_det), rel=1e-7)
+        d = u + sin * support / 3.0 * np.eye(3)
+        flowing = -np.eye(3) + sin * n
+        assert np.sum(flowing * d) == pytest.approx(0.0, abs=1e-12)
+        assert np.einsum("nij,ij->n", stresses, d).max() < 1e-9
+
+
+@pytest.mark.parametrize("code", LODE)
+def test_radial_flow_breaks_maximum_dissipation(code):
+    """Flow along the stress deviator with the least k: other admissible stresses would do up to a quarter more."""
+    sin = np.sin(np.deg2rad(35.0))
+    beta = rheology.least_slope(code, sin)
+    stresses = np.array(list(admissible_stresses(code, sin, 2000, 3)))
+    worst = 0.0
+    for u in random_deviators(200, 4):
+        k = rheology.slope(code, sin, np.linalg.det(u))
+        d = u + beta / 3.0 * np.eye(3)
+        work = np.einsum("nij,ij->n", stresses, d) / -np.trace(stresses, axis1=1, axis2=2) * 3.0
+        worst = max(worst, (work.max() - (k - beta)) / k)
+    assert 0.02 < worst < 0.25
+
+
+@pytest.mark.parametrize("sin", SINES)
+def test_stress_and_normal_are_inverse_on_a_smooth_surface(sin):
+    for theta in np.linspace(-np.pi / 6, np.pi / 6, 61):
+        u = np.diag(unit_deviator(theta))
+        a, b, support = rheology.flow_direction(rheology.MATSUOKA_NAKAI, sin, np.linalg.det(u))
+        d = isotropic(a, b, u)
+        assert np.linalg.norm(d) == pytest.approx(1.0, rel=1e-9)
+        a, b, back, g, _ = rheology.normal(rheology.MATSUOKA_NAKAI, sin, np.linalg.det(d))
+        np.testing.assert_allclose(isotropic(a, b, d) / g, u, atol=3e-7)
+        assert back == pytest.approx(support, rel=1e-9)
+
+
+@pytest.mark.parametrize("sin", SINES)
+def test_every_stress_on_a_face_of_mohr_coulomb_has_the_same_normal(sin):
+    """The intermediate principal rate vanishes and tr D = sin(phi) (d1 - d3); both corners share the normal."""
+    for theta in np.linspace(-0.5, 0.5, 11):
+        u = np.diag(unit_deviator(theta))
+        a, b, support = rheology.flow_direction(rheology.MOHR_COULOMB, sin, np.linalg.det(u))
+        d = isotropic(a, b, u) + sin * support / 3.0 * np.eye(3)
+        np.testing.assert_allclose(np.diag(d)[1], 0.0, atol=1e-12)
+        assert np.trace(d) == pytest.approx(sin * (d[0, 0] - d[2, 2]), rel=1e-12)
+        det = np.linalg.det(isotropic(a, b, u))
+        assert rheology.beyond_face(sin, det) == pytest.approx(0.0, abs=1e-9)
+        supports = [rheology.corner(sin, det, extension)[2] for extension in (True, False)]
+        assert supports == pytest.approx([support, support], rel=1e-9)
+
+
+@pytest.mark.parametrize("code", LODE)
+def test_gauge_and_its_derivatives(code):
+    h = 1e-4
+    for sin in SINES:
+        for theta in np.linspace(-0.5, 0.5, 21):
+            value, first, bend = rheology.gauge(code, sin, theta)
+            left, right = (rheology.gauge(code, sin, theta + x)[0] for x in (-h, h))
+            det = np.prod(unit_deviator(theta))
+            assert value == pytest.approx(1.0 / rheology.slope_over_sine(code, sin, det), rel=1e-9)
+            assert first == pytest.approx((right - left) / (2.0 * h), abs=1e-6)
+            assert bend - value == pytest.approx((right - 2.0 * value + left) / h**2, abs=1e-5)
+            assert bend >= 0.0

@@ -236,7 +236,7 @@ def test_frictionless_impulse_is_the_closed_form():
     )
     work = Buffers(np.zeros((N_WORK, 3, 3)), np.zeros((3, 6)))
     did = friction_impulse(
-        y, par, 0.0, np.zeros(6), work, np.zeros((15, 15)), np.zeros(15, dtype=np.int64), np.zeros(32)
+        y, par, 0.0, np.zeros(6), work, np.zeros((15, 15)), np.zeros(15, dtype=np.int64), np.zeros(36)
     )
     assert did == SLIDING
     inverse = np.linalg.inv(s)

@@ -55,6 +55,19 @@ def test_second_integrator_agrees(name):
     np.testing.assert_allclose(h[2], momentum(fine.shape, fine.velocity_gradient)[2], rtol=2e-6)
 
 
+@pytest.mark.parametrize("surface", ["mohr-coulomb", "matsuoka-nakai"])
+@pytest.mark.parametrize(("q", "period"), [(2.4, 6.0), (2.2, 6.0), (2.0, -6.0)])
+def test_second_integrator_agrees_on_the_true_normal(surface, q, period):
+    """Associative flow where k depends on the Lode angle: corners and faces of Mohr-Coulomb included."""
+    body = PILE.with_(spin_period=period * u.h, material=material(35, dilatancy=1.0, yield_surface=surface))
+    e = earth(q)
+    fine = carried(body, e.t_start, e.t_stop, e.tide, tolerance=1e-10)
+    reference = axes_of(fine.shape)
+    coarse, dense = (axes_of(stepped(body, e.t_start, e.t_stop, n, e.tide)[0]) for n in (8000, 16000))
+    assert 1.7 < np.abs(coarse / reference - 1.0).max() / np.abs(dense / reference - 1.0).max() < 2.3
+    np.testing.assert_allclose(2.0 * dense - coarse, reference, rtol=5e-6)
+
+
 def test_halving_every_tolerance_changes_nothing():
     e = earth(2.0)
     runs = [carried(PILE, e.t_start, e.t_stop, e.tide, tolerance=tol) for tol in (1e-8, 5e-9)]

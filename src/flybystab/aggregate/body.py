@@ -30,7 +30,8 @@ class Material:
     cohesion : Quantity
         Mohr-Coulomb cohesion ``Y`` (shear strength at zero pressure), Pa.
     dilatancy : float
-        ``beta / min k`` in [0, 1]: 0 preserves volume, 1 is associative on a circular cone.
+        Below 1 the flow goes along the stress deviator with ``tr D = beta |D'|``, ``beta`` this share of the least
+        slope ``k`` of the yield surface; 0 preserves volume. 1 is associative: ``D`` along the true normal.
     yield_surface : str
         One of :data:`YIELD_SURFACES`; the default is the cone through triaxial compression.
     brittle : bool

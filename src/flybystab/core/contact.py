@@ -1,7 +1,8 @@
 """Friction impulse: what a set-valued yield law does to a velocity gradient at one instant.
 
 ``Delta L = -That S^-1`` with ``That = -Phat 1 + (k Phat + chat) Dhat``, ``Dhat`` along the deviatoric rate of
-strain *afterwards* and ``Phat`` such that ``tr D = beta |D'|`` then. If a ``That`` inside the yield surface
+strain *afterwards* (for the true normal on ``k(theta)``: the stress whose normal that is) and ``Phat`` such that
+``tr D`` obeys the flow rule then. If a ``That`` inside the yield surface
 brings the body to rest, it does so; if no pressure is needed, nothing happens. A symmetric ``That`` keeps the
 angular momentum, and it never raises the kinetic energy.
 
@@ -17,8 +18,14 @@ from numpy.typing import NDArray
 from flybystab.core.jit import code, kernel
 from flybystab.core.motion import (
     COHESION,
+    COMPRESSION_CORNER,
     COS_PHI,
+    EXTENSION_CORNER,
+    FACE,
+    NORMAL,
+    PART,
     SIN_PHI,
+    SMOOTH,
     SURFACE,
     W_A,
     W_B,
@@ -28,12 +35,15 @@ from flybystab.core.motion import (
     W_SINV,
     Buffers,
     dilatancy,
+    dilation,
+    flow_stress,
     gradient,
+    isotropic,
     set_gradient,
 )
-from flybystab.core.rheology import slope_over_sine
+from flybystab.core.rheology import MOHR_COULOMB, beyond_face, corner, flow_direction, slope_over_sine
 from flybystab.core.steppers import factorise, solve
-from flybystab.core.tensors import deviator, inverse, multiply, pack, unpack
+from flybystab.core.tensors import determinant, deviator, inverse, multiply, pack, unpack
 from flybystab.core.tide import COMPONENTS
 
 Array = NDArray[np.float64]
@@ -43,8 +53,6 @@ FREE = code(0)
 REST = code(1)
 SLIDING = code(2)
 FAILED = code(3)
-
-_N = code(7)
 
 
 @kernel
@@ -64,22 +72,29 @@ def rest_spin(y: Array, s: Array, big_l: Array, work: Buffers, w: Array) -> None
 
 @kernel
 def _residual(
-    x: Array, beta: float, chat: float, par: Array, work: Buffers, d_star: Array, f: Array
+    x: Array, beta: float, cos_c: float, par: Array, work: Buffers, d_star: Array, f: Array
 ) -> float:
-    """Equations of the sliding impulse for ``x`` = (deviator of D afterwards, Phat); returns ``k``.
+    """Equations of the sliding impulse; returns its strength ``Phat sin + chat cos``.
 
-    ``D - sym L* - Phat S^-1 + (k Phat + chat) sym(Dhat S^-1) = 0`` and ``tr x = 0``, with
-    ``D = x + beta |x|/3 1``.
+    ``x`` holds the deviator of D afterwards, Phat and, on a face of Mohr-Coulomb, the place of the stress between
+    its corners. ``D - sym L* - Phat S^-1 + (Phat sin + chat cos) sym(N S^-1) = 0`` and ``tr x = 0``, with ``N`` the
+    stress deviator of `flow_stress` and ``tr D`` the `dilation` of ``x``; on a face ``x`` is normal to it.
     """
-    unit = work.c[2]
-    _, norm, det = deviator(x[0:6], unit)
     n, b, sinv = work.m[W_N], work.m[W_B], work.m[W_SINV]
-    unpack(unit, n)
+    unit = work.c[2]
+    norm, _, support, _ = flow_stress(x[0:6], par, unit, n)
+    if int(par[PART]) == FACE:
+        det = determinant(unit)
+        f[7] = norm * beyond_face(par[SIN_PHI], det)
+        p1, p2, _, _, _ = corner(par[SIN_PHI], det, False)
+        isotropic(p1, p2, unit, b)
+        for i in range(3):
+            for j in range(3):
+                n[i, j] += x[7] * (b[i, j] - n[i, j])
     multiply(n, sinv, b)
-    k = par[SIN_PHI] * slope_over_sine(int(par[SURFACE]), par[SIN_PHI], det)
     p = x[6]
-    strength = k * p + chat
-    mean = beta * norm / 3.0
+    strength = par[SIN_PHI] * p + cos_c
+    mean = dilation(beta, norm, support, par) / 3.0
     f[0] = x[0] + mean - d_star[0] - p * sinv[0, 0] + strength * b[0, 0]
     f[1] = x[1] + mean - d_star[1] - p * sinv[1, 1] + strength * b[1, 1]
     f[2] = x[2] + mean - d_star[2] - p * sinv[2, 2] + strength * b[2, 2]
@@ -87,7 +102,7 @@ def _residual(
     f[4] = x[4] - d_star[4] - p * sinv[0, 2] + 0.5 * strength * (b[0, 2] + b[2, 0])
     f[5] = x[5] - d_star[5] - p * sinv[1, 2] + 0.5 * strength * (b[1, 2] + b[2, 1])
     f[6] = x[0] + x[1] + x[2]
-    return k
+    return strength
 
 
 @kernel
@@ -106,11 +121,11 @@ def friction_impulse(
     Parameters
     ----------
     duration : float
-        Time over which cohesion acts, ``chat = duration k c``; 0 for an instant.
+        Time over which cohesion acts; 0 for an instant.
     offset : ndarray (6,)
         Rate of strain that counts as rest; the friction law holds for ``D`` less this.
     jac, pivots, x : ndarray
-        Scratch: (15, 15), int (15,), (32,).
+        Scratch: (15, 15), int (15,), (36,).
     """
     s, sinv, before = work.m[W_S], work.m[W_SINV], work.m[W_L]
     unpack(y[0:6], s)
@@ -122,7 +137,7 @@ def friction_impulse(
             before[j, i] -= offset[c]
     beta, _ = dilatancy(volume, par)
     surface = int(par[SURFACE])
-    cos_c = par[COS_PHI] * par[COHESION] * volume * duration  # chat = slope_over_sine * cos_c
+    cos_c = par[COS_PHI] * par[COHESION] * volume * duration
     # Rest needs the impulse That = (L - W) S; inside the yield surface it holds the body.
     w = x[8:11]
     rest_spin(y, s, before, work, w)
@@ -156,24 +171,34 @@ def friction_impulse(
     mean, start, _ = deviator(d_star, work.c[2])
     scale = start + abs(mean) + abs(p) * trace_sinv
     excess = (norm - g * (p * par[SIN_PHI] + cos_c)) * trace_sinv / 3.0
-    for i in range(6):
-        x[i] = (that[i] + (p if i < 3 else 0.0)) * excess / norm
-    x[6] = p
-    found = _newton(x, beta, cos_c, scale, par, work, d_star, jac, pivots)
-    if not found and start > 0.0:
-        for i in range(6):
-            x[i] = d_star[i] + (mean if i < 3 else 0.0)
-        x[6] = max(0.0, 3.0 * mean / trace_sinv)
-        found = _newton(x, beta, cos_c, scale, par, work, d_star, jac, pivots)
+    hexagon = par[NORMAL] > 0.0 and surface == MOHR_COULOMB
+    if hexagon and int(par[PART]) == SMOOTH:
+        par[PART] = EXTENSION_CORNER
+    found = False
+    for part in range(3 if hexagon else 1):
+        if part > 0:
+            par[PART] = par[PART] % 3.0 + 1.0
+        for guess in range(2 if start > 0.0 else 1):
+            if guess == 0:
+                _along_rest(that, p, norm, det, excess, par, x, work)
+            else:
+                for i in range(6):
+                    x[i] = d_star[i] + (mean if i < 3 else 0.0)
+                x[6] = max(0.0, 3.0 * mean / trace_sinv)
+                x[7] = 0.5
+            found = _newton(x, beta, cos_c, scale, par, work, d_star, jac, pivots) and (
+                not hexagon or _belongs(x, par, work)
+            )
+            if found:
+                break
+        if found:
+            break
     if not found:
         return FAILED
-    f = x[18:25]
-    k = _residual(x, beta, _chat(par, cos_c, surface, x, work), par, work, d_star, f)
-    chat = _chat(par, cos_c, surface, x, work)
-    strength = k * x[6] + chat
+    strength = _residual(x, beta, cos_c, par, work, d_star, x[19:27])
     if strength < 0.0 or (par[SIN_PHI] == 0.0 and par[COHESION] == 0.0 and x[6] < 0.0):
         return FREE
-    # Delta L = Phat S^-1 - (k Phat + chat) Dhat S^-1; b = Dhat S^-1 is left by the residual.
+    # Delta L = Phat S^-1 - (Phat sin + chat cos) N S^-1; b = N S^-1 is left by the residual.
     b = work.m[W_B]
     for i in range(3):
         for j in range(3):
@@ -182,6 +207,36 @@ def friction_impulse(
     for i in range(6):
         y[6 + i] += offset[i]
     return SLIDING
+
+
+@kernel
+def _along_rest(
+    that: Array, p: float, norm: float, det: float, excess: float, par: Array, x: Array, work: Buffers
+) -> None:
+    """First guess ``x[:8]``: strain as the impulse that rest would need wants it, in proportion to its excess."""
+    unit, n = work.c[2], work.m[W_N]
+    for i in range(6):
+        unit[i] = (that[i] + (p if i < 3 else 0.0)) / norm
+    a, b = 1.0, 0.0
+    if par[NORMAL] > 0.0:
+        a, b, _ = flow_direction(int(par[SURFACE]), par[SIN_PHI], det)
+    isotropic(a, b, unit, n)
+    pack(n, x[0:6])
+    for i in range(6):
+        x[i] *= excess
+    x[6] = p
+    x[7] = 0.5
+
+
+@kernel
+def _belongs(x: Array, par: Array, work: Buffers) -> bool:
+    """Whether a solution lies where its part of the hexagon says: on the face, or in the fan of the corner."""
+    part = int(par[PART])
+    if part == FACE:
+        return -1e-9 <= x[7] <= 1.0 + 1e-9
+    _, _, det = deviator(x[0:6], work.c[2])
+    past = beyond_face(par[SIN_PHI], det)
+    return past >= -1e-9 if part == COMPRESSION_CORNER else past <= 1e-9
 
 
 @kernel
@@ -196,28 +251,28 @@ def _newton(
     jac: Array,
     pivots: NDArray[np.int64],
 ) -> bool:
-    """Solve `_residual` for ``x[:7]`` from the guess in it; scratch in ``x[11:]``."""
-    surface = int(par[SURFACE])
-    trial, f, moved = x[11:18], x[18:25], x[25:32]
+    """Solve `_residual` for ``x[:7]`` (``x[:8]`` on a face) from the guess in it; scratch in ``x[11:]``."""
+    trial, f, moved = x[11:19], x[19:27], x[27:35]
+    m = 8 if int(par[PART]) == FACE else 7
     for _turn in range(60):
-        _residual(x, beta, _chat(par, cos_c, surface, x, work), par, work, d_star, f)
+        _residual(x, beta, cos_c, par, work, d_star, f)
         _, size, _ = deviator(x[0:6], work.c[2])
         if not size > 1e-300:
             return False
-        for j in range(7):
-            delta = 1e-7 * size if j < 6 else 1e-7 * max(abs(x[6]), 1e-6 * scale)
+        for j in range(m):
+            delta = 1e-7 * size if j < 6 else 1e-7 * max(abs(x[6]), 1e-6 * scale) if j == 6 else 1e-7
             saved = x[j]
             x[j] = saved + delta
             delta = x[j] - saved
-            _residual(x, beta, _chat(par, cos_c, surface, x, work), par, work, d_star, moved)
+            _residual(x, beta, cos_c, par, work, d_star, moved)
             x[j] = saved
-            for i in range(7):
+            for i in range(m):
                 jac[i, j] = (moved[i] - f[i]) / delta
-        for i in range(7):
+        for i in range(m):
             trial[i] = -f[i]
-        if not factorise(jac, _N, pivots):
+        if not factorise(jac, m, pivots):
             return False
-        solve(jac, _N, pivots, trial)
+        solve(jac, m, pivots, trial)
         step = 0.0
         along = 0.0
         for i in range(6):
@@ -234,17 +289,8 @@ def _newton(
             fraction = min(fraction, -0.5 * size * size / along)
         if across > 0.5 * (size + max(0.0, along / size)):
             fraction = min(fraction, 0.5 * (size + max(0.0, along / size)) / across)
-        for i in range(7):
+        for i in range(m):
             x[i] += fraction * trial[i]
         if fraction == 1.0 and step <= max(1e-12 * size, 1e-15 * scale):
             return True
     return False
-
-
-@kernel
-def _chat(par: Array, cos_c: float, surface: int, x: Array, work: Buffers) -> float:
-    """Cohesive strength ``chat = (k/sin phi) cos phi c`` in the direction of ``x[:6]``."""
-    if cos_c == 0.0:
-        return 0.0
-    _, _, det = deviator(x[0:6], work.c[2])
-    return slope_over_sine(surface, par[SIN_PHI], det) * cos_c

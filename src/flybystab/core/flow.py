@@ -6,7 +6,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.core.jit import kernel
-from flybystab.core.motion import COHESION, FLOWING, N_FULL, SIN_PHI, W_SCRATCH, rate
+from flybystab.core.motion import (
+    BESIDE,
+    COHESION,
+    COMPRESSION_CORNER,
+    EXTENSION_CORNER,
+    FACE,
+    FLOWING,
+    N_FULL,
+    NORMAL,
+    PART,
+    SIN_PHI,
+    SMOOTH,
+    SURFACE,
+    W_SCRATCH,
+    rate,
+)
+from flybystab.core.rheology import MOHR_COULOMB
 from flybystab.core.steppers import flow_jacobian, implicit_at, implicit_step
 from flybystab.core.tensors import deviator, eigensystem
 from flybystab.core.tide import TidePanels
@@ -18,6 +34,7 @@ from flybystab.core.workspace import (
     JAM,
     LOSS,
     STUCK,
+    SWITCH,
     Counts,
     Workspace,
     copy,
@@ -25,6 +42,9 @@ from flybystab.core.workspace import (
 )
 
 Array = NDArray[np.float64]
+
+#: Lode angle, rad, by which `D` may be past the fan of a corner: rounding of the switch, far below any other error.
+_SLACK = 1e-9
 
 
 @kernel
@@ -45,10 +65,11 @@ def _spread(values: Array) -> float:
 def _health(
     t: float, y: Array, dy: Array, par: Array, tide: TidePanels, limit2: float, ws: Workspace
 ) -> float:
-    """Least of the three event functions of flow; negative once one of them is over. Sets the rate `dy`.
+    """Least of the event functions of flow; negative once one of them is over. Sets the rate `dy`.
 
-    They are the strength ``k P + k c`` (the pressure of a fluid), the denominator of the pressure, and the
-    distance from the axis ratio where the model is left. ``ws.mark[3]`` keeps the code of the least.
+    They are the strength ``k P + k c`` (the pressure of a fluid), the denominator of the pressure, the distance
+    from the axis ratio where the model is left, and on Mohr-Coulomb the distance from the end of the face or of
+    the fan of the corner where the stress is. ``ws.mark[3]`` keeps the code of the least.
     """
     denominator = rate(FLOWING, t, y, dy, par, tide, ws.work)
     ratio2 = _spread(ws.work.m[W_SCRATCH, 0])  # left there by `rate`
@@ -64,7 +85,40 @@ def _health(
     if denominator > 0.0 and strength < least:
         least = strength
         ws.mark[3] = LOSS
+    part = int(par[PART])
+    if part != SMOOTH and denominator > 0.0 and strength > 0.0:
+        place, past = ws.work.m[W_SCRATCH, 2, 1], ws.work.m[W_SCRATCH, 2, 2]
+        if part == FACE:
+            inside = min(place, 1.0 - place)
+        else:
+            inside = par[BESIDE] + (past if part == COMPRESSION_CORNER else -past)
+        if inside < least:
+            least = inside
+            ws.mark[3] = SWITCH
     return least
+
+
+@kernel
+def choose_part(t: float, y: Array, par: Array, tide: TidePanels, near: float, ws: Workspace) -> None:
+    """Find the part of the yield section for a flow: a face if `D` is normal to one and can stay so, or a corner.
+
+    `D` within the Lode angle `near` of the normal of the face counts as normal to it. A corner then keeps the
+    stress while `D` is in its fan, or no further out of it than now and `_SLACK`.
+    """
+    par[PART] = SMOOTH
+    if par[NORMAL] == 0.0 or int(par[SURFACE]) != MOHR_COULOMB:
+        return
+    par[PART] = FACE
+    rate(FLOWING, t, y, ws.spare[:15], par, tide, ws.work)
+    place, past = ws.work.m[W_SCRATCH, 2, 1], ws.work.m[W_SCRATCH, 2, 2]
+    if abs(past) <= near:
+        if 0.0 <= place <= 1.0:
+            return
+        compression = place > 1.0
+    else:
+        compression = past > 0.0
+    par[PART] = COMPRESSION_CORNER if compression else EXTENSION_CORNER
+    par[BESIDE] = _SLACK + max(0.0, -past if compression else past)
 
 
 @kernel
@@ -86,12 +140,15 @@ def follow_flow(
     spare = ws.k[9]
     h = 1e-4
     limit2 = limit * limit
+    near = 1e-6 + 10.0 * tol  # the direction of D is known no better
+    choose_part(t, y, par, tide, near, ws)
     if _health(t, y, f0, par, tide, limit2, ws) < 0.0:
         return int(ws.mark[3]), t
     while t < t1:
         # Here f0 and the stress in `ws.work` belong to (t, y).
         p, strength = ws.work.m[W_SCRATCH, 1, 2], ws.work.m[W_SCRATCH, 1, 1]
-        _, d, det = deviator(y[6:12], ws.stress)
+        _, d, _ = deviator(y[6:12], ws.stress)
+        det = ws.work.m[W_SCRATCH, 2, 0]
         record(t, FLOWING, y, par, p, strength, det, ws, hist, count)
         flow_jacobian(t, y, f0, 1e-6, par, tide, ws.work, ws.jac, ws.ft, ws.ys)
         # d|D'|/dt = Dhat : Ddot
@@ -126,14 +183,14 @@ def follow_flow(
         found = 2.0
         low = 0.0
         implicit_at(0.5, y, N_FULL, ws.dense, ws.y1, ws.ys)
-        if _health(t + 0.5 * h, ws.ys, spare, par, tide, limit2, ws) < 0.0:
+        half = _health(t + 0.5 * h, ws.ys, spare, par, tide, limit2, ws)
+        p, strength, det = ws.work.m[W_SCRATCH, 1, 2], ws.work.m[W_SCRATCH, 1, 1], ws.work.m[W_SCRATCH, 2, 0]
+        if half < 0.0:
             found = 0.5
+        elif _health(t + h, ws.y1, f0, par, tide, limit2, ws) < 0.0:
+            low, found = 0.5, 1.0
         else:
-            p, strength = ws.work.m[W_SCRATCH, 1, 2], ws.work.m[W_SCRATCH, 1, 1]
-            _, _, det = deviator(ws.ys[6:12], ws.stress)
             record(t + 0.5 * h, FLOWING, ws.ys, par, p, strength, det, ws, hist, count)
-            if _health(t + h, ws.y1, f0, par, tide, limit2, ws) < 0.0:
-                low, found = 0.5, 1.0
         if found <= 1.0:
             high = found
             for _ in range(52):
@@ -151,8 +208,21 @@ def follow_flow(
             implicit_step(
                 t, y, h, par, tide, ws.work, ws.jac, ws.ft, ws.lu, ws.pivots, ws.k, ws.scale, ws.y1, ws.dense
             )
+            if reason == SWITCH:  # the history has the middle of every step
+                implicit_at(0.5, y, N_FULL, ws.dense, ws.y1, ws.ys)
+                _health(t + 0.5 * h, ws.ys, spare, par, tide, limit2, ws)
+                p, strength = ws.work.m[W_SCRATCH, 1, 2], ws.work.m[W_SCRATCH, 1, 1]
+                det = ws.work.m[W_SCRATCH, 2, 0]
+                record(t + 0.5 * h, FLOWING, ws.ys, par, p, strength, det, ws, hist, count)
             copy(ws.y1, y, N_FULL)
-            return reason, t + h
+            t += h
+            if reason != SWITCH:
+                return reason, t
+            choose_part(t, y, par, tide, near, ws)
+            if _health(t, y, f0, par, tide, limit2, ws) < 0.0:
+                return int(ws.mark[3]), t
+            h = max(h, 1e-4)
+            continue
         t = t1 if last else t + h
         copy(ws.y1, y, N_FULL)
         _, d, _ = deviator(y[6:12], ws.stress)

@@ -19,9 +19,9 @@ from numpy.typing import NDArray
 
 from flybystab.core.ellipsoid import gravity_coefficients
 from flybystab.core.jit import code, kernel
-from flybystab.core.rheology import slope_over_sine
+from flybystab.core.rheology import beyond_face, corner, normal, slope_over_sine
 from flybystab.core.statics import rigid_load
-from flybystab.core.tensors import deviator, eigensystem, inverse, multiply, pack, unpack
+from flybystab.core.tensors import determinant, deviator, eigensystem, inverse, multiply, pack, unpack
 from flybystab.core.tide import COMPONENTS, TidePanels, tide_at
 
 Array = NDArray[np.float64]
@@ -39,7 +39,7 @@ N_FULL = code(15)
 SURFACE = 0  # code of the yield surface
 SIN_PHI = 1
 COS_PHI = 2
-BETA = 3  # dilatancy beta (not beta over k)
+BETA = 3  # dilatancy beta (not beta over k); 1 where NORMAL is on
 COHESION = 4  # 5 Y/rho0 in units of a0^2 pi G rho0
 VISCOSITY = 5  # 5 (2 mu)/rho0 in units of a0^2 sqrt(pi G rho0), FLUID only
 EXPANSION = 6  # V/V0 at which dilation has ended
@@ -49,7 +49,16 @@ S3 = 9
 G1 = 10
 G2 = 11
 G3 = 12
-N_PARAMETERS = 13
+NORMAL = 13  # 1: associative flow on a slope k(theta), the true normal; 0: D along the stress deviator
+PART = 14  # which part of the yield section the stress is on, see the codes below
+BESIDE = 15  # angle past the normal of a Mohr-Coulomb face, rad, up to which a corner keeps the stress
+N_PARAMETERS = 16
+
+# Where the stress is on the hexagon of Mohr-Coulomb in associative flow; SMOOTH on any other section.
+SMOOTH = code(0)
+EXTENSION_CORNER = code(1)
+COMPRESSION_CORNER = code(2)
+FACE = code(3)
 
 # Matrices of `Buffers.m` that `field` fills and the rates read.
 W_SINV = 0
@@ -57,11 +66,14 @@ W_K = 1  # K_g + K_t
 W_L = 2
 W_R = 3  # K_g + K_t - L^2
 W_S = 4
-W_N = 5  # unit deviator of D
+W_N = 5  # FLOWING: stress deviator over p sin(phi) + c cos(phi)
 W_A = 6
 W_B = 7
 W_VECTORS = 8
-W_SCRATCH = 9  # row 0: eigenvalues; row 1: V/V0, k (kP + kc), P
+# row 0: eigenvalues; row 1: V/V0, k P + kc, P; row 2: determinant of the unit stress deviator, place between the
+# corners of a face (0: extension, 1: compression), angle of D past the normal of the face
+W_SCRATCH = 9
+W_FACE = 10  # step from the extension to the compression corner
 N_WORK = 11
 
 
@@ -231,6 +243,8 @@ def set_gradient(m: Array, y: Array) -> None:
 def dilatancy(volume: float, par: Array) -> tuple[float, float]:
     """``beta`` and ``d beta/dV`` at ``V/V0``: constant, then faded to zero where the material is loosest.
 
+    Where NORMAL is on, the share of the dilation ``m(D')`` of the normal.
+
     The fade is a cubic over the last tenth of the allowed expansion: a critical state reached smoothly.
     """
     beta = par[BETA]
@@ -245,13 +259,71 @@ def dilatancy(volume: float, par: Array) -> tuple[float, float]:
 
 
 @kernel
+def flow_stress(d: Array, par: Array, unit: Array, n: Array) -> tuple[float, float, float, float]:
+    """Stress deviator ``n[3, 3]`` over ``p sin(phi) + c cos(phi)`` of a flow with rate of strain ``d[6]``.
+
+    Returns ``|D'|``, the norm of `n`, the support ``n:Dhat`` and the determinant of the unit stress deviator; sets
+    ``unit[6]`` to ``Dhat``.
+    """
+    _, norm, det = deviator(d, unit)
+    unpack(unit, n)
+    surface = int(par[SURFACE])
+    if par[NORMAL] == 0.0 or norm == 0.0:
+        g = slope_over_sine(surface, par[SIN_PHI], det)
+        for i in range(3):
+            for j in range(3):
+                n[i, j] *= g
+        return norm, g, g, det
+    part = int(par[PART])
+    if part == SMOOTH:
+        a, b, support, g, det = normal(surface, par[SIN_PHI], det)
+    else:
+        a, b, support, g, det = corner(par[SIN_PHI], det, part != COMPRESSION_CORNER)
+    isotropic(a, b, unit, n)
+    return norm, g, support, det
+
+
+@kernel
+def isotropic(a: float, b: float, u: Array, n: Array) -> None:
+    """Write the deviator ``n[3, 3] = a u + b (u^2 - 1/3)`` of a unit deviator ``u[6]``."""
+    u0, u1, u2, u3, u4, u5 = u[0], u[1], u[2], u[3], u[4], u[5]
+    n[0, 0] = a * u0 + b * (u0 * u0 + u3 * u3 + u4 * u4 - 1.0 / 3.0)
+    n[1, 1] = a * u1 + b * (u3 * u3 + u1 * u1 + u5 * u5 - 1.0 / 3.0)
+    n[2, 2] = a * u2 + b * (u4 * u4 + u5 * u5 + u2 * u2 - 1.0 / 3.0)
+    n[0, 1] = n[1, 0] = a * u3 + b * (u0 * u3 + u3 * u1 + u4 * u5)
+    n[0, 2] = n[2, 0] = a * u4 + b * (u0 * u4 + u3 * u5 + u4 * u2)
+    n[1, 2] = n[2, 1] = a * u5 + b * (u3 * u4 + u1 * u5 + u5 * u2)
+
+
+@kernel
+def _contract(a: Array, b: Array) -> float:
+    """``A:B`` of two (3, 3) arrays."""
+    total = 0.0
+    for i in range(3):
+        for j in range(3):
+            total += a[i, j] * b[i, j]
+    return total
+
+
+@kernel
+def dilation(beta: float, norm: float, support: float, par: Array) -> float:
+    """``tr D`` of the flow rule: ``beta |D'|``, or the share `beta` of ``m(D')`` where NORMAL is on."""
+    return beta * norm * (support * par[SIN_PHI] if par[NORMAL] > 0.0 else 1.0)
+
+
+@kernel
 def deformation_rate(regime: int, y: Array, dy: Array, par: Array, work: Buffers) -> float:
     """Rate of the 15 numbers, given `field`; returns the denominator of the pressure (FLOWING), else 1.
 
-    ``Ldot = R - T S^-1``, ``R = K - L^2``, ``T = -P 1 + (k P + k c) Dhat``. With ``B = 1 - beta Dhat`` the
-    pressure that keeps ``tr D = beta |D'|`` is
+    ``Ldot = R - T S^-1``, ``R = K - L^2``, ``T = -P 1 + (P sin + c cos) N``. Radial rule: ``N = Dhat k/sin`` and
+    ``E = beta Dhat``; the true normal: ``N`` is the stress with the normal ``Dhat`` and ``E = f sin N`` (the gradient
+    of the support, ``f`` the fade of `dilatancy`). The pressure that keeps ``tr D`` at its `dilation` is
 
-        P = [betadot |D'| - B:R + k c B:(Dhat S^-1)] / [B:((1 - k Dhat) S^-1)].
+        P = [fdot m - B:R + c cos B:(N S^-1)] / [B:((1 - sin N) S^-1)],    B = 1 - E.
+
+    For the true normal with ``f = 1`` the denominator is a sum of squares: no jam. On a face of Mohr-Coulomb, where
+    the normal leaves the stress between two corners undetermined, the motion determines it: `D` stays normal to
+    the face (two of the planes of Koiter 1953 are active), as long as the stress is between the corners.
     """
     d = y[6:12]
     big_l = work.m[W_L]
@@ -282,28 +354,67 @@ def deformation_rate(regime: int, y: Array, dy: Array, par: Array, work: Buffers
     pressure = 0.0
     strength = 0.0  # k P + k c: norm of the deviatoric stress
     if regime == FLOWING:
-        unit = work.c[2]
-        _, norm, det = deviator(d, unit)
-        unpack(unit, n)
-        g = slope_over_sine(int(par[SURFACE]), par[SIN_PHI], det)
-        k = g * par[SIN_PHI]
-        kc = g * par[COS_PHI] * par[COHESION] * volume
+        norm, g, support, det = flow_stress(d, par, work.c[2], n)
+        work.m[W_SCRATCH, 2, 0] = det
+        part = int(par[PART])
+        det_d = 0.0
+        if part != SMOOTH:
+            det_d = determinant(work.c[2])
+            work.m[W_SCRATCH, 2, 2] = beyond_face(par[SIN_PHI], det_d)
+        sin = par[SIN_PHI]
+        cohesive = par[COS_PHI] * par[COHESION] * volume
         beta, dbeta = dilatancy(volume, par)
+        e = beta * sin if par[NORMAL] > 0.0 else beta / g  # E = e N
         multiply(n, sinv, b)
         n_sinv = b[0, 0] + b[1, 1] + b[2, 2]
-        nn_sinv = 0.0
-        n_r = 0.0
+        nn_sinv = _contract(n, b)
+        n_r = _contract(n, r)
+        denominator = trace_sinv - (sin + e) * n_sinv + sin * e * nn_sinv
+        fading = dilation(dbeta * volume * trace_d, norm, support, par)
+        numerator = fading - trace_r + e * n_r + cohesive * (n_sinv - e * nn_sinv)
+        if part == FACE:
+            # N = N_e + w X with the step X between the corners and w such that D stays normal to the face:
+            # X:Ddot = 0, which eliminates F w (F = P sin + c cos) from the equation of the pressure.
+            x, xs = work.m[W_FACE], work.m[W_A]
+            p1, p2, _, _, _ = corner(sin, det_d, False)
+            isotropic(p1, p2, work.c[2], x)
+            for i in range(3):
+                for j in range(3):
+                    x[i, j] -= n[i, j]
+            multiply(x, sinv, xs)
+            across = _contract(x, xs)
+            nx_sinv = _contract(x, b)
+            along = xs[0, 0] + xs[1, 1] + xs[2, 2]
+            pull = _contract(x, r) - cohesive * nx_sinv
+            bx = along - e * nx_sinv
+            denominator -= bx * (along - sin * nx_sinv) / across
+            numerator += bx * pull / across
+            pressure = numerator / denominator
+            factor = sin * pressure + cohesive
+            share = (pressure * (along - sin * nx_sinv) + pull) / across
+            for i in range(3):
+                for j in range(3):
+                    r[i, j] -= share * xs[i, j]
+            place = share / factor if factor != 0.0 else np.inf
+            work.m[W_SCRATCH, 2, 1] = place
+            size = 0.0
+            third = 0.0
+            if factor != 0.0:
+                unit = work.c[2]
+                for i in range(3):
+                    for j in range(3):
+                        x[i, j] = n[i, j] + place * x[i, j]
+                pack(x, unit)
+                _, size, third = deviator(unit, unit)
+            g = size
+            work.m[W_SCRATCH, 2, 0] = third
+        else:
+            pressure = numerator / denominator
+            factor = sin * pressure + cohesive
+        strength = g * factor
         for i in range(3):
             for j in range(3):
-                nn_sinv += n[i, j] * b[i, j]
-                n_r += n[i, j] * r[i, j]
-        denominator = trace_sinv - (k + beta) * n_sinv + k * beta * nn_sinv
-        numerator = dbeta * volume * trace_d * norm - trace_r + beta * n_r + kc * (n_sinv - beta * nn_sinv)
-        pressure = numerator / denominator
-        strength = k * pressure + kc
-        for i in range(3):
-            for j in range(3):
-                r[i, j] += pressure * sinv[i, j] - strength * b[i, j]
+                r[i, j] += pressure * sinv[i, j] - factor * b[i, j]
     elif regime == FLUID:
         mu = par[VISCOSITY] * volume
         unpack(d, n)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from flybystab.constants import G
 from flybystab.core import motion, regimes
-from flybystab.core.rheology import least_slope
+from flybystab.core.rheology import DRUCKER_PRAGER, EXTENSION_CONE, least_slope
 from flybystab.core.tide import TidePanels
 from flybystab.core.workspace import N_EVENT, N_HISTORY
 
@@ -79,7 +79,10 @@ def parameters(
     par[motion.SURFACE] = surface
     par[motion.SIN_PHI] = np.sin(phi)
     par[motion.COS_PHI] = np.cos(phi)
-    par[motion.BETA] = dilatancy * least_slope(surface, np.sin(phi))
+    # Associative flow on a slope k(theta) is the true normal; less dilatant flow goes along the stress deviator.
+    normal = dilatancy >= 1.0 and surface not in (DRUCKER_PRAGER, EXTENSION_CONE)
+    par[motion.NORMAL] = normal
+    par[motion.BETA] = 1.0 if normal else dilatancy * least_slope(surface, np.sin(phi))
     par[motion.COHESION] = 5.0 * cohesion / (rho * a0 * a0 * rate2)
     par[motion.VISCOSITY] = 10.0 * viscosity / (rho * a0 * a0 * np.sqrt(rate2))
     par[motion.EXPANSION] = expansion

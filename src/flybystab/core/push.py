@@ -28,10 +28,9 @@ from flybystab.core.jit import kernel
 from flybystab.core.rheology import (
     DRUCKER_PRAGER,
     EXTENSION_CONE,
-    MOHR_COULOMB,
     SQRT6,
     least_slope,
-    lode_angle,
+    normal,
     slope_over_sine,
 )
 from flybystab.core.statics import rigid_stress
@@ -164,40 +163,8 @@ def slope_of_flow(b: Pile, x: Array) -> tuple[float, float]:
     det = _unit_determinant(x, r) if r > 0.0 else 0.0
     if not b.associative:
         return slope_over_sine(b.code, b.sin, det), b.beta
-    theta = lode_angle(det)  # of D', with the sign of the stress: +30 deg is compression
-    if b.code == MOHR_COULOMB:  # the vertices of the hexagon: compression and extension
-        g = max(
-            2.0 * SQRT6 / (3.0 - b.sin) * np.cos(np.pi / 6.0 - theta),
-            2.0 * SQRT6 / (3.0 + b.sin) * np.cos(np.pi / 6.0 + theta),
-        )
-        return g, g * b.sin
-    # unimodal in theta: the section is smooth and strictly convex
-    low = -np.pi / 6.0
-    high = np.pi / 6.0
-    golden = 0.3819660112501051
-    x1 = low + golden * (high - low)
-    x2 = high - golden * (high - low)
-    g1 = _section(b, x1) * np.cos(x1 - theta)
-    g2 = _section(b, x2) * np.cos(x2 - theta)
-    for _ in range(45):
-        if g1 > g2:
-            high = x2
-            x2, g2 = x1, g1
-            x1 = low + golden * (high - low)
-            g1 = _section(b, x1) * np.cos(x1 - theta)
-        else:
-            low = x1
-            x1, g1 = x2, g2
-            x2 = high - golden * (high - low)
-            g2 = _section(b, x2) * np.cos(x2 - theta)
-    g = max(g1, g2)
+    _, _, g, _, _ = normal(b.code, b.sin, det)
     return g, g * b.sin
-
-
-@kernel
-def _section(b: Pile, theta: float) -> float:
-    """``k/sin(phi)`` at a Lode angle: ``sin(3 theta) = -3 sqrt6 det``."""
-    return slope_over_sine(b.code, b.sin, -np.sin(3.0 * theta) / (3.0 * SQRT6))
 
 
 @kernel

@@ -28,21 +28,27 @@ from flybystab.core.flow import follow_flow
 from flybystab.core.free import follow_free
 from flybystab.core.jit import kernel
 from flybystab.core.motion import (
-    BETA,
     COHESION,
     DISPERSED,
     FLOWING,
     N_FULL,
+    NORMAL,
+    PART,
     RIGID,
     S1,
     S2,
     S3,
+    SIN_PHI,
+    SMOOTH,
+    SURFACE,
     W_SCRATCH,
     angular_momentum,
+    dilatancy,
     rigid_excess,
     set_rigid_shape,
     to_fixed_frame,
 )
+from flybystab.core.rheology import flow_direction
 from flybystab.core.rigid import follow_rigid
 from flybystab.core.tensors import determinant, deviator, eigensystem
 from flybystab.core.tide import COMPONENTS, TidePanels
@@ -67,14 +73,28 @@ Array = NDArray[np.float64]
 
 @kernel
 def loosen(y: Array, par: Array, ws: Workspace) -> None:
-    """Turn the RIGID state ``y[:7]`` into one that flows along the deviator of ``ws.stress``, barely."""
+    """Turn the RIGID state ``y[:7]`` into one that flows as the stress ``ws.stress`` wants, barely.
+
+    The direction is the deviator of the stress, or the normal of the yield surface there.
+    """
     m = ws.work.m[0]
     out = ws.y1
     to_fixed_frame(y, par, m, out[0:6], out[12:15])
     u = ws.ys
-    deviator(ws.stress, u[:6])
+    _, _, det = deviator(ws.stress, u[:6])
+    trace, _ = dilatancy(np.sqrt(par[S1] * par[S2] * par[S3]), par)
+    if par[NORMAL] > 0.0:
+        p, q, support = flow_direction(int(par[SURFACE]), par[SIN_PHI], det)
+        trace *= support * par[SIN_PHI]
+        u0, u1, u2, u3, u4, u5 = u[0], u[1], u[2], u[3], u[4], u[5]
+        u[0] = p * u0 + q * (u0 * u0 + u3 * u3 + u4 * u4 - 1.0 / 3.0)
+        u[1] = p * u1 + q * (u3 * u3 + u1 * u1 + u5 * u5 - 1.0 / 3.0)
+        u[2] = p * u2 + q * (u4 * u4 + u5 * u5 + u2 * u2 - 1.0 / 3.0)
+        u[3] = p * u3 + q * (u0 * u3 + u3 * u1 + u4 * u5)
+        u[4] = p * u4 + q * (u0 * u4 + u3 * u5 + u4 * u2)
+        u[5] = p * u5 + q * (u3 * u4 + u1 * u5 + u5 * u2)
     for c, (i, j) in enumerate(COMPONENTS):
-        flow = par[BETA] / 3.0 if i == j else 0.0
+        flow = trace / 3.0 if i == j else 0.0
         for a in range(3):
             flow += m[i, a] * m[j, a] * u[a]
         flow += (m[i, 0] * m[j, 1] + m[i, 1] * m[j, 0]) * u[3]
@@ -165,7 +185,7 @@ def follow(
         RIGID (``y[:7]``), FLOWING, DISPERSED or FLUID (``y[:15]``) at the start.
     y : ndarray (15,)
         State, overwritten with the last one, which is a 15-number state in any regime.
-    par : ndarray (13,)
+    par : ndarray (16,)
         Parameters, see :mod:`flybystab.core.motion`; cohesion and rigid shape are updated.
     tol : float
         Relative error allowed in a step.
@@ -212,7 +232,7 @@ def follow(
             reason, t = follow_flow(t, t1, par, tide, tol, limit, max_steps, ws, hist, count)
             volume = np.sqrt(determinant(ws.y[0:6]))
             if reason in (ARREST, JAM):
-                _, _, det = deviator(ws.y[6:12], ws.stress)
+                det = ws.work.m[W_SCRATCH, 2, 0]
                 stiffen(ws.y, par, ws)
                 log(reason, t, det, volume, events, count)
                 regime = RIGID
@@ -226,7 +246,8 @@ def follow(
             if reason != CONTACT:
                 break
             log(CONTACT, t, 0.0, np.sqrt(determinant(ws.y[0:6])), events, count)
-            did = friction_impulse(ws.y, par, 0.0, ws.spare[32:], ws.work, ws.jac, ws.pivots, ws.spare)
+            par[PART] = SMOOTH
+            did = friction_impulse(ws.y, par, 0.0, ws.spare[36:], ws.work, ws.jac, ws.pivots, ws.spare)
             if did == FAILED:
                 reason = STUCK
                 break

@@ -7,15 +7,16 @@ from numpy.typing import NDArray
 
 from flybystab.core.jit import code, kernel
 from flybystab.core.motion import (
-    BETA,
     COHESION,
     N_RIGID,
+    NORMAL,
     RIGID,
     S1,
     S2,
     S3,
     SIN_PHI,
     SURFACE,
+    dilatancy,
     rate,
     rigid_excess,
 )
@@ -50,11 +51,16 @@ def _onset(excess: float, p: float, norm: float, det: float, par: Array, stress:
 
 @kernel
 def onset_denominator(p: float, norm: float, det: float, par: Array, stress: Array) -> float:
-    """``B:((1 - k Dhat) S^-1)`` for ``Dhat`` along the deviator of ``stress[6]`` (body axes)."""
+    """``B:((1 - k shat) S^-1)`` for flow whose stress has the deviator of ``stress[6]`` (body axes).
+
+    ``B = 1 - beta shat`` for the radial rule, ``1 - f k shat`` for the true normal.
+    """
     if norm == 0.0:
         return 1.0
     k = slope(int(par[SURFACE]), par[SIN_PHI], det)
-    beta = par[BETA]
+    beta, _ = dilatancy(np.sqrt(par[S1] * par[S2] * par[S3]), par)
+    if par[NORMAL] > 0.0:
+        beta *= k
     i1, i2, i3 = 1.0 / par[S1], 1.0 / par[S2], 1.0 / par[S3]
     n0, n1, n2 = (stress[0] + p) / norm, (stress[1] + p) / norm, (stress[2] + p) / norm
     n3, n4, n5 = stress[3] / norm, stress[4] / norm, stress[5] / norm

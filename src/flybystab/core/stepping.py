@@ -18,7 +18,10 @@ from flybystab.core.contact import FAILED, FREE, REST, SLIDING, friction_impulse
 from flybystab.core.jit import kernel
 from flybystab.core.motion import (
     COHESION,
+    N_FULL,
     N_WORK,
+    SIN_PHI,
+    SURFACE,
     W_A,
     W_B,
     W_K,
@@ -26,12 +29,15 @@ from flybystab.core.motion import (
     W_S,
     Buffers,
     dilatancy,
+    dilation,
     field,
     gradient,
     set_gradient,
 )
-from flybystab.core.tensors import determinant, multiply, pack, unpack
+from flybystab.core.rheology import normal
+from flybystab.core.tensors import determinant, deviator, multiply, pack, unpack
 from flybystab.core.tide import TidePanels
+from flybystab.core.workspace import copy
 
 Array = NDArray[np.float64]
 
@@ -72,13 +78,13 @@ def drift(h: float, y: Array, work: Buffers) -> bool:
 
 
 @kernel
-def _shear(y: Array, offset: Array) -> float:
-    """Norm of the deviator of ``D - offset``."""
-    mean = (y[6] + y[7] + y[8] - offset[0] - offset[1] - offset[2]) / 3.0
-    total = 0.0
-    for i in range(3):
-        total += (y[6 + i] - offset[i] - mean) ** 2 + 2.0 * (y[9 + i] - offset[3 + i]) ** 2
-    return np.sqrt(total)
+def _dilation(y: Array, offset: Array, beta: float, par: Array, less: Array) -> float:
+    """``tr D`` that the flow rule wants for the deviator of ``D - offset``."""
+    for i in range(6):
+        less[i] = y[6 + i] - offset[i]
+    _, norm, det = deviator(less, less)
+    _, _, support, _, _ = normal(int(par[SURFACE]), par[SIN_PHI], det)
+    return dilation(beta, norm, support, par)
 
 
 @kernel
@@ -93,14 +99,18 @@ def follow_steps(
     work = Buffers(np.zeros((N_WORK, 3, 3)), np.zeros((3, 6)))
     jac = np.zeros((15, 15))
     pivots = np.zeros(15, dtype=np.int64)
-    spare = np.zeros(32)
+    spare = np.zeros(36)
     offset = np.zeros(6)
+    less = np.zeros(6)
+    kicked = np.zeros(N_FULL)
+    gap = 0.0
     last = np.zeros((3, 3))
     gradient(y, last)
     h = (t1 - t0) / n
     contact = np.sqrt(determinant(y[0:6]))  # V/V0 at which the grains touch
     summary[0] = summary[1] = -1.0
     summary[2] = summary[3] = 0.0
+    touching = True
     for step in range(n):
         t = t0 + (step + 0.5) * h
         if not drift(0.5 * h, y, work):
@@ -113,23 +123,42 @@ def follow_steps(
                 big_l[i, j] += h * work.m[W_K, i, j]
         set_gradient(big_l, y)
         volume = np.sqrt(determinant(y[0:6]))
-        # The drift to the next kick is 1 + h L, of mean gradient L - h L^2/2: that is what must obey the law
-        # of friction, and L^2 of the last step is near enough. What volume error is left is undone.
-        multiply(last, last, work.m[W_A])
-        pack(work.m[W_A], offset)
-        for i in range(6):
-            offset[i] *= 0.5 * h
-        for i in range(3):
-            offset[i] += np.log(contact / volume) / (3.0 * h)
         beta, _ = dilatancy(contact, par)
         did = FREE
-        if y[6] + y[7] + y[8] - offset[0] - offset[1] - offset[2] < beta * _shear(y, offset):
+        for turn in range(1 if touching else 4):
+            # The drift to the next kick is 1 + h L, of mean gradient L - h L^2/2: that is what must obey the law
+            # of friction, and L^2 of the last step is near enough, except where the grains meet: there it is that
+            # of the impulse itself, by iteration. What volume error is left is undone, again except there: what
+            # the grains overlap would throw them apart.
+            multiply(last, last, work.m[W_A])
+            pack(work.m[W_A], offset)
+            for i in range(6):
+                offset[i] *= 0.5 * h
+            if turn == 0:
+                copy(y, kicked, N_FULL)
+                gap = np.log(contact / volume) / h
+            else:
+                copy(kicked, y, N_FULL)
+            for i in range(3):
+                offset[i] += gap / 3.0
+            if y[6] + y[7] + y[8] - offset[0] - offset[1] - offset[2] >= _dilation(
+                y, offset, beta, par, less
+            ):
+                did = FREE
+                break
+            if not touching and turn == 0:
+                contact = volume
+                gap = 0.0
+                for i in range(3):
+                    offset[i] = 0.0
             did = friction_impulse(y, par, h, offset, work, jac, pivots, spare)
             if did == FAILED:
                 return False
+            gradient(y, last)
         gradient(y, last)
+        touching = did != FREE
         if did == SLIDING:
-            contact *= np.exp(h * beta * _shear(y, offset))
+            contact *= np.exp(h * _dilation(y, offset, beta, par, less))
             if brittle:
                 par[COHESION] = 0.0
             if summary[2] == 0.0:

@@ -23,6 +23,7 @@ CONTACT = code(4)
 BEYOND = code(5)
 JAM = code(6)
 STUCK = code(7)  # more steps or switches than allowed
+SWITCH = code(8)  # flow passes from one part of the yield section to another (not logged)
 
 #: Columns of the history: time, regime, S (6), D (6), w (3), pressure, deviator norm, unit determinant.
 N_HISTORY = 20
@@ -79,7 +80,7 @@ def workspace() -> Workspace:
         np.ones(15),
         np.zeros(6),
         np.zeros((2, N_SAMPLE + 1)),
-        np.zeros(38),
+        np.zeros(42),
         np.zeros(4),
     )
 
