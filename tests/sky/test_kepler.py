@@ -11,6 +11,7 @@ from flybystab.sky.kepler import (
     stumpff,
     time_at_anomaly,
     time_at_distance,
+    two_body,
 )
 
 Q = 1.1 * R_EARTH
@@ -84,3 +85,17 @@ def test_stumpff_series_meet_closed_forms(psi):
 def test_anomaly_is_nan_inside_periapsis():
     assert np.isnan(anomaly_at_distance(Q, 0.4, 0.9 * Q))
     assert time_at_anomaly(GM_EARTH, Q, 0.4, 0.0) == 0.0
+
+
+@pytest.mark.parametrize("f", [4.0, 0.3, 1e-9, 0.0, -0.2, -0.9, -1.0])
+def test_two_body_motion_from_any_point_is_that_from_periapsis(f):
+    turn = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
+
+    def at(t):
+        x, y, vx, vy = states_at_times(GM_EARTH, Q, f, np.array([t]))[0]
+        return np.concatenate([turn @ [x, y, 0], turn @ [vx, vy, 0]])
+
+    for start, wait in ((-3e4, 5e4), (0.0, 7e5), (100.0, -3e5), (-2e5, 1e3), (5e3, 0.0)):
+        error = two_body(GM_EARTH, at(start), wait) - at(start + wait)
+        assert np.abs(error[:3]).max() < 1e-3
+        assert np.abs(error[3:]).max() < 1e-6

@@ -138,7 +138,8 @@ def periapsis_time(state_at: Callable[[float], Array], t: float) -> tuple[float,
         if not slope > 0.0:
             break
         last, step = rv, -rv / slope
-        if abs(step) < 1e-6:
+        # A decimetre of the way, beside the 1e8 m of an encounter: rounding over centuries leaves centimetres.
+        if abs(step) * float(np.linalg.norm(s[3:])) < 0.1:
             return t + step, state_at(t + step)
     raise NotConverged(f"closest approach near t = {t:.6g} s: the last correction was {step:.3g} s")
 

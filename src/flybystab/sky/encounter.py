@@ -32,6 +32,7 @@ from flybystab.sky.forces import FORCES, model, shares
 from flybystab.sky.kepler import states_at_times, time_at_distance
 from flybystab.sky.orbit import Orbit, _ephemeris, later, seconds
 from flybystab.sky.planets import PLANETS, Planet, planet
+from flybystab.sky.predictability import Neighbour, Predictability, neighbour, predictability
 from flybystab.sky.reboundry import LOG_WIDTH, Flight
 from flybystab.units import to_si
 
@@ -133,9 +134,20 @@ class Encounter:
         On an impact both it and the track end there, and `t_stop` is the time of it.
     distance_error, time_error : Quantity or None
         For a real orbit: change of distance and time of closest approach when the integration is made 100
-        times tighter plus the change when every known force is on. The orbit's own uncertainty is not in it.
+        times tighter plus the change when every known force is on; infinite if the encounter vanishes then.
+        The orbit's own uncertainty is not in it.
     ephemeris : str or None
         Where the planets of a real orbit are from; None for a scripted encounter.
+    displacement : Quantity or None
+        For a real orbit: how far a neighbour of the orbit is away at closest approach: one sigma of the
+        covariance in the direction least known by then, or 1 m at the epoch where there is no covariance.
+    growth : float or None
+        That over the distance between the two at the epoch.
+    neighbour : str
+        What the neighbour is.
+    predictability : Predictability or None
+        What displacement and errors say of the encounter: ``determined``, ``uncertain`` or ``one of many``
+        (:mod:`flybystab.sky.predictability`).
     """
 
     planet: Planet
@@ -158,6 +170,10 @@ class Encounter:
     t_periapsis: float = 0.0
     distance_error: Quantity | None = None
     time_error: Quantity | None = None
+    displacement: Quantity | None = None
+    growth: float | None = None
+    neighbour: str = ""
+    predictability: Predictability | None = None
     ephemeris: str | None = None
 
     def position(self, t: Array | float) -> Array:
@@ -480,9 +496,11 @@ def _real(
     forces: tuple[str, ...] | None,
 ) -> Encounter:
     index = BODIES.index(body.name)
+    beside = neighbour(orbit, near, ephemeris)
     epoch = seconds(orbit.epoch, near)
+    epochs = (epoch, seconds(beside.orbit.epoch, near))
     window = _ephemeris(ephemeris).window(
-        near, min(epoch, -reach), max(epoch, reach + wait + TAIL + 10.0 * DAY)
+        near, min(*epochs, -reach), max(*epochs, reach + wait + TAIL + 10.0 * DAY)
     )
     everything = tuple(n for n in FORCES if n != "non-gravitational" or any(orbit.nongrav.a))
     first = _passage(orbit, window, index, forces or everything, reach, 1e-9)
@@ -492,18 +510,53 @@ def _real(
         )
         raise NoEncounter(
             f"no encounter with {body.name} within {largest / AU:.4f} au and {reach / DAY:g} d of "
-            f"{near.iso} TDB: {closest}"
+            f"{near.iso} TDB: {closest}{_horizon(orbit, beside, window, forces or everything, largest)}"
         )
     size = shares(window, *_path(first.way, epoch, first.t), orbit.nongrav)
     if forces is None:
         forces = tuple(n for n in everything if size[n] >= accuracy)
     chosen = _passage(orbit, window, index, forces, reach, 1e-9)
+    if chosen is None:
+        raise NoEncounter(
+            f"the closest approach to {body.name} vanishes with the forces {', '.join(forces)}"
+            + _horizon(orbit, beside, window, everything, largest)
+        )
     tight = _passage(orbit, window, index, forces, reach, 1e-11)
-    if chosen is None or tight is None:
-        raise NoEncounter(f"the closest approach to {body.name} vanishes with the forces {', '.join(forces)}")
-    d_error = abs(chosen.distance - first.distance) + abs(chosen.distance - tight.distance)
-    t_error = abs(chosen.t - first.t) + abs(chosen.t - tight.t)
-    return _around(cls, orbit, body, window, chosen, accuracy, start, wait, reach, size, (d_error, t_error))
+    gaps = [
+        (abs(chosen.distance - other.distance), abs(chosen.t - other.t)) if other else (np.inf, np.inf)
+        for other in (first, tight)
+    ]
+    place = chosen.state[:3] + window.states(index, np.array([chosen.t]))[0, :3]
+    there = beside.orbit.flight(window, forces).to(chosen.t)[:3]
+    growth = _Growth(
+        distance=gaps[0][0] + gaps[1][0],
+        time=gaps[0][1] + gaps[1][1],
+        displacement=float(np.linalg.norm(there - place)),
+        beside=beside,
+    )
+    return _around(cls, orbit, body, window, chosen, accuracy, start, wait, reach, size, growth)
+
+
+@dataclass(frozen=True)
+class _Growth:
+    """What other runs made of a closest approach: distance (m), time (s), displacement of the neighbour (m)."""
+
+    distance: float
+    time: float
+    displacement: float
+    beside: Neighbour
+
+
+def _horizon(orbit: Orbit, beside: Neighbour, window: Window, forces: tuple[str, ...], largest: float) -> str:
+    """What to add to "no encounter" where the orbit cannot be followed that far, else nothing."""
+    places = [o.flight(window, forces).to(0.0)[:3] for o in (orbit, beside.orbit)]
+    gap = float(np.linalg.norm(places[0] - places[1]))
+    if predictability(largest, gap) is Predictability.DETERMINED:
+        return ""
+    return (
+        f"; the orbit cannot be predicted that far: {beside.label} at {beside.orbit.epoch.iso[:10]} is "
+        f"{gap / AU:.2g} au there, so that an encounter at this time is one of many possible"
+    )
 
 
 def _around(
@@ -517,7 +570,7 @@ def _around(
     wait: float,
     reach: float,
     size: dict[str, float],
-    errors: tuple[float, float],
+    growth: _Growth,
 ) -> Encounter:
     """The encounter around a closest approach."""
     index = BODIES.index(body.name)
@@ -586,8 +639,17 @@ def _around(
         t_stop=stop - zero,
         tide=panels,
         track=track,
-        distance_error=(errors[0] * u.m).to(u.km),
-        time_error=errors[1] * u.s,
+        distance_error=(growth.distance * u.m).to(u.km),
+        time_error=growth.time * u.s,
+        displacement=(growth.displacement * u.m).to(u.km),
+        growth=growth.displacement / growth.beside.shift,
+        neighbour=growth.beside.label,
+        predictability=predictability(
+            max(q, body.impact_distance if level is not None else 0.0),
+            growth.displacement,
+            growth.distance,
+            growth.time * v_p,
+        ),
         ephemeris=window.name,
     )
 

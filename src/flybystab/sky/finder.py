@@ -32,6 +32,7 @@ from flybystab.sky.forces import _GM, FORCES, acceleration_among, bodies, model,
 from flybystab.sky.kepler import time_at_distance
 from flybystab.sky.orbit import Orbit, _ephemeris, default_forces, later, seconds
 from flybystab.sky.planets import planet
+from flybystab.sky.predictability import neighbour
 from flybystab.units import to_si
 
 Array = NDArray[np.float64]
@@ -359,6 +360,7 @@ def find_encounters(
     tolerance: float = 1e-12,
     forces: tuple[str, ...] | None = None,
     threads: int | None = None,
+    growth: bool = False,
 ) -> QTable:
     """Every closest approach of every asteroid to every planet below a threshold.
 
@@ -381,6 +383,10 @@ def find_encounters(
         `planets`, and A1, A2, A3 of orbits that have them.
     threads : int, optional
         Number of threads; the processors by default.
+    growth : bool
+        Follow a neighbour of each orbit as well, for the columns ``displacement`` (km, of the neighbour from
+        the asteroid at closest approach), ``growth`` (over that at the epoch) and ``predictability``
+        (:mod:`flybystab.sky.predictability`). Up to twice the time.
 
     Returns
     -------
@@ -419,7 +425,9 @@ def find_encounters(
     middle = later(start, 0.5 * seconds(stop, start))
     t_start, t_stop = seconds(start, middle), seconds(stop, middle)
     epochs = [seconds(orbit.epoch, middle) for _, orbit in rows]
-    window = eph.window(middle, min([t_start, *epochs]), max([t_stop, *epochs]))
+    beside = [neighbour(orbit, middle, eph) for _, orbit in rows] if growth else []
+    every = [t_start, t_stop, *epochs, *(seconds(n.orbit.epoch, middle) for n in beside)]
+    window = eph.window(middle, min(every), max(every))
     chosen = forces
     if chosen is None:
         used = {name for _, orbit in rows for name in default_forces(orbit, *(b.name for b in found))}
@@ -428,11 +436,15 @@ def find_encounters(
     targets = np.array([BODIES.index(b.name) for b in found])
     floors = np.array([b.impact_distance for b in found])
 
-    def one(item: tuple[int, tuple[str, Orbit]]) -> tuple[int, Array]:
-        i, (name, orbit) = item
+    def law_of(orbit: Orbit) -> Array:
         law = np.zeros(8)
         if any(orbit.nongrav.a) and (forces is None or "non-gravitational" in forces):
             law[:] = *orbit.nongrav.a, *orbit.nongrav.constants
+        return law
+
+    def one(item: tuple[int, tuple[str, Orbit]]) -> tuple[int, Array]:
+        i, (name, orbit) = item
+        law = law_of(orbit)
         state = orbit.barycentric(window)
         parts = []
         legs = []
@@ -462,7 +474,12 @@ def find_encounters(
             results = list(pool.map(one, enumerate(rows)))
     else:
         results = [one(item) for item in enumerate(rows)]
-    return _table(rows, results, middle, window, chosen, tolerance)
+    out = _table(rows, results, middle, window, chosen, tolerance)
+    if growth:
+        from flybystab.sky.growth import add_growth
+
+        add_growth(out, beside, [law_of(orbit) for _, orbit in rows], window, table, tolerance, workers)
+    return out
 
 
 def _table(

@@ -145,3 +145,55 @@ def states_at_times(gm: float, q: float, f: float, t: Array) -> Array:
     for i in range(t.size):
         state_at_time(gm, q, f, t[i], out[i])
     return out
+
+
+@kernel
+def two_body(gm: float, state: Array, t: float) -> Array:
+    """State, shape (6,), `t` s after a state (m, m/s) of any conic, by universal variables.
+
+    ``sqrt(gm) t = r0 x + (r0.v0/sqrt(gm)) x^2 c2 + (1 - alpha r0) x^3 c3`` rises with x (its slope is the
+    distance), so that Newton's steps can be held between bounds.
+    """
+    root = np.sqrt(gm)
+    r0 = np.sqrt(state[0] ** 2 + state[1] ** 2 + state[2] ** 2)
+    sigma = (state[0] * state[3] + state[1] * state[4] + state[2] * state[5]) / root
+    alpha = 2.0 / r0 - (state[3] ** 2 + state[4] ** 2 + state[5] ** 2) / gm
+    s = root * t
+    sign = 1.0 if s >= 0.0 else -1.0
+    step = sign * max(abs(s) * alpha, np.sqrt(r0)) if alpha > 0.0 else sign * np.sqrt(r0)
+    near = 0.0
+    far = step
+    for _ in range(400):  # bounds: twice as far until the time is passed
+        _, _, c2, c3 = stumpff(alpha * far * far)
+        if sign * (r0 * far + sigma * far**2 * c2 + (1.0 - alpha * r0) * far**3 * c3 - s) >= 0.0:
+            break
+        near = far
+        far *= 2.0
+    x = far
+    r = r0
+    for _ in range(200):
+        c0, c1, c2, c3 = stumpff(alpha * x * x)
+        miss = r0 * x + sigma * x * x * c2 + (1.0 - alpha * r0) * x**3 * c3 - s
+        r = r0 * c0 + sigma * x * c1 + x * x * c2
+        if sign * miss >= 0.0:
+            far = x
+        else:
+            near = x
+        y = x - miss / r
+        if not (min(near, far) <= y <= max(near, far)):
+            y = 0.5 * (near + far)
+        done = abs(y - x) <= 4e-16 * abs(y)
+        x = y
+        if done:
+            break
+    c0, c1, c2, c3 = stumpff(alpha * x * x)
+    r = r0 * c0 + sigma * x * c1 + x * x * c2
+    f = 1.0 - x * x * c2 / r0
+    g = (r0 * x * c1 + sigma * x * x * c2) / root
+    df = -root * x * c1 / (r * r0)
+    dg = 1.0 - x * x * c2 / r
+    out = np.empty(6)
+    for j in range(3):
+        out[j] = f * state[j] + g * state[3 + j]
+        out[3 + j] = df * state[j] + dg * state[3 + j]
+    return out

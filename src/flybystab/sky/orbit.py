@@ -226,7 +226,7 @@ class Orbit:
         """
         covariance = self._known("clones")
         parameters, _ = covariance.samples(_count(n), seed)
-        return self._deviated(*covariance.deviations(parameters), "clone", ephemeris)
+        return deviated(self, covariance.epoch, *covariance.deviations(parameters), "clone", ephemeris)
 
     def sigma_points(self, ephemeris: str | Ephemeris | None = None) -> tuple[tuple[Orbit, ...], ...]:
         """Pairs of orbits, plus and minus one sigma along each principal axis of the correlations.
@@ -237,7 +237,7 @@ class Orbit:
         covariance = self._known("sigma points")
         ways = covariance.factor.T
         steps = np.concatenate([covariance.values + ways, covariance.values - ways])
-        found = self._deviated(*covariance.deviations(steps), "sigma point", ephemeris)
+        found = deviated(self, covariance.epoch, *covariance.deviations(steps), "sigma point", ephemeris)
         return tuple(zip(found[: len(ways)], found[len(ways) :], strict=True))
 
     def _known(self, what: str) -> Covariance:
@@ -245,27 +245,38 @@ class Orbit:
             raise InvalidInput("covariance", self.covariance, f"a Covariance: {what} are drawn from it")
         return self.covariance
 
-    def _deviated(
-        self, states: Array, pushes: Array, label: str, ephemeris: str | Ephemeris | None
-    ) -> tuple[Orbit, ...]:
-        """The orbit at the epoch of its covariance plus each of the deviations, SI, (m, 6) and (m, 3)."""
-        covariance = self._known(label)
-        position, velocity, centre = self.position, self.velocity, self.centre
-        if abs(seconds(covariance.epoch, self.epoch)) > 1e-3:
-            centre = "sun"
-            position, velocity = self.at(covariance.epoch, centre, ephemeris)
-        r, v, a = position.to_value(u.m), velocity.to_value(u.m / u.s), np.array(self.nongrav.a)
-        return tuple(
-            Orbit(
-                covariance.epoch,
-                (r + ds[:3]) * u.m,
-                (v + ds[3:]) * u.m / u.s,
-                centre,
-                NonGravitational(tuple((a + da).tolist()), self.nongrav.law),
-                f"{self.name} {label} {k}".strip(),
-            )
-            for k, (ds, da) in enumerate(zip(states, pushes, strict=True))
+
+def deviated(
+    orbit: Orbit, epoch: Time, states: Array, pushes: Array, label: str, ephemeris: str | Ephemeris | None
+) -> tuple[Orbit, ...]:
+    """An orbit taken to `epoch`, plus deviations of the state (m, 6) and of A1, A2, A3 (m, 3) there; SI."""
+    position, velocity, centre = orbit.position, orbit.velocity, orbit.centre
+    if abs(seconds(epoch, orbit.epoch)) > 1e-3:
+        centre = "sun"
+        position, velocity = orbit.at(epoch, centre, ephemeris)
+    else:
+        epoch = orbit.epoch
+    r, v, a = position.to_value(u.m), velocity.to_value(u.m / u.s), np.array(orbit.nongrav.a)
+    return tuple(
+        Orbit(
+            epoch,
+            (r + ds[:3]) * u.m,
+            (v + ds[3:]) * u.m / u.s,
+            centre,
+            NonGravitational(tuple((a + da).tolist()), orbit.nongrav.law),
+            f"{orbit.name} {label} {k}".strip(),
         )
+        for k, (ds, da) in enumerate(zip(states, pushes, strict=True))
+    )
+
+
+def heliocentric(orbit: Orbit, ephemeris: str | Ephemeris | None = None) -> Array:
+    """State of an orbit at its epoch relative to the Sun, shape (6,), m and m/s."""
+    if orbit.centre == "sun":
+        return np.concatenate([orbit.position.to_value(u.m), orbit.velocity.to_value(u.m / u.s)])
+    window = _ephemeris(ephemeris).window(orbit.epoch, 0.0, 0.0)
+    sun: Array = window.states(BODIES.index("sun"), np.zeros(1))[0]
+    return orbit.barycentric(window) - sun
 
 
 def default_forces(orbit: Orbit, *bodies: str) -> tuple[str, ...]:

@@ -1,0 +1,126 @@
+"""The neighbours of many orbits, followed to the encounters that were found: one more integration each."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import astropy.units as u
+import numpy as np
+from astropy.table import QTable
+from numpy.typing import NDArray
+
+from flybystab.constants import DAY
+from flybystab.core.jit import kernel
+from flybystab.sky.ephemeris import BODIES, Window
+from flybystab.sky.finder import _LONGEST, _rate, _step
+from flybystab.sky.orbit import seconds
+from flybystab.sky.planets import planet
+from flybystab.sky.predictability import Neighbour, predictability
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def carry(model: Array, law: Array, t0: float, y0: Array, times: Array, tolerance: float, out: Array) -> int:
+    """Write barycentric states (m, m/s) at ``times`` (s), in order away from ``t0``, into ``out[n, 6]``.
+
+    Steps and tolerance as in :func:`flybystab.sky.finder.track_encounters`. Returns the number written.
+    """
+    k = np.empty((13, 6))
+    y = y0.copy()
+    new = np.empty(6)
+    places = np.empty((10, 3))
+    rate = np.zeros(3)
+    t = t0
+    h = DAY
+    _rate(model, law, t, y, places, rate, k[0])
+    for n in range(times.size):
+        while t != times[n]:
+            sign = 1.0 if times[n] > t else -1.0
+            last = abs(times[n] - t) <= abs(h)
+            length = times[n] - t if last else sign * abs(h)
+            error = _step(model, law, t, y, length, k, new, places, rate) / tolerance
+            if not error <= 1.0:
+                factor = 0.9 * error**-0.125 if error < 1e30 else 0.1
+                h = length * max(factor, 0.1)
+                if abs(h) < 1e-3:
+                    return n
+                continue
+            t = times[n] if last else t + length
+            y[:] = new
+            k[0] = k[12]
+            grow = 0.9 * error**-0.125 if error > 0.0 else 5.0
+            if not last or grow < 1.0:
+                h = length * min(max(grow, 0.2), 5.0)
+            if abs(h) > _LONGEST:
+                h = _LONGEST
+        out[n] = y
+    return times.size
+
+
+def add_growth(
+    table: QTable,
+    neighbours: Sequence[Neighbour],
+    laws: Sequence[Array],
+    window: Window,
+    model: Array,
+    tolerance: float,
+    threads: int,
+) -> None:
+    """Add to a table of encounters ``displacement`` (km), ``growth`` and ``predictability``.
+
+    Displacement: of the neighbour from the asteroid at the time of closest approach; on an impact, of the
+    neighbour from the planet's centre, less the distance of the two-body orbit. Growth: displacement over
+    that at the epoch.
+
+    Parameters
+    ----------
+    table : QTable
+        From :func:`flybystab.find_encounters`.
+    neighbours, laws : sequences
+        Of each asteroid: neighbour, and A1, A2, A3 with their law.
+    window, model, tolerance
+        Of the search.
+    """
+    t = seconds(table["time"][0], window.epoch) if len(table) else 0.0
+    times = t + (table["time"] - table["time"][0]).to_value(u.s) if len(table) else np.zeros(0)
+    bodies = np.array([BODIES.index(name) for name in table["planet"]], dtype=int)
+    index = np.asarray(table["index"])
+    shift = np.full(len(table), np.nan)
+
+    def one(i: int) -> None:
+        beside = neighbours[i]
+        start = seconds(beside.orbit.epoch, window.epoch)
+        state = beside.orbit.barycentric(window)
+        rows = np.flatnonzero(index == i)
+        law = laws[i].copy()
+        if law.any():
+            law[:3] = beside.orbit.nongrav.a
+        for side in (rows[times[rows] >= start], rows[times[rows] < start][::-1]):
+            out = np.empty((side.size, 6))
+            done = carry(model, law, start, state, times[side], tolerance, out)
+            for row, found in zip(side[:done], out, strict=False):
+                away = found[:3] - window.states(int(bodies[row]), times[row : row + 1])[0, :3]
+                if table["impact"][row]:
+                    distance = table["distance"][row].to_value(u.m)
+                    shift[row] = max(float(np.linalg.norm(away)) - distance, 0.0)
+                else:
+                    shift[row] = np.linalg.norm(away - table["position"][row].to_value(u.m))
+
+    wanted = np.unique(index).tolist()
+    if threads > 1 and len(wanted) > 1:
+        with ThreadPoolExecutor(threads) as pool:
+            list(pool.map(one, wanted))
+    else:
+        for i in wanted:
+            one(i)
+    shift[np.isnan(shift)] = np.inf  # the neighbour was lost
+    scale = np.array([planet(name).impact_distance for name in table["planet"]])
+    size = np.maximum(table["distance"].to_value(u.m), np.where(table["impact"], scale, 0.0))
+    table["displacement"] = (shift * u.m).to(u.km)
+    table["growth"] = shift / np.array([neighbours[i].shift for i in index])
+    table["predictability"] = np.array(
+        [str(predictability(d, x)) for d, x in zip(size, shift, strict=True)], dtype="U12"
+    )
+    table.meta["neighbours"] = sorted({n.label for n in neighbours})

@@ -1,0 +1,115 @@
+"""How well an encounter is known: what becomes of a neighbouring track.
+
+After a close passage two tracks part by orders of magnitude (a metre before the 2029 passage of Apophis is
+5 km a year later). Whether a later encounter is still the encounter of this asteroid, or one of many that it
+may have, is decided by following a neighbour of the orbit to it: one sigma of the covariance along the
+direction that moves the asteroid most by then, or, for an orbit taken as exact, one metre away from the Sun.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import StrEnum
+
+import astropy.units as u
+import numpy as np
+from astropy.time import Time
+from numpy.typing import NDArray
+
+from flybystab.constants import AU
+from flybystab.sky.covariance import Covariance
+from flybystab.sky.elements import GM_SUN
+from flybystab.sky.ephemeris import Ephemeris
+from flybystab.sky.kepler import two_body
+from flybystab.sky.orbit import Orbit, deviated, heliocentric, seconds
+
+Array = NDArray[np.float64]
+
+
+class Predictability(StrEnum):
+    """What a displacement of the asteroid says of an encounter.
+
+    ``determined``: below a tenth of the closest distance. ``uncertain``: below the distance itself: there is
+    such an encounter, its digits do not hold. ``one of many``: as large as the distance or larger, or the
+    encounter does not happen on the other track: this encounter is one of many possible.
+    """
+
+    DETERMINED = "determined"
+    UNCERTAIN = "uncertain"
+    ONE_OF_MANY = "one of many"
+
+
+def predictability(distance: float, *displacements: float) -> Predictability:
+    """Judgement of displacements of the asteroid at closest approach (m; inf: the passage is gone)."""
+    worst = max(displacements)
+    if worst < 0.1 * distance:
+        return Predictability.DETERMINED
+    return Predictability.UNCERTAIN if worst < distance else Predictability.ONE_OF_MANY
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbour:
+    """An orbit beside another.
+
+    Attributes
+    ----------
+    orbit : Orbit
+    shift : float
+        How far it is away at its epoch, m.
+    label : str
+        What the shift is, in words.
+    """
+
+    orbit: Orbit
+    shift: float
+    label: str
+
+
+def neighbour(orbit: Orbit, time: Time, ephemeris: str | Ephemeris | None = None) -> Neighbour:
+    """The neighbour by which encounters around `time` are judged.
+
+    With a covariance: one sigma along the direction in which two-body motion with A1 and the drift that A2 makes
+    leave the asteroid most uncertain at `time`. Planets are left out of this choice of a direction alone.
+    """
+    covariance = orbit.covariance
+    if not isinstance(covariance, Covariance):
+        r = orbit.position.to_value(u.m)
+        out = np.concatenate([r / np.linalg.norm(r), np.zeros(3)])
+        beside = deviated(orbit, orbit.epoch, out[None], np.zeros((1, 3)), "neighbour", ephemeris)[0]
+        return Neighbour(beside, 1.0, "1 m away from the Sun")
+    t = seconds(time, covariance.epoch)
+    middle = heliocentric(
+        deviated(orbit, covariance.epoch, np.zeros((1, 6)), np.zeros((1, 3)), "", ephemeris)[0]
+    )
+    ends = []
+    for sign in (1.0, -1.0):
+        states, pushes = covariance.deviations(covariance.values + sign * covariance.factor.T)
+        ends.append(_later(middle + states, pushes, t))
+    # rows: displacement by each principal way; the first left singular vector mixes the ways to the largest
+    weight = np.linalg.svd(ends[0] - ends[1])[0][:, 0]
+    states, pushes = covariance.deviations((covariance.values + covariance.factor @ weight)[None])
+    beside = deviated(orbit, covariance.epoch, states, pushes, "neighbour", ephemeris)[0]
+    label = "one sigma in the direction least known" + (
+        "" if covariance.correlated else ", without correlations"
+    )
+    return Neighbour(beside, float(np.linalg.norm(states[0, :3])), label)
+
+
+def _later(states: Array, pushes: Array, t: float) -> Array:
+    """Two-body positions (m), shape (m, 3), `t` s after heliocentric states (m, 6), with changes of A1, A2, A3.
+
+    A1 weakens the Sun's pull by ``A1 (1 au)^2``. A2 drifts the semi-major axis by
+    ``2 A2 (1 - e^2)/n (1 au/p)^2`` (Farnocchia et al. 2013, inverse square), hence the place along the orbit by
+    ``-3/2 A2 p alpha^2 (1 au/p)^2 t^2 / n`` in time, alpha = 1/a. A3 has no secular part along the orbit.
+    """
+    out = np.empty((len(states), 3))
+    for k, (state, push) in enumerate(zip(states, pushes, strict=True)):
+        gm = GM_SUN - push[0] * AU**2
+        there = two_body(gm, state, t)
+        alpha = 2.0 / np.linalg.norm(state[:3]) - state[3:] @ state[3:] / gm
+        p = np.sum(np.cross(state[:3], state[3:]) ** 2) / gm
+        late = 0.0
+        if alpha > 0.0:
+            late = -1.5 * push[1] * p * alpha**2 * (AU / p) ** 2 * t * t / np.sqrt(gm * alpha**3)
+        out[k] = there[:3] + late * there[3:]
+    return out
