@@ -84,3 +84,7 @@ class MissingExtra(FlybystabError, ImportError):
 
 class WorkersLost(FlybystabError, RuntimeError):
     """Processes that computed something are gone; what was finished is kept."""
+
+
+class OutputFailed(FlybystabError, OSError):
+    """A result file could not be written in the middle of a run; the message says what is safe, and where."""

@@ -92,12 +92,21 @@ def test_journal_recovers_from_a_cut_at_every_byte(tmp_path):
 
 
 def test_journal_of_another_run_is_refused(tmp_path):
-    Journal(tmp_path / "j", {"run": "abc"}).close()
-    with pytest.raises(InvalidInput, match="another run"):
-        Journal(tmp_path / "j", {"run": "abd"})
+    Journal(tmp_path / "j", {"run": "abc", "settings": {"seed": 1, "samples": 9}}).close()
+    with pytest.raises(InvalidInput, match="another run is unfinished there, with seed = 1 instead of 2"):
+        Journal(tmp_path / "j", {"run": "abd", "settings": {"seed": 2, "samples": 9}})
     (tmp_path / "k").write_text(json.dumps([1]) + "\n")
     with pytest.raises(InvalidInput, match="journal"):
         Journal(tmp_path / "k", {"run": "abc"})
+
+
+def test_two_runs_cannot_write_the_same_journal(tmp_path):
+    pytest.importorskip("fcntl")
+    first = Journal(tmp_path / "j", {"run": "abc"})
+    with pytest.raises(InvalidInput, match="no other run"):
+        Journal(tmp_path / "j", {"run": "abc"})
+    first.close()
+    Journal(tmp_path / "j", {"run": "abc"}).close()
 
 
 def test_bad_outputs_are_found_before_work(tmp_path, monkeypatch):

@@ -1,6 +1,8 @@
 """The chain from asteroids to rows: verdicts, probabilities, reproducibility, failure, stop and resume."""
 
 import pickle
+import re
+import signal
 from concurrent.futures import ThreadPoolExecutor
 
 import astropy.units as u
@@ -10,7 +12,7 @@ from scripted import NAMES, SPAN, day, screening, three
 
 from flybystab.aggregate.body import Material
 from flybystab.constants import AU, R_EARTH
-from flybystab.errors import InvalidInput, OutOfSpan, UnknownName
+from flybystab.errors import InvalidInput, OutOfSpan, OutputFailed, UnknownName
 from flybystab.sky.encounter import Encounter, usual_start
 from flybystab.sky.planets import planet
 from flybystab.survey.catalogue import Asteroid
@@ -190,6 +192,30 @@ def test_output_is_checked_before_anything_is_computed(tmp_path):
         run.run(tmp_path / "nowhere" / "x.ecsv")
     with pytest.raises(InvalidInput, match="keep_samples"):
         run.run(tmp_path / "x.ecsv", samples_output=tmp_path / "y.ecsv")
+
+
+@pytest.mark.parametrize("limit", [2_000, 9_000])
+def test_a_disk_that_fills_up_in_the_middle_keeps_what_is_done(tmp_path, limit):
+    """A limit on the size of files stands for the disk; the second also hits the table at the end."""
+    resource = pytest.importorskip("resource")
+    run, out = screening(samples=4), tmp_path / "x.ecsv"
+    before = resource.getrlimit(resource.RLIMIT_FSIZE)
+    old = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+    try:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (limit, before[1]))
+        with pytest.raises(OutputFailed, match=r"asteroids are safe in .*x.ecsv.journal") as caught:
+            run.run(out)
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, before)
+        signal.signal(signal.SIGXFSZ, old)
+    saved = int(re.search(r"(\d+) of 6 asteroids", str(caught.value))[1])
+    assert 0 <= saved < 6
+    called = []
+    again = Screening(run.asteroids, run.settings, lambda a, s: called.append(a.name) or three(a, s))
+    again.run(out)
+    assert called == NAMES[saved:]
+    run.run(tmp_path / "whole.ecsv")
+    same(read_results(out), read_results(tmp_path / "whole.ecsv"))
 
 
 def test_wilson_interval_and_contributors():

@@ -2,18 +2,29 @@
 
 from __future__ import annotations
 
+import os
 import signal
 from collections.abc import Iterator
 from concurrent.futures import Executor, ProcessPoolExecutor
 from contextlib import contextmanager
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
+from multiprocessing.connection import wait
+from threading import Thread
 
 from flybystab.errors import InvalidInput, MissingExtra, WorkersLost
 
 
-def _quiet() -> None:
-    # Ctrl-C reaches every process of the terminal; the parent alone answers it.
+def _follow_parent() -> None:
+    """Prepare a worker process: the parent alone answers Ctrl-C, and its death, by SIGKILL too, ends the worker."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)
+    parent = parent_process()
+    if parent is not None:
+        Thread(target=_end_with, args=(parent.sentinel,), daemon=True).start()
+
+
+def _end_with(sentinel: int) -> None:
+    wait([sentinel])
+    os._exit(1)
 
 
 @contextmanager
@@ -61,7 +72,7 @@ def workers(jobs: int = 1, dask: str | None = None, timeout: float = 30.0) -> It
         yield None
     else:
         # Fresh processes: a fork of a process with threads can hang.
-        pool = ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_quiet)
+        pool = ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_follow_parent)
         try:
             yield pool
         finally:

@@ -45,6 +45,12 @@ class ProgressBar:
             self.stream.write(self.line(state) + "\n")
         self.stream.flush()
 
+    def end(self) -> None:
+        """Leave the line of the bar, for other words."""
+        if self.terminal:
+            self.stream.write("\n")
+            self.stream.flush()
+
     def line(self, state: Progress, width: int = 0) -> str:
         """One line of text, cut to `width` if it is positive."""
         share = state.done / state.total if state.total else 1.0

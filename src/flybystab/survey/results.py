@@ -99,7 +99,7 @@ class Journal:
     Raises
     ------
     InvalidInput
-        The file is the journal of another run, or not a journal.
+        The file is the journal of another run, or not a journal, or another process writes to it.
     """
 
     def __init__(self, path: Path, header: Mapping[str, Any]) -> None:
@@ -110,15 +110,35 @@ class Journal:
             self._recover(wanted)
         else:
             path.write_text(wanted + "\n", encoding="utf-8")
-        self._file = path.open("ab")
+        # Unbuffered: what is written is in the hands of the system, and a full disk is noticed at once.
+        self._file = path.open("ab", buffering=0)
+        self._lock()
+
+    def _lock(self) -> None:
+        """Refuse a second process on the same journal."""
+        try:
+            import fcntl
+        except ImportError:  # not on this system
+            return
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            self._file.close()
+            raise InvalidInput("journal", str(self.path), "no other run that writes to it now") from None
+        except OSError:  # a file system without locks
+            pass
 
     def _recover(self, wanted: str) -> None:
         with self.path.open("r+b") as stream:
             first, line = stream.readline(), wanted.encode() + b"\n"
             if first != line:
                 if not line.startswith(first):
-                    expected = "this run's journal; another run is unfinished (remove it to drop that)"
-                    raise InvalidInput("journal", str(self.path), expected)
+                    raise InvalidInput(
+                        "journal",
+                        str(self.path),
+                        "this run's journal; another run is unfinished there"
+                        f"{_difference(first, line)}. Start that one again to finish it, or remove the file",
+                    )
                 stream.seek(0)  # killed while it wrote its first line
                 stream.write(line)
                 stream.truncate()
@@ -139,10 +159,10 @@ class Journal:
         """Write down a finished task; a task that is there already is not repeated."""
         if task in self.where:
             return
-        line = json.dumps({"task": task, **content}).encode() + b"\n"
-        offset = self._file.tell()
-        self._file.write(line)
-        self._file.flush()
+        line = memoryview(json.dumps({"task": task, **content}).encode() + b"\n")
+        offset = self._file.seek(0, os.SEEK_END)
+        while line:
+            line = line[self._file.write(line) :]
         self.where[task] = offset
 
     def tasks(self) -> Iterator[dict[str, Any]]:
@@ -157,6 +177,18 @@ class Journal:
         self._file.close()
         if remove:
             self.path.unlink(missing_ok=True)
+
+
+def _difference(theirs: bytes, ours: bytes) -> str:
+    """In what another run's header differs, for a reader."""
+    try:
+        a, b = (json.loads(text).get("settings", {}) for text in (theirs, ours))
+    except (ValueError, AttributeError):
+        return ""
+    keys = [k for k in b if a.get(k) != b[k]]
+    if not a or not keys:
+        return ""
+    return ", with " + ", ".join(f"{k} = {a.get(k)} instead of {b[k]}" for k in keys[:3])
 
 
 def empty_table(columns: Mapping[str, Column], meta: Mapping[str, Any]) -> QTable:

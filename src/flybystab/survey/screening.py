@@ -29,7 +29,7 @@ from numpy.typing import NDArray
 from flybystab import __version__
 from flybystab.aggregate.body import Material
 from flybystab.constants import AU
-from flybystab.errors import FlybystabError, InvalidInput, WorkersLost
+from flybystab.errors import FlybystabError, InvalidInput, OutputFailed, WorkersLost
 from flybystab.outcome import Verdict
 from flybystab.sky.ephemeris import ephemeris
 from flybystab.sky.planets import planet
@@ -360,7 +360,12 @@ class Screening:
                 digest.update(a.covariance.values.tobytes() + a.covariance.matrix.tobytes())
         settings = json.dumps(self.settings.stated() | {"ephemeris": ephemeris().name}, sort_keys=True)
         digest.update(settings.encode())
-        return {"flybystab": __version__, "run": digest.hexdigest(), "samples": self.settings.keep_samples}
+        return {
+            "flybystab": __version__,
+            "run": digest.hexdigest(),
+            "samples": self.settings.keep_samples,
+            "settings": self.settings.stated() | {"asteroids": len(self.asteroids)},
+        }
 
     def results(
         self,
@@ -436,6 +441,8 @@ class Screening:
             The output cannot be written, or another run's journal is in the way: before anything is computed.
         WorkersLost
             Processes of the executor died; the rows so far are in the file and the same call goes on.
+        OutputFailed
+            The disk is full, or gone, in the middle; the rows so far are in the journal and the same call goes on.
         KeyboardInterrupt
             After the rows so far have been written into a valid file; the same call goes on later.
         """
@@ -467,20 +474,36 @@ class Screening:
         for task in journal.tasks():
             rows += len(task["rows"])
             counts.update(r.get("verdict") or "error" for r in task["rows"])
+        unwritten: OSError | None = None
         try:
             tell()
             for i, result in self.results(executor, skip=journal.where, chunk=chunk):
-                journal.add(i, result)
+                try:
+                    journal.add(i, result)
+                except OSError as error:
+                    unwritten = error
+                    break
                 rows += len(result["rows"])
                 counts.update(r.get("verdict") or "error" for r in result["rows"])
                 tell()
-            complete = True
+            complete = unwritten is None
         finally:
             meta = self.meta(complete=complete)
-            write_rows((r for t in journal.tasks() for r in t["rows"]), out, COLUMNS, meta)
-            if extra is not None:
-                write_rows((r for t in journal.tasks() for r in t["samples"]), extra, SAMPLE_COLUMNS, meta)
-            journal.close(remove=complete)
+            try:
+                write_rows((r for t in journal.tasks() for r in t["rows"]), out, COLUMNS, meta)
+                if extra is not None:
+                    write_rows(
+                        (r for t in journal.tasks() for r in t["samples"]), extra, SAMPLE_COLUMNS, meta
+                    )
+            except OSError as error:
+                unwritten = error
+            journal.close(remove=complete and unwritten is None)
+            if unwritten is not None:
+                raise OutputFailed(
+                    f"{out.parent} cannot be written any more ({unwritten.strerror}). {len(journal.where)} of "
+                    f"{len(self.asteroids)} asteroids are safe in {journal.path}: make room and start the same "
+                    "run again"
+                )
         return state()
 
 

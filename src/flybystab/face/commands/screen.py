@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import sys
 
 from flybystab.face.commands.common import material_arguments, show, span_arguments, tdb
 
@@ -72,10 +73,16 @@ def run(options: argparse.Namespace) -> None:
             keep_samples=options.samples_output is not None,
         ),
     )
-    with workers(options.jobs, options.dask) as executor:
-        screening.run(
-            output, samples_output=options.samples_output, executor=executor, progress=ProgressBar()
+    bar = ProgressBar()
+    try:
+        with workers(options.jobs, options.dask) as executor:
+            screening.run(output, samples_output=options.samples_output, executor=executor, progress=bar)
+    except KeyboardInterrupt:
+        bar.end()
+        print(
+            f"flybystab: {output} holds the rows so far; the same command goes on from there", file=sys.stderr
         )
+        raise
     show(
         options,
         lambda: table_document(read_results(output)),
