@@ -10,7 +10,7 @@ import flybystab as fs
 from flybystab.errors import InvalidInput, NoEncounter
 from flybystab.sky.b_plane import capture_radius
 from flybystab.sky.covariance import SETS, Covariance
-from flybystab.sky.distribution import disc_probability, ellipse
+from flybystab.sky.linear_plane import disc_probability, ellipse
 from flybystab.sky.orbit import later
 from flybystab.sky.planets import planet
 from flybystab.survey.catalogue import catalogue

@@ -7,6 +7,7 @@ normal as long as the map is linear, which is measured.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -16,46 +17,18 @@ from astropy.table import QTable
 from astropy.time import Time
 from astropy.units import Quantity
 from numpy.typing import NDArray
-from scipy.integrate import quad
-from scipy.stats import binomtest, norm
+from scipy.stats import binomtest
 
 from flybystab.errors import InvalidInput, NoEncounter
-from flybystab.sky.b_plane import capture_radius
 from flybystab.sky.encounter import far_enough
 from flybystab.sky.ephemeris import Ephemeris
 from flybystab.sky.finder import find_encounters
+from flybystab.sky.linear_plane import LinearPlane, ellipse, linear_plane
 from flybystab.sky.orbit import Orbit, later
 from flybystab.sky.planets import Planet, planet
 from flybystab.units import to_si
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class LinearPlane:
-    """The covariance of an orbit mapped linearly to the target plane.
-
-    Attributes
-    ----------
-    centre : Quantity, shape (2,)
-        ``(B.T, B.R)`` of the nominal orbit.
-    covariance : Quantity, shape (2, 2)
-        Of ``(B.T, B.R)``.
-    distance_sigma, time_sigma : Quantity
-        1-sigma of distance and time of closest approach, by the same map.
-    impact_probability : float
-        Share of the normal law inside the capture radius of the nominal ``v_inf``.
-    nonlinearity : float
-        Largest deviation of the middle of a pair of one-sigma points from the nominal, over the longer
-        semi-axis of the ellipse: the map, and the probability, hold while it is far below one.
-    """
-
-    centre: Quantity
-    covariance: Quantity
-    distance_sigma: Quantity
-    time_sigma: Quantity
-    impact_probability: float
-    nonlinearity: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,43 +108,8 @@ class EncounterDistribution:
     def b_covariance(self) -> Quantity:
         """Sample covariance of ``(B.T, B.R)``, shape (2, 2), over the unbound clones."""
         points = self.b.to_value(u.km)
-        return np.cov(points[np.isfinite(points).all(axis=1)].T) * u.km**2
-
-
-def ellipse(covariance: Quantity) -> tuple[Quantity, Quantity, Quantity]:
-    """Semi-axes of the one-sigma ellipse, longer one first, and its direction from +T to +R, 0 to 180 deg."""
-    values, vectors = np.linalg.eigh(covariance.to_value(u.km**2))
-    axes = np.sqrt(np.maximum(values, 0.0)) * u.km
-    angle = np.arctan2(vectors[1, 1], vectors[0, 1]) % np.pi
-    return axes[1], axes[0], np.rad2deg(angle) * u.deg
-
-
-def disc_probability(centre: Array, covariance: Array, radius: float) -> float:
-    """Share of a normal law in the plane inside a disc around the origin.
-
-    Along the shorter axis of the ellipse the integral is done numerically, along the other in closed form.
-
-    Parameters
-    ----------
-    centre, covariance : ndarray, shapes (2,) and (2, 2)
-        Any unit, the same as that of `radius`.
-    """
-    values, vectors = np.linalg.eigh(covariance)
-    short, long = np.sqrt(np.maximum(values, (1e-12 * radius) ** 2))
-    x0, y0 = vectors.T @ centre
-
-    def slice_(x: float) -> float:
-        half = np.sqrt(max(radius * radius - x * x, 0.0))
-        inside = norm.sf((-half - y0) / long) - norm.sf((half - y0) / long)
-        if y0 < 0.0:  # the tail on the side where no digit is lost
-            inside = norm.cdf((half - y0) / long) - norm.cdf((-half - y0) / long)
-        return float(norm.pdf((x - x0) / short) / short * inside)
-
-    low, high = max(-radius, x0 - 12.0 * short), min(radius, x0 + 12.0 * short)
-    if not low < high:
-        return 0.0
-    middle = [m for m in (x0,) if low < m < high]
-    return float(quad(slice_, low, high, points=middle or None, limit=200, epsabs=0.0, epsrel=1e-8)[0])
+        points = points[np.isfinite(points).all(axis=1)]
+        return (np.cov(points.T) if len(points) > 1 else np.full((2, 2), np.nan)) * u.km**2
 
 
 def encounter_distribution(
@@ -214,101 +152,160 @@ def encounter_distribution(
         The ephemeris covers the passage or the epoch of the covariance not at all.
     InvalidInput, UnitMismatch, UnknownName
     """
-    path = getattr(orbit, "orbit", orbit)
-    if not isinstance(path, Orbit):
-        raise InvalidInput("orbit", orbit, "an Orbit, or an object with one as its attribute 'orbit'")
+    path = _path(orbit)
     if not isinstance(time, Time) or time.shape != ():
         raise InvalidInput("time", time, "one astropy Time")
     body = _planet(planet)
     reach = to_si(search, u.s, "search", low=0.0, open_low=True)
     largest = far_enough(body) if within is None else to_si(within, u.m, "within", low=0.0, open_low=True)
-    clones = path.clones(n, seed, ephemeris)
-    pairs = path.sigma_points(ephemeris)
-    covariance = path.covariance
-    assert covariance is not None
-
-    def passages(orbits: list[Orbit], near: Time) -> tuple[QTable, Array]:
-        """Passages of the orbits and, for each orbit, its row (-1: none)."""
-        table = find_encounters(
-            orbits,
-            later(near, -reach),
-            later(near, reach),
-            [body.name],
-            largest * u.m,
-            ephemeris=ephemeris,
-            tolerance=tolerance,
-            threads=threads,
-        )
-        rows = np.full(len(orbits), -1)
-        if len(table):
-            gap = np.abs((table["time"] - near).to_value(u.s))
-            # An impact ends a track: it comes before any other minimum.
-            order = np.lexsort((gap, ~table["impact"]))[::-1]
-            rows[table["index"][order]] = order
-        return table, rows
-
-    table, rows = passages([path], time.tdb)
-    if rows[0] < 0:
+    table = find_encounters(
+        path,
+        later(time, -reach),
+        later(time, reach),
+        [body.name],
+        largest * u.m,
+        ephemeris=ephemeris,
+        tolerance=tolerance,
+        threads=threads,
+    )
+    if not len(table):
         raise NoEncounter(
             f"{path.name or 'the orbit'} has no minimum of distance to {body.name} within "
-            f"{(search).to(u.d):g} of {time.tdb.iso} TDB and {(largest * u.m).to(u.au):.4g}"
+            f"{search.to(u.d):g} of {time.tdb.iso} TDB and {(largest * u.m).to(u.au):.4g}"
         )
-    nominal = table[int(rows[0])]
-    middle = nominal["time"]
-    points = [o for pair in pairs for o in pair]
-    table, rows = passages([*clones, *points], middle)
-    offset = (table["time"] - middle).to_value(u.s) if len(table) else np.zeros(0)
-    columns = np.full((len(rows), 6), np.nan)
-    have = rows >= 0
-    if len(table):
-        every = np.column_stack(
-            [
-                offset,
-                *(table[c].to_value(u.m) for c in ("distance", "b_t", "b_r")),
-                table["v_inf"].to_value(u.m / u.s),
-                table["impact"],
-            ]
-        )
-        columns[have] = every[rows[have]]
+    row = int(np.argmin(np.abs((table["time"] - time).to_value(u.s))))
+    return distributions(
+        path,
+        table[row : row + 1],
+        n=n,
+        seed=seed,
+        search=search,
+        within=largest * u.m,
+        ephemeris=ephemeris,
+        tolerance=tolerance,
+        threads=threads,
+    )[0]
+
+
+def distributions(
+    orbit: Any,
+    table: QTable,
+    *,
+    n: int = 1000,
+    seed: int = 0,
+    search: Quantity = 10 * u.d,
+    within: Quantity | None = None,
+    ephemeris: str | Ephemeris | None = None,
+    tolerance: float = 1e-12,
+    threads: int | None = None,
+) -> list[EncounterDistribution]:
+    """Clones of an orbit through several encounters, in one integration.
+
+    Parameters
+    ----------
+    orbit, n, seed, search, within, ephemeris, tolerance, threads
+        As in :func:`encounter_distribution`.
+    table : QTable
+        The encounters of the nominal orbit, from :func:`flybystab.find_encounters`.
+
+    Returns
+    -------
+    list of EncounterDistribution
+        One for each row. A clone that hits a planet is missing from the later ones.
+    """
+    path = _path(orbit)
+    reach = to_si(search, u.s, "search", low=0.0, open_low=True)
+    if not len(table):
+        return []
+    clones = path.clones(n, seed, ephemeris)
+    points = [o for pair in path.sigma_points(ephemeris) for o in pair]
+    bodies = list(dict.fromkeys(np.asarray(table["planet"]).tolist()))
+    far = [far_enough(planet(b)) if within is None else within.to_value(u.m) for b in bodies]
+    found = find_encounters(
+        [*clones, *points],
+        later(table["time"].min(), -reach),
+        later(table["time"].max(), reach),
+        bodies,
+        far * u.m,
+        ephemeris=ephemeris,
+        tolerance=tolerance,
+        threads=threads,
+    )
+    return [_distribution(path, row, clones, len(points), found, reach) for row in table]
+
+
+def _distribution(
+    orbit: Orbit, nominal: Any, clones: tuple[Orbit, ...], points: int, found: QTable, reach: float
+) -> EncounterDistribution:
+    """The passages that belong to one of the nominal orbit; `found` has the clones, then the sigma points."""
+    covariance = orbit.covariance
+    assert covariance is not None
+    body = planet(str(nominal["planet"]))
+    columns = np.full((len(clones) + points, 6), np.nan)
+    if len(found):
+        offset = (found["time"] - nominal["time"]).to_value(u.s)
+        here = np.flatnonzero((found["planet"] == body.name) & (np.abs(offset) <= reach))
+        # The last one written stays: an impact before any other minimum, then the one nearest in time.
+        order = here[np.lexsort((np.abs(offset[here]), ~found["impact"][here]))[::-1]]
+        every = [offset, *(found[c].to_value(u.m) for c in ("distance", "b_t", "b_r"))]
+        every += [found["v_inf"].to_value(u.m / u.s), found["impact"]]
+        columns[found["index"][order]] = np.column_stack(every)[order]
     first = columns[: len(clones)]
     return EncounterDistribution(
         planet=body,
-        time=middle,
+        time=nominal["time"],
         nominal=nominal,
         clones=clones,
-        found=have[: len(clones)],
+        found=np.isfinite(first[:, 0]),
         time_offset=first[:, 0] * u.s,
         distance=(first[:, 1] * u.m).to(u.km),
         v_inf=(first[:, 4] * u.m / u.s).to(u.km / u.s),
         b=(first[:, 2:4] * u.m).to(u.km),
         impact=first[:, 5] > 0.0,
-        linear=_linear(columns[len(clones) :], nominal, body),
+        linear=linear_plane(columns[len(clones) :], nominal, body),
         source=covariance.source,
         correlated=covariance.correlated,
     )
 
 
+def _path(orbit: Any) -> Orbit:
+    path = getattr(orbit, "orbit", orbit)
+    if not isinstance(path, Orbit):
+        raise InvalidInput("orbit", orbit, "an Orbit, or an object with one as its attribute 'orbit'")
+    if path.covariance is None:
+        raise InvalidInput("covariance", None, "an orbit with one: clones are drawn from it")
+    return path
+
+
+def add_clones(table: QTable, found: Sequence[EncounterDistribution | None]) -> None:
+    """Add what clones say to a table of encounters, one distribution a row; None where there is no covariance.
+
+    Columns: ``clones`` (number), ``clones_found`` (with a passage near this time), ``distance_sigma``,
+    ``distance_low``, ``distance_high`` (99.73 % of those found; km), ``time_sigma`` (s), ``b_major``,
+    ``b_minor`` (km) and ``b_angle`` (deg from +T to +R) of the one-sigma ellipse, ``p_impact`` with its 95 %
+    interval ``p_impact_low``, ``p_impact_high``, and ``p_impact_linear``. nan where fewer than two were found.
+    """
+
+    def column(value: Callable[[EncounterDistribution], Any], least: int = 2) -> Array:
+        return np.array(
+            [value(d) if d is not None and d.found.sum() >= least else np.nan for d in found], dtype=float
+        )
+
+    table["clones"] = np.array([0 if d is None else len(d) for d in found], dtype=int)
+    table["clones_found"] = np.array([0 if d is None else d.found.sum() for d in found], dtype=int)
+    table["distance_sigma"] = column(lambda d: d.distance_sigma.to_value(u.km)) * u.km
+    table["distance_low"] = column(lambda d: d.distance_interval()[0].to_value(u.km)) * u.km
+    table["distance_high"] = column(lambda d: d.distance_interval()[1].to_value(u.km)) * u.km
+    table["time_sigma"] = column(lambda d: d.time_sigma.to_value(u.s)) * u.s
+    table["b_major"] = column(lambda d: ellipse(d.b_covariance)[0].to_value(u.km)) * u.km
+    table["b_minor"] = column(lambda d: ellipse(d.b_covariance)[1].to_value(u.km)) * u.km
+    table["b_angle"] = column(lambda d: ellipse(d.b_covariance)[2].to_value(u.deg)) * u.deg
+    table["p_impact"] = column(lambda d: d.impact_probability, 0)
+    table["p_impact_low"] = column(lambda d: d.impact_interval()[0], 0)
+    table["p_impact_high"] = column(lambda d: d.impact_interval()[1], 0)
+    table["p_impact_linear"] = column(lambda d: d.linear.impact_probability if d.linear else np.nan, 0)
+    table.meta["covariances"] = sorted({d.source for d in found if d is not None})
+
+
 def _planet(name: str | Planet) -> Planet:
     return planet(name)
-
-
-def _linear(points: Array, nominal: Any, body: Planet) -> LinearPlane | None:
-    """The linear map from pairs of rows: time, distance, B.T, B.R (SI) at plus and minus one sigma."""
-    centre = np.array([nominal["b_t"].to_value(u.m), nominal["b_r"].to_value(u.m)])
-    pairs = points[:, :4].reshape(-1, 2, 4)
-    if not (np.isfinite(pairs).all() and np.isfinite(centre).all()):
-        return None
-    half = 0.5 * (pairs[:, 0] - pairs[:, 1])
-    bent = 0.5 * (pairs[:, 0] + pairs[:, 1])[:, 2:] - centre
-    matrix = half[:, 2:].T @ half[:, 2:]
-    sigma = np.sqrt(np.sum(half**2, axis=0))
-    disc = capture_radius(body.gm, body.impact_distance, nominal["v_inf"].to_value(u.m / u.s))
-    longest = float(np.sqrt(np.linalg.eigvalsh(matrix)[-1]))
-    return LinearPlane(
-        centre=(centre * u.m).to(u.km),
-        covariance=(matrix * u.m**2).to(u.km**2),
-        distance_sigma=(sigma[1] * u.m).to(u.km),
-        time_sigma=sigma[0] * u.s,
-        impact_probability=disc_probability(centre, matrix, disc),
-        nonlinearity=float(np.abs(bent).max()) / longest if longest > 0.0 else 0.0,
-    )

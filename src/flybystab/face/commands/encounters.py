@@ -1,52 +1,132 @@
-"""``flybystab encounters NAME``: close approaches of an asteroid."""
+"""``flybystab encounters NAME``: close approaches of an asteroid, and how well they are known."""
 
 from __future__ import annotations
 
 import argparse
+from typing import Any
 
 from flybystab.face.commands.common import show, span_arguments, tdb
 
 HELP = "close approaches of an asteroid"
-EXAMPLE = "flybystab encounters Apophis --to 2030-01-01"
+EXAMPLE = "flybystab encounters Apophis --to 2030-01-01 --clones 1000"
 
 
 def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
-    sub.add_argument("name", help="number, name or designation")
+    sub.add_argument(
+        "name", help="number, name or designation, or a file with one orbit (.ke1, .json) or more (.csv)"
+    )
     span_arguments(sub, "2020-01-01", "2050-01-01")
-    sub.add_argument("--output", metavar="FILE", help="write the table (.ecsv)")
+    sub.add_argument(
+        "--clones", type=int, default=0, metavar="N", help="orbits drawn from the covariance (0: none)"
+    )
+    sub.add_argument("--seed", type=int, default=0, help="fixes the clones (0)")
+    sub.add_argument("--output", metavar="FILE", help="write the table (.ecsv, .parquet)")
 
 
 def run(options: argparse.Namespace) -> None:
     """Answer the command."""
     import astropy.units as u
 
+    from flybystab.errors import InvalidInput
     from flybystab.face.document import table_document
     from flybystab.sky.finder import find_encounters
-    from flybystab.survey.asteroid import Asteroid
+    from flybystab.survey.results import check_output
+    from flybystab.survey.tables import write_table
 
-    asteroid = Asteroid.from_catalogue(options.name)
+    if options.output:
+        check_output(options.output)
+    if options.clones < 0:
+        raise InvalidInput("--clones", options.clones, "a number of clones, 0 for none")
+    asteroids = _asteroids(options.name)
     table = find_encounters(
-        asteroid,
+        asteroids,
         tdb(options.start, "--from"),
         tdb(options.stop, "--to"),
         planets=options.planet or ["earth"],
         within=options.within * u.au,
+        growth=True,
     )
+    if options.clones:
+        table = _with_clones(table, asteroids, options.clones, options.seed)
     if options.output:
-        from flybystab.survey.results import check_output
+        write_table(table, options.output)
+    many = len(asteroids) > 1
+    head = f"{len(table)} encounters within {options.within:g} au"
+    show(
+        options,
+        lambda: table_document(table),
+        lambda: [
+            f"{asteroids[0].label}: {head}"
+            if not many
+            else f"{options.name} ({len(asteroids)} asteroids): {head}",
+            *_lines(table, many),
+            *([f"table      {options.output}"] if options.output else []),
+        ],
+    )
 
-        check_output(options.output)
-        table.write(options.output, format="ascii.ecsv", overwrite=True)
 
-    def lines() -> list[str]:
-        head = f"{'planet':8s} {'time (TDB)':19s} {'distance (km)':>16s} {'(au)':>9s} {'v_inf (km/s)':>12s}"
-        rows = [
+def _asteroids(name: str) -> list[Any]:
+    """The asteroid of that name, or those of that file."""
+    from pathlib import Path
+
+    from flybystab.survey.asteroid import Asteroid
+    from flybystab.survey.catalogue import catalogue
+
+    path = Path(name)
+    if path.suffix in (".ke1", ".json", ".csv", ".gz") or path.is_file():
+        return list(catalogue(path))
+    return [Asteroid.from_catalogue(name)]
+
+
+def _with_clones(table: Any, asteroids: list[Any], clones: int, seed: int) -> Any:
+    """The table with the columns of the clones, row by row in the same order."""
+    import numpy as np
+
+    from flybystab.sky.distribution import add_clones, distributions
+
+    found: list[Any] = [None] * len(table)
+    for i in np.unique(table["index"]).tolist():
+        if len(asteroids) > 1 and asteroids[i].orbit.covariance is None:
+            continue
+        rows = np.flatnonzero(table["index"] == i)
+        for row, one in zip(rows, distributions(asteroids[i], table[rows], n=clones, seed=seed), strict=True):
+            found[row] = one
+    add_clones(table, found)
+    return table
+
+
+def _lines(table: Any, many: bool) -> list[str]:
+    """The table for people: distances, and behind them what is known of them."""
+    import astropy.units as u
+
+    if not len(table):
+        return []
+    clones = "clones" in table.colnames
+    head = f"{'planet':8s} {'time (TDB)':19s} {'distance (km)':>16s} {'(au)':>9s} {'v_inf (km/s)':>12s} "
+    head += f"{'B.T (km)':>13s} {'B.R (km)':>13s} {'moves (km)':>11s}  known"
+    if clones:
+        head = head.replace("  known", f" {'sigma (km)':>11s} {'P(impact), 95 %':>24s} {'linear':>9s}  known")
+    out = [(f"{'asteroid':16s} " if many else "") + head]
+    for row in table:
+        line = f"{row['asteroid'][:16]:16s} " if many else ""
+        line += (
             f"{row['planet']:8s} {row['time'].tdb.iso[:19]} {row['distance'].to_value(u.km):16,.1f} "
-            f"{row['distance'].to_value(u.au):9.6f} {row['v_inf'].to_value(u.km / u.s):12.4f}"
-            + (" impact" if row["impact"] else "")
-            for row in table
-        ]
-        return [f"{asteroid.label}: {len(rows)} encounters within {options.within:g} au", head, *rows]
-
-    show(options, lambda: table_document(table), lines)
+            f"{row['distance'].to_value(u.au):9.6f} {row['v_inf'].to_value(u.km / u.s):12.4f} "
+            f"{row['b_t'].to_value(u.km):13,.0f} {row['b_r'].to_value(u.km):13,.0f} "
+            f"{row['displacement'].to_value(u.km):11.4g}"
+        )
+        if clones:
+            odds = f"{row['p_impact']:.3g} ({row['p_impact_low']:.2g}-{row['p_impact_high']:.2g})"
+            line += f" {row['distance_sigma'].to_value(u.km):11.4g} {odds:>24s} {row['p_impact_linear']:9.2g}"
+        out.append(f"{line}  {row['predictability']}" + (", impact" if row["impact"] else ""))
+    neighbours = "; ".join(table.meta["neighbours"])
+    out.append(f"moves: how far the asteroid is displaced there by {neighbours}")
+    if clones:
+        lost = int((table["clones"] - table["clones_found"]).max())
+        out.append(
+            f"sigma, P(impact): of {table['clones'].max()} clones"
+            + (f", at most {lost} of them not there at that time" if lost else "")
+            + f"; covariance: {'; '.join(table.meta['covariances'])}"
+        )
+    return out
