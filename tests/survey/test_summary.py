@@ -5,9 +5,10 @@ import pytest
 from astropy.table import QTable
 
 from flybystab.errors import InvalidInput
+from flybystab.face.plotting_survey import results_figure
 from flybystab.survey.columns import COLUMNS, VERDICTS, share_of
 from flybystab.survey.results import table_of, write_rows
-from flybystab.survey.summary import results_figure, summary
+from flybystab.survey.summary import summary
 
 ROWS = [
     {"asteroid": "calm", "verdict": "INTACT", "margin": 12.0, "p_yield": 0.0, "samples": 10},

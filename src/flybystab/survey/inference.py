@@ -11,8 +11,6 @@ shape.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from pathlib import Path
-from typing import Any
 
 import astropy.units as u
 import numpy as np
@@ -23,16 +21,20 @@ from astropy.units import Quantity
 from flybystab.aggregate.body import Body, Material
 from flybystab.constants import G
 from flybystab.core.passage import passage
-from flybystab.core.statics import demand, rigid_stress
 from flybystab.errors import InvalidInput
 from flybystab.sky.encounter import Encounter
 from flybystab.sky.finder import find_encounters
 from flybystab.survey.attitude import attitude_matrix, isotropic_direction
 from flybystab.survey.catalogue import Asteroid
 from flybystab.survey.draws import identity, stream
+from flybystab.survey.quick import quick_margins, tide_size
 from flybystab.units import to_si
 
 _TOLERANCE = 1e-7
+#: A passage that adds less than this is not followed, rad.
+NEGLIGIBLE = float(np.radians(0.05))
+#: A friction angle that no material has, rad: where the bound may look.
+_STEEP = 1.5
 
 
 def infer(
@@ -51,9 +53,10 @@ def infer(
     ----------
     asteroid : Asteroid or Body
     encounters : sequence of Encounter
-        Passages that it is known to have survived.
+        Passages that it is known to have survived. One that the quick bound shows to add less than 0.05 deg
+        is not followed: its bound counts for every attitude, and nothing for any attitude.
     densities, cohesions : Quantity (n,), (m,)
-        The grid; 1000 to 3500 kg/m3 and 0 to 1 kPa by default.
+        The grid; by default 1000 to 3500 kg/m3, and cohesions from zero to three times the body's own stress.
     attitudes : int
         Attitudes tried in every passage: the catalogue's pole where it is known, isotropic ones elsewhere.
     seed : int
@@ -64,9 +67,10 @@ def infer(
     Returns
     -------
     QTable
-        Rows over densities, then cohesions: ``density``, ``cohesion``, ``friction_equilibrium``, and over all
-        passages ``friction_any_attitude`` (needed whatever the attitude was) and ``friction_every_attitude``
-        (enough for every attitude); deg, inf where no friction is enough.
+        Rows over densities, then cohesions: ``density``, ``cohesion``, ``friction_equilibrium`` (of a tumbler: in
+        all its phases), and over all passages ``friction_any_attitude`` (needed whatever the attitude was) and
+        ``friction_every_attitude`` (enough for every attitude tried); deg, inf where no friction is enough.
+        ``meta["passages"]`` says what each passage adds.
 
     Raises
     ------
@@ -77,41 +81,53 @@ def infer(
     )
     if np.any(rho <= 0.0):
         raise InvalidInput("densities", densities, "positive values")
-    default = np.array([0.0, 1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0])
-    cohesion = default if cohesions is None else _grid(cohesions, u.Pa, "cohesions")
     if isinstance(attitudes, bool) or not isinstance(attitudes, int) or attitudes < 1:
         raise InvalidInput("attitudes", attitudes, "a whole number, 1 or more")
     code = Material(yield_surface=yield_surface).surface_code
     bodies, turns = _attitudes(asteroid, attitudes, seed)
-    axes = bodies[0].axes
-    s1, s2, s3 = axes**2
-    stress = np.empty(6)
-    rows: dict[str, list[float]] = {n: [] for n in ("density", "cohesion", "rest", "least", "most")}
-    for r in rho:
-        rigid_stress(s1, s2, s3, r, np.pi * G * r, bodies[0].omega, np.zeros(6), stress)
-        for c in cohesion:
-            rest = float(demand(code, 0.5, c, stress)[0])
-            least, most = rest, rest
-            for encounter in encounters:
-                needs = np.array(
-                    [
-                        _need(body, q, encounter, float(r), float(c), code)
-                        for body, q in zip(bodies, turns, strict=True)
-                    ]
-                )
-                least, most = max(least, float(needs.min())), max(most, float(needs.max()))
-            for name, value in zip(rows, (r, c, rest, least, most), strict=True):
-                rows[name].append(float(value))
+    cohesion = _cohesions(bodies[0]) if cohesions is None else _grid(cohesions, u.Pa, "cohesions")
+    sizes = [tide_size(e.tide, e.t_start, e.t_stop) for e in encounters]
+    shape = (len(rho), len(cohesion))
+    rest = np.empty(shape)
+    needs = np.empty((*shape, len(encounters), 2))  # whatever the attitude, at the worst one
+    followed = np.zeros(len(encounters), dtype=bool)
+    for i, r in enumerate(rho):
+        for j, c in enumerate(cohesion):
+            free, bounds = _by_bound(bodies, float(r), float(c), code, sizes)
+            rest[i, j] = free
+            for k, encounter in enumerate(encounters):
+                if bounds[k] < free + NEGLIGIBLE or not np.isfinite(free):
+                    needs[i, j, k] = free, max(free, bounds[k] if np.isfinite(free) else free)
+                    continue
+                followed[k] = True
+                found = [
+                    _need(body, q, encounter, float(r), float(c), code)
+                    for body, q in zip(bodies, turns, strict=True)
+                ]
+                needs[i, j, k] = max(free, min(found)), max(free, *found)
+    least, most = (
+        np.maximum(rest, needs[..., side].max(axis=2)) if len(encounters) else rest for side in (0, 1)
+    )
     table = QTable()
-    table["density"] = rows["density"] * u.kg / u.m**3
-    table["cohesion"] = rows["cohesion"] * u.Pa
-    for name, column in (("equilibrium", "rest"), ("any_attitude", "least"), ("every_attitude", "most")):
-        table[f"friction_{name}"] = np.rad2deg(rows[column]) * u.deg
+    table["density"] = np.repeat(rho, len(cohesion)) * u.kg / u.m**3
+    table["cohesion"] = np.tile(cohesion, len(rho)) * u.Pa
+    for name, values in (("equilibrium", rest), ("any_attitude", least), ("every_attitude", most)):
+        table[f"friction_{name}"] = np.rad2deg(values.ravel()) * u.deg
     table.meta = {
         "title": "least friction angle by density and cohesion",
         "asteroid": asteroid.label if isinstance(asteroid, Asteroid) else "body",
-        "semi_axes_m": [float(a) for a in axes],
-        "passages": [_label(e) for e in encounters],
+        "semi_axes_m": [float(a) for a in bodies[0].axes],
+        "spin_period_h": 2.0 * np.pi / float(np.linalg.norm(bodies[0].omega)) / 3600.0,
+        "catalogue_density_kg_m3": _known_density(asteroid),
+        "passages": [
+            {
+                "passage": _label(e),
+                "followed": bool(followed[k]),
+                "adds_at_any_attitude_deg": _largest(needs[..., k, 0] - rest),
+                "adds_at_worst_attitude_deg": _largest(needs[..., k, 1] - rest),
+            }
+            for k, e in enumerate(encounters)
+        ],
         "attitudes": attitudes,
         "pole": "catalogue" if isinstance(asteroid, Asteroid) and asteroid.pole is not None else "isotropic",
         "seed": seed,
@@ -121,12 +137,52 @@ def infer(
     return table
 
 
+def _largest(rise: np.ndarray) -> float:
+    """Largest finite rise over the grid, deg."""
+    finite = rise[np.isfinite(rise)]
+    return float(np.rad2deg(finite.max())) if len(finite) else 0.0
+
+
+def _known_density(asteroid: Asteroid | Body) -> list[float]:
+    """Density and its 1-sigma in the catalogue, kg/m3; empty for a body of one's own."""
+    columns = ("density_kg_m3", "density_sigma_kg_m3")
+    if not isinstance(asteroid, Asteroid) or not asteroid.knows(columns[0]):
+        return []
+    return [float(asteroid.quantity(c).value) if asteroid.knows(c) else 0.0 for c in columns]
+
+
+def _cohesions(body: Body) -> np.ndarray:
+    """Zero, and the steps 1, 3, 10 ... Pa from a hundredth to three times the body's own stress."""
+    a = body.axes
+    weight = 2.0 / 15.0 * np.pi * G * 2000.0**2 * np.cbrt(np.prod(a)) ** 2
+    spin = 2000.0 / 5.0 * float(body.omega @ body.omega) * a[0] ** 2
+    top = 3.0 * max(weight, spin)
+    steps = np.array([m * 10.0**k for k in range(-6, 10) for m in (1.0, 3.0)])
+    return np.concatenate([[0.0], steps[(steps <= top) & (steps >= top / 300.0)]])
+
+
+def _by_bound(
+    bodies: Sequence[Body], rho: float, cohesion: float, code: int, sizes: Sequence[tuple[float, float]]
+) -> tuple[float, list[float]]:
+    """Friction (rad) mobilised at rest, largest over the phases, and bounds on it in each of the tides."""
+    n = len(bodies)
+    axes = np.array([b.axes for b in bodies])
+    omega = np.array([b.omega for b in bodies])
+    friction, verdict = np.empty((n, 2)), np.empty(n, dtype=np.int64)
+    bounds = []
+    for size in [(0.0, 0.0), *sizes]:
+        args = axes, np.full(n, rho), omega, np.full(n, _STEEP), np.full(n, cohesion), code
+        quick_margins(*args, *size, friction, verdict)
+        bounds.append(float(friction[:, 1].max()))
+    return float(friction[:, 0].max()), bounds[1:]
+
+
 def survived(
     asteroid: Asteroid,
     start: Time,
     stop: Time,
     planets: Sequence[str] = ("earth",),
-    within: Quantity = 0.01 * u.au,
+    within: Quantity = 0.05 * u.au,
 ) -> list[Encounter]:
     """Passages of an asteroid's orbit between two dates, followed with all forces, for :func:`infer`.
 
@@ -190,26 +246,3 @@ def _need(
 def _label(encounter: Encounter) -> str:
     when = "scripted" if encounter.time is None else encounter.time.tdb.isot[:16]
     return f"{encounter.planet.name} {when} {encounter.distance.to_value(u.km):.0f} km"
-
-
-def inference_figure(table: QTable, path: str | Path) -> Path:
-    """Plot the least friction angles of :func:`infer` against density, a line for each cohesion."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    names = [n for n in table.colnames if n.startswith("friction_")]
-    figure = Figure(figsize=(4 * len(names), 3.6), layout="constrained")
-    FigureCanvasAgg(figure)
-    panels: Any = figure.subplots(1, len(names), sharey=True)
-    for panel, name in zip(panels, names, strict=True):
-        for c in np.unique(table["cohesion"]):
-            rows = table[table["cohesion"] == c]
-            panel.plot(rows["density"].value, rows[name].to_value(u.deg), label=f"{c.to_value(u.Pa):g} Pa")
-        panel.set(
-            xlabel="density (kg/m$^3$)", title=name.removeprefix("friction_").replace("_", " "), ylim=(0, 60)
-        )
-    panels[0].set_ylabel("least friction angle (deg)")
-    panels[-1].legend(title="cohesion", fontsize=7)
-    figure.suptitle(str(table.meta.get("asteroid", "")), fontsize=9)
-    figure.savefig(path, dpi=150)
-    return Path(path)

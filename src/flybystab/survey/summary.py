@@ -13,7 +13,7 @@ from astropy.table import QTable
 
 from flybystab.errors import InvalidInput
 from flybystab.outcome import Verdict
-from flybystab.survey.columns import VERDICTS, share_of
+from flybystab.survey.columns import VERDICTS
 from flybystab.survey.results import read_results
 
 #: Rows of a list in the text.
@@ -141,41 +141,3 @@ def summary(results: QTable | str | Path, closest: int = 10) -> Summary:
         errors=dict(errors.most_common(10)),
         meta=dict(table.meta),
     )
-
-
-def results_figure(results: QTable | str | Path, path: str | Path) -> Path:
-    """Plot a result table: margin against distance, by verdict, and the probability of yielding.
-
-    Returns
-    -------
-    Path
-        The file written.
-    """
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    table = results if isinstance(results, QTable) else read_results(results)
-    summary(table)
-    verdict = np.asarray(table["verdict"], dtype=str)
-    distance = table["distance"].to_value(u.au)
-    margin = table["margin"].to_value(u.deg)
-    figure = Figure(figsize=(9, 4), layout="constrained")
-    FigureCanvasAgg(figure)
-    left, right = figure.subplots(1, 2)
-    for v in VERDICTS:
-        chosen = (verdict == v) & np.isfinite(margin)
-        if chosen.any():
-            left.plot(distance[chosen], margin[chosen], ".", label=f"{v} ({chosen.sum()})")
-    left.set(xscale="log", xlabel="distance at closest approach (au)", ylabel="margin (deg of friction)")
-    left.axhline(0.0, color="0.6", lw=0.8)
-    left.legend(fontsize=7)
-    shares = [
-        float(np.nanmean(table[share_of(v)])) if np.isfinite(table[share_of(v)]).any() else 0.0
-        for v in VERDICTS
-    ]
-    right.barh([str(v) for v in VERDICTS], shares)
-    right.set(xlabel="mean share of the samples", xscale="symlog", xlim=(0, 1))
-    right.set_xscale("symlog", linthresh=1e-4)
-    figure.suptitle(str(table.meta.get("title", "")), fontsize=9)
-    figure.savefig(path, dpi=150)
-    return Path(path)

@@ -19,8 +19,9 @@ def arguments(sub: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> None:
     """Answer the command."""
     from flybystab.face.document import table_document
+    from flybystab.face.plotting_survey import results_figure
     from flybystab.survey.results import read_results
-    from flybystab.survey.summary import results_figure, summary
+    from flybystab.survey.summary import summary
 
     check_picture(options.output)
     table = read_results(options.file)

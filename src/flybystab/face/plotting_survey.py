@@ -1,0 +1,130 @@
+"""Figures of a screening's table and of the bounds that survival puts on a material."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import astropy.units as u
+import numpy as np
+from astropy.table import QTable
+
+from flybystab.survey.columns import VERDICTS
+from flybystab.survey.results import read_results
+from flybystab.survey.summary import summary
+
+#: Colour of each verdict, mild to fatal.
+COLOURS = dict(
+    zip(VERDICTS, ("#4477aa", "#228833", "#ccbb44", "#ee6677", "#aa3377", "#66ccee", "#bbbbbb"), strict=True)
+)
+PANELS = {
+    "friction_equilibrium": "shape and spin",
+    "friction_any_attitude": "and passages, whatever the attitude",
+    "friction_every_attitude": "enough at every attitude",
+}
+#: Isolines of the least friction angle, deg.
+_LEVELS = (0, 5, 10, 15, 20, 25, 30, 35, 40, 45, 60)
+
+
+def _figure(width: float, height: float) -> Any:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def inference_figure(table: QTable, path: str | Path) -> Path:
+    """Plot the region of density, cohesion and friction that :func:`flybystab.infer` leaves.
+
+    Each panel is a map of the least friction angle over density and cohesion; hatched, no friction is enough.
+    The band is the density of the catalogue with its 1-sigma, the line the usual 35 deg.
+
+    Returns
+    -------
+    Path
+        The file written.
+    """
+    import matplotlib
+
+    density = np.unique(table["density"].to_value(u.kg / u.m**3))
+    cohesion = np.unique(table["cohesion"].to_value(u.Pa))
+    names = list(PANELS) if table.meta.get("passages") else list(PANELS)[:1]
+    figure = _figure(1.2 + 3.6 * len(names), 3.8)
+    panels: Any = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
+    # Zero cohesion has a place below the least of the others.
+    height = np.arange(len(cohesion))
+    known = table.meta.get("catalogue_density_kg_m3") or []
+    filled = None
+    colours = matplotlib.colormaps["viridis_r"].with_extremes(over="0.85")
+    for panel, name in zip(panels, names, strict=True):
+        need = table[name].to_value(u.deg).reshape(len(density), len(cohesion)).T
+        capped = np.where(np.isfinite(need), np.minimum(need, 90.0), 90.0)
+        if min(capped.shape) > 1:
+            filled = panel.contourf(density, height, capped, _LEVELS, cmap=colours, extend="max")
+
+            lines = panel.contour(density, height, capped, [15, 25, 35, 45], colors="k", linewidths=0.7)
+            panel.clabel(lines, fmt="%g deg", fontsize=7)
+            panel.contourf(density, height, capped, [60, 91], colors="none", hatches=["///"])
+        if len(known) == 2:
+            panel.axvspan(known[0] - known[1], known[0] + known[1], color="w", alpha=0.35, lw=0)
+            panel.axvline(known[0], color="w", lw=1)
+        panel.set_title(PANELS[name], fontsize=9)
+        panel.set(xlabel="density (kg/m$^3$)", xlim=(density[0], density[-1]))
+        panel.locator_params(axis="x", nbins=4)
+    panels[0].set_yticks(height, [f"{c:g}" for c in cohesion])
+    panels[0].set_ylabel("cohesion (Pa)")
+    if filled is not None:
+        figure.colorbar(filled, ax=list(panels), label="least friction (deg); hatched: none")
+    axes = " x ".join(f"{2 * a:.0f}" for a in table.meta.get("semi_axes_m", []))
+    title = f"{table.meta.get('asteroid', '')}: {axes} m, {table.meta.get('spin_period_h', np.nan):.4g} h"
+    strongest = max(
+        table.meta.get("passages", []), key=lambda p: p["adds_at_worst_attitude_deg"], default=None
+    )
+    if strongest is not None:
+        title += f"; strongest passage: {strongest['passage']}"
+    figure.suptitle(title, fontsize=9)
+    figure.savefig(path, dpi=150)
+    return Path(path)
+
+
+def results_figure(results: QTable | str | Path, path: str | Path, names: int = 8) -> Path:
+    """Plot a result table: what each passage adds to the mobilised friction, and how near that is to failure.
+
+    Returns
+    -------
+    Path
+        The file written.
+    """
+    table = results if isinstance(results, QTable) else read_results(results)
+    summary(table)
+    verdict = np.asarray(table["verdict"], dtype=str)
+    distance = table["distance"].to_value(u.au)
+    rise = np.maximum(table["friction_rise"].to_value(u.deg), 1e-5)
+    margin = table["margin"].to_value(u.deg)
+    figure = _figure(10, 4.2)
+    left, right = figure.subplots(1, 2)
+    for v in VERDICTS:
+        chosen = verdict == v
+        for panel, x, y in ((left, distance, rise), (right, rise, margin)):
+            ok = chosen & np.isfinite(x) & np.isfinite(y)
+            if ok.any():
+                panel.plot(x[ok], y[ok], ".", ms=4, color=COLOURS[v], label=f"{v} ({chosen.sum()})")
+    stands = np.isfinite(rise) & np.isfinite(margin) & (verdict != "NOT IN EQUILIBRIUM")
+    for k in np.flatnonzero(stands)[np.argsort(-rise[stands], kind="stable")][:names]:
+        label = f"{table['asteroid'][k]} {str(table['time_tdb'][k])[:4]}"
+        left.annotate(label, (distance[k], rise[k]), fontsize=6, xytext=(3, 2), textcoords="offset points")
+        right.annotate(label, (rise[k], margin[k]), fontsize=6, xytext=(3, 2), textcoords="offset points")
+    left.set(xscale="log", yscale="log", xlabel="distance at closest approach (au)")
+    left.set_ylabel("friction angle that the passage adds (deg)")
+    right.set(xscale="log", xlabel="friction angle that the passage adds (deg)")
+    right.set_ylabel("margin (deg of friction angle)")
+    right.axhline(0.0, color="0.6", lw=0.8)
+    if left.get_legend_handles_labels()[0]:
+        left.legend(fontsize=7)
+    figure.suptitle(
+        f"{table.meta.get('title', '')}: {len(table)} rows, {table.meta.get('ephemeris', '')}", fontsize=9
+    )
+    figure.savefig(path, dpi=150)
+    return Path(path)
