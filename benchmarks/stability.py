@@ -1,43 +1,194 @@
-"""Throughput of the stability test: a catalogue of 4,000 bodies by depth, and a 200 x 200 map of shapes.
+"""The stability test: throughput, and its numbers against brute force and the full dynamics.
 
-Run as ``python benchmarks/stability.py``. Times are after compilation.
+    python benchmarks/stability.py [speed | minima | push | kappa]
+
+speed   a catalogue of 4,000 bodies by depth, and a 200 x 200 map of shapes (times after compilation)
+minima  least critical energies against 100,000 random directions: four yield surfaces, three dilatancies
+push    second order, third order and barrier against the full dynamics of pushed bodies
+kappa   plastic bulk modulus, friction and dilatancy over decades, with kappa_crit where it exists
 """
 
 from __future__ import annotations
 
+import sys
 import time
 
 import astropy.units as u
 import numpy as np
 
-from flybystab.aggregate.body import Body
+from flybystab.aggregate.body import YIELD_SURFACES, Body, Material
+from flybystab.aggregate.recovery import recovery_energy
 from flybystab.aggregate.regions import DEPTHS, stability_many, stability_map
+from flybystab.aggregate.stability import stability
+from flybystab.constants import G
+from flybystab.core import classify as columns
+from flybystab.core.classify import classify
+from flybystab.core.jit import kernel
+from flybystab.core.push import LONGEST, barrier, pile, powers, second_order, third_order
 
 COUNT = 4000
+SAMPLES = 100_000
+RHO = 2000.0
+
+#: Axes and omega^2/(pi G rho).
+SHAPES = {
+    "pile 1.4:.85:.75, 6 h": ((1.4, 0.85, 0.75), (2 * np.pi / 21600) ** 2 / (np.pi * G * RHO)),
+    "1:.8:.7, w2 .7": ((1, 0.8, 0.7), 0.7),
+    "1:.6:.6, w2 .3": ((1, 0.6, 0.6), 0.3),
+    "1:1:.6, w2 .8": ((1, 1, 0.6), 0.8),
+    "1:.45:.4, w2 .4": ((1, 0.45, 0.4), 0.4),
+}
 
 
-def bodies(n: int) -> list[Body]:
+def body(name: str, friction: float, **material: object) -> Body:
+    axes, w2 = SHAPES[name]
+    spin = [0, 0, np.sqrt(w2 * np.pi * G * RHO)] * u.rad / u.s
+    made = Material(friction_angle=friction * u.deg, **material)
+    return Body(np.array(axes) * u.km, RHO * u.kg / u.m**3, spin=spin, material=made)
+
+
+def random_bodies(n: int) -> list[Body]:
     rng = np.random.default_rng(0)
     axes = -np.sort(-rng.uniform(0.35, 1.0, (n, 3)), axis=1) * 10 ** rng.uniform(2, 3.5, (n, 1))
     density, period = rng.uniform(1200, 3000, n), rng.lognormal(1.6, 0.8, n) + 2.0
     return [Body(a * u.m, d * u.kg / u.m**3, p * u.h) for a, d, p in zip(axes, density, period, strict=True)]
 
 
-def main() -> None:
-    pile = bodies(COUNT)
-    stability_many(pile[:8])
+def speed() -> None:
+    bodies = random_bodies(COUNT)
+    ratio = np.linspace(0.05, 1.0, 200)
+    stability_many(bodies[:8])
+    stability_map([1.0], [0.8], 0.3, 30 * u.deg)
     print(f"{'depth':>14} {'s for ' + str(COUNT):>12} {'us/body':>10}")
     for depth in DEPTHS:
         start = time.perf_counter()
-        stability_many(pile, depth=depth)
+        stability_many(bodies, depth=depth)
         wall = time.perf_counter() - start
         print(f"{depth:>14} {wall:12.2f} {wall / COUNT * 1e6:10.1f}")
-    ratio = np.linspace(0.05, 1.0, 200)
     for depth in ("friction", "infinitesimal", "second"):
         start = time.perf_counter()
         stability_map(ratio[None, :], ratio[:, None], 0.3, 30 * u.deg, depth=depth)
         print(f"200 x 200 map, {depth:>14}: {time.perf_counter() - start:6.2f} s")
 
 
+@kernel
+def brute(b, x, out):  # type: ignore[no-untyped-def]
+    """Least second order, third order and barrier over the directions ``x[n, 5]``."""
+    out[:] = np.inf
+    for i in range(x.shape[0]):
+        p1, p2, p3 = powers(b, x[i])
+        out[0] = min(out[0], second_order(p1, p2)[0])
+        out[1] = min(out[1], third_order(p1, p2, p3)[0])
+        out[2] = min(out[2], barrier(b, x[i], LONGEST, np.inf)[0])
+
+
+def minima() -> None:
+    print(
+        f"least critical energy over {SAMPLES} random directions / the one found (1 or more: none was missed)"
+    )
+    print(f"{'body':>22} {'surface':>25} {'dilatancy':>9} {'second':>8} {'third':>8} {'barrier':>8}")
+    rng = np.random.default_rng(0)
+    x = rng.standard_normal((SAMPLES, 5))
+    x /= np.linalg.norm(x, axis=1)[:, None]
+    # the ball: half of the directions at the apex, where it is admissible
+    ball = x.copy()
+    ball[::2] *= rng.uniform(0, 1, (SAMPLES // 2, 1)) ** 0.2
+    row, found = np.empty(columns.COLUMNS), np.empty((columns.DIRECTIONS, 5))
+    worst = np.full(3, np.inf)
+    for name, (axes, w2) in SHAPES.items():
+        for code, surface in enumerate(YIELD_SURFACES):
+            for dilatancy in (0.0, 0.5, 1.0):
+                spin = np.array([0.0, 0.0, np.sqrt(w2)])
+                given = (*np.square(axes), spin, code, np.deg2rad(40.0), 0.0, dilatancy, 0.0)
+                b = pile(*given)
+                classify(*given, 5, row, found)
+                least = np.empty(3)
+                brute(b, ball if dilatancy == 1.0 else x, least)
+                ours = row[[columns.ENERGY_2, columns.ENERGY_3, columns.ENERGY_B]]
+                with np.errstate(invalid="ignore"):
+                    ratio = np.where(np.isinf(least) & np.isinf(ours), 1.0, least / ours)
+                worst = np.fmin(worst, ratio)
+                print(f"{name:>22} {surface:>25} {dilatancy:9.1f} " + " ".join(f"{v:8.5f}" for v in ratio))
+    print(f"{'least ratio':>58} " + " ".join(f"{v:8.5f}" for v in worst))
+
+
+def push() -> None:
+    print(
+        "critical energies / binding energy; dynamics: least and median over 16 directions of the energy from"
+    )
+    print("which the body does not come to rest inside the model (python -m flybystab: aggregate.recovery)")
+    print(
+        f"{'body':>22} {'friction':>8} {'required':>8} {'dilatancy':>9} | {'second':>7} {'third':>7} {'barrier':>7}"
+        f" {'kind':>8} | {'least':>7} {'median':>7} | {'least/barrier':>13}"
+    )
+    ratios = []
+    for name, friction in (
+        ("pile 1.4:.85:.75, 6 h", 35),
+        ("pile 1.4:.85:.75, 6 h", 8),
+        ("1:.8:.7, w2 .7", 30),
+        ("1:.8:.7, w2 .7", 21),
+        ("1:.6:.6, w2 .3", 20),
+        ("1:1:.6, w2 .8", 40),
+        ("1:1:.6, w2 .8", 28.2),
+        ("1:.45:.4, w2 .4", 35),
+        ("1:.45:.4, w2 .4", 12),
+    ):
+        b = body(name, friction)
+        for dilatancy in (0.0, 0.5, 1.0):
+            s = stability(b, dilatancy=dilatancy)
+            rng = np.random.default_rng(0)
+            ways = [
+                d
+                for d in s.directions
+                if np.all(np.isfinite(d)) and np.linalg.norm(d - np.trace(d) / 3 * np.eye(3)) > 0.1
+            ]
+            ways += [v + v.T for v in rng.standard_normal((16 - len(ways), 3, 3))]
+            found = [
+                recovery_energy(b, d, dilatancy=dilatancy, precision=0.02) / s.binding_energy for d in ways
+            ]
+            energies = [(e / s.binding_energy).value for e in s.critical_energy]
+            ratios.append(min(found).value / energies[2])
+            print(
+                f"{name:>22} {friction:8.1f} {s.equilibrium.required_friction_angle.value:8.1f} {dilatancy:9.1f} | "
+                + " ".join(f"{e:7.4f}" for e in energies)
+                + f" {s.barrier_kind:>8} | {min(found).value:7.4f} {np.median(found):7.4f} | {ratios[-1]:13.2f}",
+                flush=True,
+            )
+    print(
+        f"least of the dynamics / barrier: {min(ratios):.2f} to {max(ratios):.2f}, median {np.median(ratios):.2f}"
+    )
+
+
+def kappa() -> None:
+    print(
+        "plastic bulk modulus kappa over the pressure p: least critical energy / binding energy at second order, and"
+    )
+    print(
+        "from the barrier; kappa_crit of a body at yield; stable: to infinitesimal pushes with the friction mobilised"
+    )
+    ratios = (0.0, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4)
+    print(
+        f"{'body':>22} {'friction':>8} {'dilatancy':>9} {'kappa_crit/p':>12} | "
+        + " ".join(f"{'kappa/p ' + format(r, 'g'):>15}" for r in ratios)
+    )
+    for name in ("pile 1.4:.85:.75, 6 h", "1:.8:.7, w2 .7", "1:1:.6, w2 .8"):
+        for friction in (30.0, 35.0, 40.0):
+            for dilatancy in (0.0, 0.01, 0.1, 0.5, 0.9, 1.0):
+                b = body(name, friction)
+                p = stability(b).equilibrium.mean_pressure
+                cells, critical = [], ""
+                for r in ratios:
+                    s = stability(body(name, friction, bulk_modulus=r * p), dilatancy=dilatancy)
+                    second, _, whole = (float(e / s.binding_energy) for e in s.critical_energy)
+                    cells.append(f"{second:7.4f} {whole:7.4f}")
+                    critical = "-" if s.kappa_crit is None else f"{(s.kappa_crit / p).value:.3f}"
+                print(f"{name:>22} {friction:8.1f} {dilatancy:9.2f} {critical:>12} | " + " ".join(cells))
+
+
+COMMANDS = {"speed": speed, "minima": minima, "push": push, "kappa": kappa}
+
 if __name__ == "__main__":
-    main()
+    what = sys.argv[1] if len(sys.argv) > 1 else "speed"
+    if what not in COMMANDS:
+        sys.exit(f"no benchmark {what!r}: {', '.join(COMMANDS)}")
+    COMMANDS[what]()

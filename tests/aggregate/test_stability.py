@@ -3,6 +3,7 @@
 import astropy.units as u
 import numpy as np
 import pytest
+from scipy.linalg import expm
 
 from flybystab.aggregate.body import YIELD_SURFACES, Body, Material
 from flybystab.aggregate.equilibrium import equilibrium, spin_limits
@@ -11,9 +12,10 @@ from flybystab.aggregate.stability import body_units, push, stability
 from flybystab.constants import G
 from flybystab.core.certified import least_second_order, trust_region
 from flybystab.core.classify import first_to_flow
-from flybystab.core.energy import MASS
-from flybystab.core.push import barrier, loss_at, pile, powers, second_order, third_order
+from flybystab.core.energy import MASS, energy, velocity_gradient
+from flybystab.core.push import LONGEST, barrier, loss_at, pile, powers, second_order, third_order
 from flybystab.core.search import least
+from flybystab.core.tide import components, tensor
 from flybystab.errors import InvalidInput
 
 RHO = 2000 * u.kg / u.m**3
@@ -108,7 +110,7 @@ def test_third_order_and_barrier_minima_beat_brute_force(case):
     samples = directions(3000, seed=3, ball=b.associative)
     brute = min(third_order(*powers(b, y))[0] for y in samples)
     assert least(b, 3, False, seeds, 12, 3, 1e-4, x)[0] <= brute * (1 + 1e-6)
-    brute = min(barrier(b, y, 3.0)[0] for y in samples[:600])
+    brute = min(barrier(b, y, 3.0, np.inf)[0] for y in samples[:600])
     assert least(b, 0, False, seeds, 12, 3, 1e-3, x)[0] <= brute * (1 + 1e-6)
 
 
@@ -239,12 +241,56 @@ def test_critical_momentum_spins_the_body_to_its_limit():
     assert np.isnan(tumbling.critical_momentum).all()
 
 
-def test_dispersal_of_a_dilating_cohesionless_body_costs_its_energy():
-    b = body((1, 0.9, 0.8), 0.1)
-    s = stability(b)
-    assert np.isinf(s.critical_strain.barrier)
-    spin_energy = 0.5 * b.inertia[2].value * b.omega[2] ** 2
-    assert s.critical_energy.barrier.value == pytest.approx(s.binding_energy.value - spin_energy, rel=1e-12)
+def test_expanding_alike_for_ever_costs_the_whole_energy():
+    b = scene((1, 0.9, 0.8), (0, 0, 0.3))
+    lost, strain = barrier(b, np.zeros(5), LONGEST, np.inf)  # the apex: pure dilation
+    assert np.isinf(strain)
+    momentum = MASS / 5 * (b.s.sum() - b.s[2]) * 0.3
+    phi = energy(np.array([*b.s, 0, 0, 0]), np.array([0, 0, momentum]))
+    assert lost == pytest.approx(-phi, rel=1e-12)
+
+
+def test_barrier_ends_at_a_maximum_or_at_the_edge_of_the_model():
+    def ratio(s, t):
+        """Axis ratio on the path of constant gradient along the direction of the barrier."""
+        gradient = np.empty((3, 3))
+        squares = s.body.axes**2
+        velocity_gradient(*squares, components(s.directions.barrier), gradient)
+        grown = np.linalg.eigvalsh(tensor(components(expm(2 * t * gradient) @ np.diag(squares))))
+        return np.sqrt(grown[-1] / grown[0])
+
+    still = stability(body((1, 0.8, 0.7)), dilatancy=0.0)
+    assert still.barrier_kind == "edge"
+    assert ratio(still, still.critical_strain.barrier) == pytest.approx(6.0, rel=1e-6)
+    f = maclaurin(np.sqrt(1 - 0.93**2))
+    fluid = stability(body((1, 1, f.a3_a1), f.load, friction_angle=1 * u.deg), dilatancy=0.0)
+    assert fluid.barrier_kind == "maximum"
+    t, top = fluid.critical_strain.barrier, fluid.critical_energy.barrier
+    around = [0.99 * t, t, 1.01 * t]
+    near = push(fluid.body, fluid.directions.barrier, around, dilatancy=0.0).loss.barrier.value
+    assert near[1] == pytest.approx(top.value, rel=1e-6)
+    assert max(near[0], near[2]) < near[1]
+    fast = body((1, 0.8, 0.7), 2.0)
+    assert stability(fast).barrier_kind == "inadmissible"
+
+
+@pytest.mark.parametrize("kappa", [0.5, 20.0, 1e4])
+def test_softening_never_takes_the_pressure_below_that_of_the_apex(kappa):
+    """With kappa the pressure falls to -Y cot(phi) and stays there: friction does no work beyond."""
+    b = scene((1, 0.8, 0.7), dilatancy=0.5, cohesion=0.03, kappa=kappa)
+    x = directions(1)[0]
+    sin, tan = np.sin(np.deg2rad(30)), np.tan(np.deg2rad(30))
+    k, apex = 2 * 6**0.5 * sin / (3 - sin), 0.03 / tan
+    beta = 0.5 * k
+    grid = np.linspace(0.0, 0.8, 160_001)
+    pressure = np.maximum(b.pressure - kappa * beta * grid, -apex)
+    power = MASS * np.exp(beta * grid) * ((k - beta) * pressure + k * apex)
+    work = np.concatenate([[0], np.cumsum(0.5 * (power[1:] + power[:-1])) * grid[1]])
+    frictionless = scene((1, 0.8, 0.7), dilatancy=0.5, kappa=0.0)
+    for t in (0.1, 0.45, 0.8):
+        i = np.searchsorted(grid, t - 1e-9)
+        phi = loss_at(frictionless, x, t) - MASS * (k - beta) * b.pressure * np.expm1(beta * t) / beta
+        assert loss_at(b, x, t) == pytest.approx(phi + work[i], rel=1e-6)
 
 
 def test_push_reports_its_loss_to_each_order():

@@ -19,7 +19,7 @@ from flybystab.core.energy import (
 )
 from flybystab.core.statics import rigid_stress
 from flybystab.core.tensors import unpack
-from flybystab.core.tide import components
+from flybystab.core.tide import components, tensor
 
 SHAPES = [(1, 0.8, 0.6), (1, 1, 0.7), (1, 1, 1), (1, 0.5, 0.5), (1, 0.4, 0.2)]
 
@@ -130,9 +130,11 @@ def test_path_of_constant_gradient_and_its_slope():
         d = rng.standard_normal(6)
         path_frame(*s, d, rates, frame)
         velocity_gradient(*s, d, gradient)
-        phi, slope = energy_along(rates, frame, momentum, 0.3, shape, rate)
+        phi, slope, ratio2 = energy_along(rates, frame, momentum, 0.3, shape, rate)
         assert shape == pytest.approx(components(expm(0.6 * gradient) @ np.diag(s)), rel=1e-12, abs=1e-12)
         assert phi == pytest.approx(energy(shape, momentum), rel=1e-13)
+        squares = np.linalg.eigvalsh(tensor(shape))
+        assert ratio2 == pytest.approx(squares[-1] / squares[0], rel=1e-12)
         ends = [energy_along(rates, frame, momentum, 0.3 + h, shape, rate)[0] for h in (-1e-4, 1e-4)]
         assert slope == pytest.approx((ends[1] - ends[0]) / 2e-4, rel=1e-6, abs=1e-7)
 

@@ -6,7 +6,10 @@ from the frame in which the body has no relative angular momentum, with the angu
 kinetic energy is ``K(0) + t P1 + t^2/2 P2 + t^3/6 P3 + ...``: friction takes ``-P1`` and a push goes on once
 what gravity and spin give (``P2``) has overcome it. The critical energy and strain are the least over all six
 directions of strain, at second order (certified), third order and from the whole barrier along paths of
-constant velocity gradient. The three side by side show what the approximation is worth.
+constant velocity gradient, up to the axis ratio of 6:1 at which the homogeneous model ends. The three side by side
+show what the approximation is worth: the two series are taken at the strain of rest, and where they differ from the
+barrier the critical strain is far from small. The full dynamics of a pushed body
+(:mod:`flybystab.aggregate.recovery`) is the judge; ``python benchmarks/stability.py push`` holds the three against it.
 
 With a plastic bulk modulus ``kappa`` the pressure falls as the material dilates, ``pdot = -kappa tr D``. Under strictly
 associative flow it has no say: the work of the stress does not depend on the pressure.
@@ -91,8 +94,8 @@ class Stability:
         ``P2 < 0`` along the direction that flows first decides.
     critical_energy : Orders of Quantity
         Least kinetic energy of deformation, J, that a push needs to overcome friction; inf where no push of
-        that order does. For cohesionless associative flow without a maximum the barrier is the energy that
-        disperses the body, at infinite strain.
+        that order does. The barrier is the least energy that leads past a maximum of the energy lost or out of
+        the model (`barrier_kind`): with less a push comes to rest.
     critical_strain : Orders of float
         Least strain ``e t`` (measured with ``|D'| = 1``) at which a push begins to grow, at second and third
         order; for the barrier, the strain at which the least barrier is passed. In a direction at the apex
@@ -103,6 +106,10 @@ class Stability:
         The one of the second order.
     at_apex : Orders of bool
         Whether that direction dilates faster than the friction asks for (apex of the yield surface).
+    barrier_kind : str
+        "maximum": past the barrier the push gains energy; "edge": there the axis ratio passes 6:1, while friction is
+        still the stronger; "dispersal": the body expands for ever; "none": no push of this size leads anywhere;
+        "inadmissible": it does not stand in the first place.
     spread : float
         Largest over least critical energy of the three orders, less one: the error of the approximation.
     binding_energy : Quantity
@@ -135,6 +142,7 @@ class Stability:
     critical_strain: Orders
     directions: Orders
     at_apex: Orders
+    barrier_kind: str
     spread: float
     binding_energy: Quantity
     curvature_at_yield: float
@@ -220,6 +228,7 @@ def stability(body: Body, *, dilatancy: float | None = 1.0) -> Stability:
         critical_strain=strains,
         directions=Orders(*(d for d, _ in directions)),
         at_apex=Orders(*(a for _, a in directions)),
+        barrier_kind=_kind(scene, found[4], row),
         spread=float(values.max() / values.min() - 1.0) if finite else np.inf,
         binding_energy=binding * u.J,
         curvature_at_yield=curvature,
@@ -310,6 +319,19 @@ def push(body: Body, direction: Any, strain: Any, *, dilatancy: float = 1.0) -> 
         strain=t,
         loss=Orders(second * joule, (second - t**3 / 6 * p3) * joule, whole * joule),
     )
+
+
+def _kind(scene: Any, x: Array, row: Array) -> str:
+    """What ends the least barrier."""
+    if row[columns.LEVEL] < 1:
+        return "inadmissible"
+    energy, strain = row[columns.ENERGY_B], row[columns.STRAIN_B]
+    if not np.isfinite(energy):
+        return "none"
+    if not np.isfinite(strain):
+        return "dispersal"
+    ahead = loss_at(scene, x, strain + 0.01) if strain > 0.0 else -np.inf
+    return "edge" if ahead > energy else "maximum"
 
 
 def _loss(scene: Any, x: Array, t: float) -> float:

@@ -168,10 +168,10 @@ def path_frame(s1: float, s2: float, s3: float, d: Array, rates: Array, frame: A
 @kernel
 def energy_along(
     rates: Array, frame: Array, momentum: Array, t: float, shape: Array, rate: Array
-) -> tuple[float, float]:
-    """``Phi`` and ``dPhi/dt`` at time `t` on a path of :func:`path_frame`; writes ``S[6]`` into `shape`.
+) -> tuple[float, float, float]:
+    """``Phi``, ``dPhi/dt`` and the squared axis ratio at time `t` on a path of :func:`path_frame`.
 
-    `rate` is scratch space of six numbers (it holds ``dS/dt``).
+    Writes ``S[6]`` into `shape`; `rate` is scratch space of six numbers (it holds ``dS/dt``).
     """
     for i in range(6):
         shape[i] = 0.0
@@ -227,4 +227,4 @@ def energy_along(
     phi_t -= c * turning * (w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
     phi_t += c * (rate[0] * w[0] * w[0] + rate[1] * w[1] * w[1] + rate[2] * w[2] * w[2])
     phi_t += 2.0 * c * (rate[3] * w[0] * w[1] + rate[4] * w[0] * w[2] + rate[5] * w[1] * w[2])
-    return phi, phi_t
+    return phi, phi_t, np.max(values) / np.min(values)

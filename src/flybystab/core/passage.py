@@ -44,7 +44,8 @@ class Passage(NamedTuple):
         Name, time (s) and Lode angle of the stress (rad; nan where there is none) of every switch.
     history : dict of str to ndarray, or None
         ``time``, ``regime``, ``shape`` (n, 3, 3), ``velocity_gradient`` (n, 3, 3), and of the stress:
-        ``pressure`` (Pa), ``deviator`` (Pa, norm), ``determinant`` of the unit deviator.
+        ``pressure`` (Pa), ``deviator`` (Pa, norm), ``determinant`` of the unit deviator; ``quaternion`` (n, 4),
+        body axes -> frame of the tide, scalar first, of rigid rows (zero otherwise).
     steps, rejected : int
         Integration steps tried and rejected.
     """
@@ -112,8 +113,9 @@ def passage(
     max_axis_ratio: float = 6.0,
     max_steps: int = 200_000,
     keep: int = 0,
+    deformation: Array | None = None,
 ) -> Passage:
-    """Follow a body that starts rigid through a tide.
+    """Follow a body that starts rigid, or in flow, through a tide.
 
     Parameters
     ----------
@@ -138,6 +140,8 @@ def passage(
         Where the homogeneous model is left.
     keep : int
         Rows of history to keep at most; 0 for none.
+    deformation : ndarray (3, 3), optional
+        Velocity gradient along the body axes, 1/s, on top of the spin: the body starts in flow.
     """
     t0 = 1.0 / np.sqrt(np.pi * G * rho)
     a0 = float(np.cbrt(np.prod(axes)))
@@ -145,6 +149,13 @@ def passage(
     y = np.zeros(15)
     regimes.quaternion(np.ascontiguousarray(attitude, dtype=float), y)
     y[4:7] = omega * t0
+    start = motion.RIGID
+    if deformation is not None:
+        start = motion.FLOWING
+        spin = np.array([[0.0, -y[6], y[5]], [y[6], 0.0, -y[4]], [-y[5], y[4], 0.0]])
+        s = np.diag((axes / a0) ** 2)
+        motion.pack(attitude @ s @ attitude.T, y[0:6])
+        motion.set_gradient(attitude @ (spin + deformation * t0) @ attitude.T, y)
     scaled = TidePanels(tide.tau / t0, tide.start, tide.width, tide.coefficients * t0**2)
     hist = np.zeros((max(keep, 1), N_HISTORY))
     events = np.zeros((64, N_EVENT))
@@ -154,7 +165,7 @@ def passage(
         t_start / t0,
         t_stop / t0,
         (t_stop if t_rest is None else t_rest) / t0,
-        motion.RIGID,
+        start,
         y,
         par,
         scaled,
@@ -184,6 +195,7 @@ def passage(
             "pressure": h[:, 17] * stress,
             "deviator": h[:, 18] * stress,
             "determinant": h[:, 19].copy(),
+            "quaternion": h[:, 20:24].copy(),
         }
     return Passage(
         EVENTS[reason],

@@ -42,6 +42,13 @@ SQRT2 = np.sqrt(2.0)
 #: Longest strain along which a barrier is looked for.
 LONGEST = 3.0
 
+#: Steps of strain in which its maximum is bracketed.
+STEP = 0.2
+
+#: Axis ratio at which the homogeneous model is left; a body that is beyond it may grow its square by the second.
+EDGE = 6.0
+BEYOND_EDGE = 1.002
+
 
 class Pile(NamedTuple):
     """A granular ellipsoid in the units of this module; `s` is ``S`` with ``det S = 1``."""
@@ -209,29 +216,63 @@ def third_order(p1: float, p2: float, p3: float) -> tuple[float, float]:
 
 
 @kernel
-def _work(beta: float, hard: float, soft: float, t: float) -> float:
-    """``int_0^t V e^(beta t) (hard - soft t) dt``: work of the stress, with the volume growing."""
+def _grown(beta: float, t: float) -> tuple[float, float]:
+    """``int_0^t e^(beta t) dt`` and ``int_0^t t e^(beta t) dt``."""
     z = beta * t
     if z > 1e-2:
         grown = np.expm1(z) / beta
-        softened = (t * np.exp(z) - grown) / beta
-    else:
-        grown = t * (1.0 + z / 2.0 + z**2 / 6.0 + z**3 / 24.0 + z**4 / 120.0 + z**5 / 720.0)
-        softened = t * t * (0.5 + z / 3.0 + z**2 / 8.0 + z**3 / 30.0 + z**4 / 144.0 + z**5 / 840.0)
-    return MASS * (hard * grown - soft * softened)
+        return grown, (t * np.exp(z) - grown) / beta
+    grown = t * (1.0 + z / 2.0 + z**2 / 6.0 + z**3 / 24.0 + z**4 / 120.0 + z**5 / 720.0)
+    return grown, t * t * (0.5 + z / 3.0 + z**2 / 8.0 + z**3 / 30.0 + z**4 / 144.0 + z**5 / 840.0)
+
+
+class Work(NamedTuple):
+    """Work of the stress per volume and strain along a path: ``hard - soft t`` up to ``t = loose``, then `left`.
+
+    With a plastic bulk modulus the pressure falls to that of the apex, ``p = -Y cot(phi)``, and no further.
+    """
+
+    beta: float
+    hard: float
+    soft: float
+    loose: float
+    left: float
 
 
 @kernel
-def _path(b: Pile, x: Array, rates: Array, frame: Array) -> tuple[float, float, float]:
-    """Set the path of a direction; ``beta``, and the work rate ``hard - soft t`` per volume along it."""
+def _rate(w: Work, t: float) -> float:
+    """Power of the stress at strain `t`, with the volume growing."""
+    return MASS * np.exp(w.beta * t) * (w.hard - w.soft * t if t < w.loose else w.left)
+
+
+@kernel
+def _work(w: Work, t: float) -> float:
+    """``int_0^t V sigma*:D dt``."""
+    early = min(t, w.loose)
+    grown, softened = _grown(w.beta, early)
+    work = w.hard * grown - w.soft * softened
+    if t > w.loose:
+        work += w.left * (_grown(w.beta, t)[0] - grown)
+    return MASS * work
+
+
+@kernel
+def _path(b: Pile, x: Array, rates: Array, frame: Array) -> Work:
+    """Set the path of a direction, and the work of the stress along it."""
     g, beta = slope_of_flow(b, x)
     k = g * b.sin
     d = np.empty(6)
     rate_of_strain(x, beta, d)
     path_frame(b.s[0], b.s[1], b.s[2], d, rates, frame)
+    kc = g * b.cohesion
     if b.associative:
-        return beta, g * b.cohesion, 0.0
-    return beta, (k - beta) * b.pressure + g * b.cohesion, (k - beta) * b.kappa * beta
+        return Work(beta, kc, 0.0, np.inf, kc)
+    soft = (k - beta) * b.kappa * beta
+    if soft <= 0.0:
+        return Work(beta, (k - beta) * b.pressure + kc, 0.0, np.inf, kc)
+    return Work(
+        beta, (k - beta) * b.pressure + kc, soft, (b.pressure + kc / k) / (b.kappa * beta), beta * kc / k
+    )
 
 
 @kernel
@@ -239,57 +280,96 @@ def loss_at(b: Pile, x: Array, t: float) -> float:
     """Energy lost at strain `t`: ``Phi(t) - Phi(0) + int V sigma*:D dt`` along ``F = exp(L t)``."""
     rates = np.empty(3)
     frame = np.empty((3, 3))
-    beta, hard, soft = _path(b, x, rates, frame)
+    work = _path(b, x, rates, frame)
     shape = np.empty(6)
     rate = np.empty(6)
-    phi0, _ = energy_along(rates, frame, b.momentum, 0.0, shape, rate)
-    phi, _ = energy_along(rates, frame, b.momentum, t, shape, rate)
-    return phi - phi0 + _work(beta, hard, soft, t)
+    phi0, _, _ = energy_along(rates, frame, b.momentum, 0.0, shape, rate)
+    phi, _, _ = energy_along(rates, frame, b.momentum, t, shape, rate)
+    return phi - phi0 + _work(work, t)
 
 
 @kernel
-def barrier(b: Pile, x: Array, longest: float) -> tuple[float, float]:
+def barrier(b: Pile, x: Array, longest: float, enough: float) -> tuple[float, float]:
     """First maximum of ``Phi(t) - Phi(0) + int V sigma*:D dt`` along ``F = exp(L t)``, and the strain there.
 
-    Where none is met up to the strain `longest`: ``-Phi(0)`` at infinite strain if the flow dissipates nothing
-    (associative, no cohesion), the energy that disperses the body; inf if it does. The maximum is the first
-    zero of the exact slope, bracketed by steps of 0.1 and refined by the Illinois rule.
+    The path ends where the axis ratio passes :data:`EDGE` and the homogeneous model with it: the loss there counts
+    as the maximum. Where the loss grows up to the strain `longest` without either: ``-Phi(0)`` at infinite strain
+    if the flow dissipates nothing (associative, no cohesion), the energy that disperses the body; inf if it does.
+    A loss above `enough` is returned as it is met: the barrier is at least that high.
+    The maximum is the first zero of the exact slope, bracketed by steps of :data:`STEP`, and at the loss of
+    pressure, and refined by the Illinois rule.
     """
     rates = np.empty(3)
     frame = np.empty((3, 3))
-    beta, work, soft = _path(b, x, rates, frame)
+    work = _path(b, x, rates, frame)
     shape = np.empty(6)
     rate = np.empty(6)
-    phi0, slope0 = energy_along(rates, frame, b.momentum, 0.0, shape, rate)
+    phi0, slope, ratio2 = energy_along(rates, frame, b.momentum, 0.0, shape, rate)
+    edge = max(EDGE * EDGE, BEYOND_EDGE * ratio2)
     t0 = 0.0
-    y0 = slope0 + MASS * work
+    y0 = slope + _rate(work, 0.0)
     if y0 <= 0.0:
         return 0.0, 0.0
     t1 = 0.0
     y1 = y0
+    phi = phi0
+    ratio0 = ratio2
     while y1 > 0.0:
         t0 = t1
         y0 = y1
-        t1 = t0 + 0.1
+        t1 = t0 + STEP
+        if t0 < work.loose < t1:
+            t1 = work.loose
         if t0 >= longest:
-            return (-phi0 if work <= 0.0 and phi0 < 0.0 else np.inf), np.inf
-        _, slope1 = energy_along(rates, frame, b.momentum, t1, shape, rate)
-        y1 = slope1 + MASS * np.exp(beta * t1) * (work - soft * t1)
+            return (-phi0 if work.hard <= 0.0 and phi0 < 0.0 else np.inf), np.inf
+        phi, slope, ratio2 = energy_along(rates, frame, b.momentum, t1, shape, rate)
+        if ratio2 > edge:
+            a = t0
+            fa = np.log(ratio0 / edge)
+            fb = np.log(ratio2 / edge)
+            side = 0
+            for _ in range(30):
+                t = (a * fb - t1 * fa) / (fb - fa)
+                phi, slope, ratio2 = energy_along(rates, frame, b.momentum, t, shape, rate)
+                f = np.log(ratio2 / edge)
+                if abs(f) < 1e-9:
+                    break
+                if f < 0.0:
+                    a = t
+                    fa = f
+                    fb *= 0.5 if side < 0 else 1.0
+                    side = -1
+                else:
+                    t1 = t
+                    fb = f
+                    fa *= 0.5 if side > 0 else 1.0
+                    side = 1
+            t1 = t
+            if slope + _rate(work, t1) > 0.0:
+                return phi - phi0 + _work(work, t1), t1
+        ratio0 = ratio2
+        y1 = slope + _rate(work, t1)
+        if y1 > 0.0:
+            lost = phi - phi0 + _work(work, t1)
+            if lost > enough:
+                return lost, t1
     t = t1
-    phi = phi0
+    side = 0
     for _ in range(40):
         t = (t0 * y1 - t1 * y0) / (y1 - y0)
-        phi, slope = energy_along(rates, frame, b.momentum, t, shape, rate)
-        y = slope + MASS * np.exp(beta * t) * (work - soft * t)
-        if abs(y) <= 1e-10 * MASS or abs(t1 - t0) < 1e-9:
+        phi, slope, _ = energy_along(rates, frame, b.momentum, t, shape, rate)
+        y = slope + _rate(work, t)
+        # the error of the maximum is of second order
+        if abs(y) <= 1e-8 * MASS or t1 - t0 < 1e-8:
             break
         if y > 0.0:
             t0 = t
-            if y0 > 0.0:
-                y1 *= 0.5 if y1 < 0.0 and y > 0.5 * y0 else 1.0
             y0 = y
+            y1 *= 0.5 if side > 0 else 1.0
+            side = 1
         else:
             t1 = t
-            y0 *= 0.5 if y < 0.5 * y1 else 1.0
             y1 = y
-    return phi - phi0 + _work(beta, work, soft, t), t
+            y0 *= 0.5 if side < 0 else 1.0
+            side = -1
+    return phi - phi0 + _work(work, t), t

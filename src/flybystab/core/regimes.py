@@ -193,7 +193,7 @@ def follow(
         Axis ratio beyond which the model is left.
     brittle, unyielding : bool
         Cohesion is lost at first yield; the body never yields (for the friction that it would need).
-    hist, events : ndarray (n, 20), (m, 4)
+    hist, events : ndarray (n, 24), (m, 4)
         History (one row or less: none is kept) and event log.
     count : ndarray of int (4,)
         Rows of history, events, steps, rejected steps.

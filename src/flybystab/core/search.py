@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from flybystab.core.energy import MASS
 from flybystab.core.jit import kernel
 from flybystab.core.push import LONGEST, SQRT2, Pile, barrier, powers, second_order, third_order
+from flybystab.core.rheology import MOHR_COULOMB
 
 Array = NDArray[np.float64]
 
@@ -20,13 +21,13 @@ MOST_SWEEPS = 60
 
 
 @kernel
-def level(b: Pile, x: Array, order: int) -> tuple[float, float]:
-    """Critical energy and strain of one direction at an order: 2, 3, or 0 for the barrier.
+def level(b: Pile, x: Array, order: int, enough: float) -> tuple[float, float]:
+    """Critical energy and strain of one direction at an order: 2, 3, or 0 for the barrier (known up to `enough`).
 
     Order 1 is ``-P1/V`` (twice): its least value is the distance of the stress from the yield surface.
     """
     if order == 0:
-        return barrier(b, x, LONGEST)
+        return barrier(b, x, LONGEST, enough)
     p1, p2, p3 = powers(b, x)
     if order == 1:
         return -p1 / MASS, -p1 / MASS
@@ -47,30 +48,46 @@ def descent(b: Pile, x: Array, order: int, by_strain: bool, step: float, smalles
     """Minimise the critical energy (or strain) over directions by pattern search from ``x[5]``, which it moves."""
     which = 1 if by_strain else 0
     ball = b.associative and b.sin > 0.0
-    best = level(b, x, order)[which]
+    edged = b.associative and b.code == MOHR_COULOMB
+    limit = np.inf
+    best = level(b, x, order, limit)[which]
     trial = np.empty(5)
     last = np.zeros(5)
     for _ in range(MOST_SWEEPS):
         if step <= smallest or best <= 0.0:
             break
         before = best
+        # the strain at a barrier does not bound the energy
+        limit = np.inf if by_strain else best
         start = x.copy()
         for i in range(5):
             for sign in (1.0, -1.0):
                 trial[:] = x
                 trial[i] += sign * step
                 _clip(trial, ball)
-                value = level(b, trial, order)[which]
+                value = level(b, trial, order, limit)[which]
                 if value < best:
                     best = value
                     x[:] = trial
                     break
+        if edged and best >= before:  # on an edge of the yield surface no coordinate may lead down
+            for i in range(5):
+                for j in range(i + 1, 5):
+                    for sign in range(4):
+                        trial[:] = x
+                        trial[i] += (step if sign < 2 else -step) / SQRT2
+                        trial[j] += (step if sign % 2 else -step) / SQRT2
+                        _clip(trial, ball)
+                        value = level(b, trial, order, limit)[which]
+                        if value < best:
+                            best = value
+                            x[:] = trial
         if best < before:  # go on in the direction that the sweep has found
             last[:] = x - start
             for _ in range(4):
                 trial[:] = x + last
                 _clip(trial, ball)
-                value = level(b, trial, order)[which]
+                value = level(b, trial, order, limit)[which]
                 if value >= best:
                     break
                 best = value
@@ -119,9 +136,12 @@ def least(
     lattice = starts(n_angles, ball)
     n = seeds.shape[0] + lattice.shape[0]
     values = np.empty(n)
+    enough = np.inf
     for i in range(n):
         y = seeds[i] if i < seeds.shape[0] else lattice[i - seeds.shape[0]]
-        values[i] = level(b, y, order)[which]
+        values[i] = level(b, y, order, enough)[which]
+        if not by_strain:
+            enough = min(enough, 2.0 * values[i])
     best = np.inf
     rank = np.argsort(values)
     x[:] = lattice[0]
@@ -137,4 +157,4 @@ def least(
             x[:] = trial
     if best == np.inf:
         return np.inf, np.inf
-    return best, level(b, x, order)[1 - which]
+    return best, level(b, x, order, np.inf)[1 - which]

@@ -25,8 +25,9 @@ JAM = code(6)
 STUCK = code(7)  # more steps or switches than allowed
 SWITCH = code(8)  # flow passes from one part of the yield section to another (not logged)
 
-#: Columns of the history: time, regime, S (6), D (6), w (3), pressure, deviator norm, unit determinant.
-N_HISTORY = 20
+#: Columns of the history: time, regime, S (6), D (6), w (3), pressure, deviator norm, unit determinant, and
+#: the unit quaternion (body axes -> fixed frame) of a rigid body, zero otherwise.
+N_HISTORY = 24
 #: Columns of the event log: code, time, Lode determinant, volume.
 N_EVENT = 4
 #: Samples in a rigid step: history rows, and the grid on which extrema of the yield function are looked for.
@@ -115,9 +116,13 @@ def record(
         to_fixed_frame(y, par, ws.work.m[W_SCRATCH], row[2:8], row[14:17])
         for i in range(6):
             row[8 + i] = 0.0
+        for i in range(4):
+            row[20 + i] = y[i]
     else:
         for i in range(15):
             row[2 + i] = y[i]
+        for i in range(4):
+            row[20 + i] = 0.0
     row[17] = p
     row[18] = s
     row[19] = det
