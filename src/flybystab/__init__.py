@@ -38,6 +38,7 @@ _HOME = {
     "screen": "survey.screening",
     "spin_sample": "spin",
     "stability": "aggregate.stability",
+    "survival": "odds",
 }
 
 __all__ = ["__version__", *_HOME]
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
     from flybystab.face.cite import cite
     from flybystab.flyby_results import FlybyResult
     from flybystab.flybys import flyby, flyby_many, periapsis_axes
+    from flybystab.odds import survival
     from flybystab.outcome import Verdict
     from flybystab.sky.distribution import encounter_distribution
     from flybystab.sky.encounter import Encounter

@@ -95,23 +95,10 @@ def spin_sample(
     InvalidInput
         If `n` is not positive.
     """
-    if n < 1:
-        raise InvalidInput("n", n, "at least one attitude")
-    rng = np.random.default_rng(seed)
-    draws = rng.random((n, 4))
-    frame = periapsis_axes(encounter)
     known = not isinstance(asteroid, Body) and asteroid.pole is not None and encounter.frame == "ICRF"
-    bodies, attitudes = [], []
-    for turn, phase, height, longitude in draws:
-        if isinstance(asteroid, Body):
-            body = asteroid if material is None else asteroid.with_(material=material)
-            rotation = _isotropic(turn, height, longitude)
-        else:
-            body = asteroid.body_with(material, phase=float(phase))
-            pole = None if known else _direction(height, longitude)
-            rotation = frame @ asteroid.attitude(2.0 * np.pi * turn * u.rad, phase=float(phase), pole=pole)
-        bodies.append(body)
-        attitudes.append(rotation)
+    bodies, rotations = spin_states(asteroid, n, seed, material, use_pole=known)
+    frame = periapsis_axes(encounter)
+    attitudes = [frame @ rotation for rotation in rotations]
     table = flyby_many(bodies, [encounter] * n, attitudes, tolerance=tolerance, workers=workers)
     return SpinSample(
         spin_ratio=table.spin_ratio,
@@ -121,6 +108,34 @@ def spin_sample(
         pole_known=known,
         seed=seed,
     )
+
+
+def spin_states(
+    asteroid: SpinStates | Body, n: int, seed: int, material: Material | None = None, *, use_pole: bool = True
+) -> tuple[list[Body], list[Array]]:
+    """Bodies and rotations, body axes -> ICRF, at `n` phases: uniform about the pole, isotropic without one.
+
+    Parameters
+    ----------
+    asteroid, n, seed, material
+        As in :func:`spin_sample`.
+    use_pole : bool
+        Whether the catalogue's pole counts.
+    """
+    if n < 1:
+        raise InvalidInput("n", n, "at least one attitude")
+    bodies, rotations = [], []
+    for turn, phase, height, longitude in np.random.default_rng(seed).random((n, 4)):
+        if isinstance(asteroid, Body):
+            bodies.append(asteroid if material is None else asteroid.with_(material=material))
+            rotations.append(_isotropic(turn, height, longitude))
+        else:
+            bodies.append(asteroid.body_with(material, phase=float(phase)))
+            pole = asteroid.pole if use_pole else None
+            if pole is None:
+                pole = _direction(height, longitude)
+            rotations.append(asteroid.attitude(2.0 * np.pi * turn * u.rad, phase=float(phase), pole=pole))
+    return bodies, rotations
 
 
 def _direction(height: float, longitude: float) -> Array:

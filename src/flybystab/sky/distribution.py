@@ -52,6 +52,8 @@ class EncounterDistribution:
         Distance between the centres (impacts: of the two-body orbit without a surface), speed far away.
     b : Quantity, shape (n, 2)
         ``(B.T, B.R)``, :mod:`flybystab.sky.b_plane`.
+    position, velocity : Quantity, shape (n, 3)
+        ICRF, relative to the planet, at closest approach (impacts: at the last step outside).
     impact : ndarray of bool, shape (n,)
         Surface or atmosphere reached.
     linear : LinearPlane or None
@@ -71,6 +73,8 @@ class EncounterDistribution:
     distance: Quantity = field(repr=False)
     v_inf: Quantity = field(repr=False)
     b: Quantity = field(repr=False)
+    position: Quantity = field(repr=False)
+    velocity: Quantity = field(repr=False)
     impact: NDArray[np.bool_] = field(repr=False)
     linear: LinearPlane | None
     source: str
@@ -241,7 +245,7 @@ def _distribution(
     covariance = orbit.covariance
     assert covariance is not None
     body = planet(str(nominal["planet"]))
-    columns = np.full((len(clones) + points, 6), np.nan)
+    columns = np.full((len(clones) + points, 12), np.nan)
     if len(found):
         offset = (found["time"] - nominal["time"]).to_value(u.s)
         here = np.flatnonzero((found["planet"] == body.name) & (np.abs(offset) <= reach))
@@ -249,6 +253,7 @@ def _distribution(
         order = here[np.lexsort((np.abs(offset[here]), ~found["impact"][here]))[::-1]]
         every = [offset, *(found[c].to_value(u.m) for c in ("distance", "b_t", "b_r"))]
         every += [found["v_inf"].to_value(u.m / u.s), found["impact"]]
+        every += [*found["position"].to_value(u.m).T, *found["velocity"].to_value(u.m / u.s).T]
         columns[found["index"][order]] = np.column_stack(every)[order]
     first = columns[: len(clones)]
     return EncounterDistribution(
@@ -261,6 +266,8 @@ def _distribution(
         distance=(first[:, 1] * u.m).to(u.km),
         v_inf=(first[:, 4] * u.m / u.s).to(u.km / u.s),
         b=(first[:, 2:4] * u.m).to(u.km),
+        position=(first[:, 6:9] * u.m).to(u.km),
+        velocity=(first[:, 9:12] * u.m / u.s).to(u.km / u.s),
         impact=first[:, 5] > 0.0,
         linear=linear_plane(columns[len(clones) :], nominal, body),
         source=covariance.source,
