@@ -76,3 +76,11 @@ def test_every_example_is_tested():
     scripts = {p.name for p in EXAMPLES.glob("*.py")}
     text = Path(__file__).read_text()
     assert all(f'"{name}"' in text for name in scripts)
+
+
+def test_apophis_slopes():
+    """Half of what is published for shapes with relief, and the same ratio between the densities."""
+    largest = ran("apophis_slopes.py")["largest"]
+    # the tilt of gravity on a sphere, (3/2) GM/d^3 over (4/3) pi G rho, is 1.73 deg; the ellipsoid is longer
+    assert 1.73 < np.median(largest[1.29]) < 2.5
+    assert np.median(largest[1.29]) / np.median(largest[2.2]) == pytest.approx(2.2 / 1.29, rel=0.05)

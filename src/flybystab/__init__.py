@@ -33,11 +33,13 @@ _HOME = {
     "find_encounters": "sky.finder",
     "flyby": "flybys",
     "flyby_many": "flybys",
+    "flyby_margin": "margins",
     "infer": "survey.inference",
     "periapsis_axes": "flybys",
     "screen": "survey.screening",
     "spin_sample": "spin",
     "stability": "aggregate.stability",
+    "surface_change": "surfaces",
     "survival": "odds",
 }
 
@@ -51,6 +53,7 @@ if TYPE_CHECKING:
     from flybystab.face.cite import cite
     from flybystab.flyby_results import FlybyResult
     from flybystab.flybys import flyby, flyby_many, periapsis_axes
+    from flybystab.margins import flyby_margin
     from flybystab.odds import survival
     from flybystab.outcome import Verdict
     from flybystab.sky.distribution import encounter_distribution
@@ -58,6 +61,7 @@ if TYPE_CHECKING:
     from flybystab.sky.finder import find_encounters
     from flybystab.sky.orbit import Orbit
     from flybystab.spin import spin_sample
+    from flybystab.surfaces import surface_change
     from flybystab.survey.asteroid import Asteroid
     from flybystab.survey.catalogue import catalogue
     from flybystab.survey.inference import infer
