@@ -78,9 +78,8 @@ def neighbour(orbit: Orbit, time: Time, ephemeris: str | Ephemeris | None = None
         beside = deviated(orbit, orbit.epoch, out[None], np.zeros((1, 3)), "neighbour", ephemeris)[0]
         return Neighbour(beside, 1.0, "1 m away from the Sun")
     t = seconds(time, covariance.epoch)
-    middle = heliocentric(
-        deviated(orbit, covariance.epoch, np.zeros((1, 6)), np.zeros((1, 3)), "", ephemeris)[0]
-    )
+    there = deviated(orbit, covariance.epoch, np.zeros((1, 6)), np.zeros((1, 3)), "there", ephemeris)[0]
+    middle = heliocentric(there, ephemeris)
     ends = []
     for sign in (1.0, -1.0):
         states, pushes = covariance.deviations(covariance.values + sign * covariance.factor.T)
@@ -88,7 +87,7 @@ def neighbour(orbit: Orbit, time: Time, ephemeris: str | Ephemeris | None = None
     # rows: displacement by each principal way; the first left singular vector mixes the ways to the largest
     weight = np.linalg.svd(ends[0] - ends[1])[0][:, 0]
     states, pushes = covariance.deviations((covariance.values + covariance.factor @ weight)[None])
-    beside = deviated(orbit, covariance.epoch, states, pushes, "neighbour", ephemeris)[0]
+    beside = deviated(there, covariance.epoch, states, pushes, "neighbour", ephemeris)[0]
     label = "one sigma in the direction least known" + (
         "" if covariance.correlated else ", without correlations"
     )
