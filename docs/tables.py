@@ -13,8 +13,10 @@ TABLES = {
     "apophis": "python benchmarks/sky.py apophis",
     "flyby": "flybystab bench flyby",
     "grains": "python benchmarks/piles.py grains",
+    "other_planets": "python benchmarks/encounters.py planets",
     "outcomes": "python benchmarks/piles.py map",
     "stability": "python benchmarks/stability.py",
+    "tracks": "python benchmarks/encounters.py tracks",
 }
 
 

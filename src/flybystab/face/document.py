@@ -47,6 +47,10 @@ def encounter_document(encounter: Encounter) -> dict[str, Any]:
         "frame": encounter.frame,
         "ephemeris": encounter.ephemeris,
         "tide_error_relative": encounter.tide_error,
+        "displacement_km": None if encounter.displacement is None else encounter.displacement.to_value(u.km),
+        "displaced_by": encounter.neighbour or None,
+        "growth": encounter.growth,
+        "predictability": None if encounter.predictability is None else str(encounter.predictability),
     }
 
 

@@ -21,7 +21,7 @@ from astropy.table import Row
 from flybystab import __version__
 from flybystab.face.plotting import BLUE, flyby_panels
 from flybystab.face.scene import scene_plot
-from flybystab.face.text import MEANING, angle
+from flybystab.face.text import MEANING, angle, known
 from flybystab.flyby_results import FlybyResult
 from flybystab.sky.ephemeris import ephemeris
 from flybystab.spin import SpinSample
@@ -180,6 +180,7 @@ def _encounter_rows(r: FlybyResult, when: str) -> list[tuple[str, str]]:
                 "orbit itself is not in it",
             )
         )
+        rows.append(("how well the encounter is known", _e(known(e))))
     if e.impact:
         rows.append(("impact", f"reaches the {_e(e.impact_level)}"))
     return rows

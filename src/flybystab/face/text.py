@@ -38,7 +38,15 @@ def encounter_lines(e: Encounter) -> list[str]:
     ]
     if e.impact:
         out.append(f"           reaches the {e.impact_level}")
+    if e.displacement is not None:
+        out.append(f"known      {known(e)}")
     return out
+
+
+def known(e: Encounter) -> str:
+    """How well an encounter on a real orbit is known."""
+    assert e.displacement is not None
+    return f"{e.predictability}: {e.neighbour} moves the asteroid by {e.displacement.to_value(u.km):,.3g} km there"
 
 
 def flyby_lines(r: FlybyResult) -> list[str]:
