@@ -4,11 +4,15 @@ python benchmarks/screen.py throughput     samples per second by distance and wo
 python benchmarks/screen.py memory         resident memory while 10^6 rows are written
 python benchmarks/screen.py catalogue [FILE] [--jobs N] [--samples N] [--output FILE]
                                            a whole run: time, verdicts, the ten closest to failure
+python benchmarks/screen.py cneos RESULT   a table of results against the passages that CNEOS predicted in 2021
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
+import gzip
+import io
 import resource
 import sys
 import tempfile
@@ -23,10 +27,11 @@ from astropy.time import Time
 
 from flybystab.constants import AU, R_EARTH
 from flybystab.sky.encounter import Encounter
-from flybystab.survey.catalogue import Asteroid, catalogue
+from flybystab.survey.catalogue import Asteroid, catalogue, key_of
 from flybystab.survey.formats import with_physical_data
 from flybystab.survey.judging import Passage
 from flybystab.survey.progress import ProgressBar, duration
+from flybystab.survey.results import read_results
 from flybystab.survey.screening import Screening, Settings, settings
 from flybystab.survey.summary import summary
 
@@ -68,8 +73,9 @@ def measured(run: Screening, executor: Executor | None) -> tuple[float, int, int
 
 def throughput() -> None:
     bodies = [a for a in catalogue() if a.name != "Bennu"]
-    head = [("workers", 7), ("samples", 8), ("by dynamics", 11), ("samples/s", 10), ("1e8 samples", 12)]
+    head = [("workers", 7), ("samples", 8), ("by dynamics", 11), ("samples/s", 10)]
     print(f"{'distance':>9} " + " ".join(f"{name:>{width}}" for name, width in head))
+    rates: dict[tuple[str, int], float] = {}
     with ProcessPoolExecutor(2) as pool:
         # The first runs compile, in the workers, too.
         measured(Screening(bodies[:20], settings(*SPAN, samples=20), two), pool)
@@ -79,26 +85,37 @@ def throughput() -> None:
             for workers in (1, 2):
                 run = Screening(bodies[:n], settings(*SPAN, samples=100), finder)
                 spent, samples, dynamic = measured(run, pool if workers == 2 else None)
-                rate = samples / spent
+                rates[name, workers] = samples / spent
                 print(
-                    f"{name:>9} {workers:7d} {samples:8d} {100 * dynamic / samples:10.1f}% {rate:10.0f} "
-                    f"{duration(1e8 / rate):>12}"
+                    f"{name:>9} {workers:7d} {samples:8d} {100 * dynamic / samples:10.1f}% {samples / spent:10.0f}"
                 )
-        nothing = settings(*SPAN, within=1 * u.m)
-        began = time.perf_counter()
-        futures = [pool.submit(len, [a, nothing]) for a in bodies]
-        for f in futures:
-            f.result()
-        print(f"overhead of one task: {1e3 * (time.perf_counter() - began) / len(bodies):.2f} ms")
+        nothing = Screening(bodies, settings(*SPAN), nowhere)
+        spent, _, _ = measured(nothing, pool)
+        print(f"overhead of one task: {1e3 * spent / len(bodies):.2f} ms")
     run = Screening(catalogue(), settings(*SPAN))
     began = time.perf_counter()
     found = sum(len(result["rows"]) for _, result in run.results())
     spent = time.perf_counter() - began
     years = 24 * len(run.asteroids)
     print(
-        f"search and nominal verdicts, 1 worker: {years / spent:.0f} object-years/s ({found} encounters of "
+        f"search and catalogue bodies, 1 worker: {years / spent:.0f} object-years/s ({found} passages of "
         f"{len(run.asteroids)} asteroids in 24 years, {spent:.1f} s)"
     )
+    # Passages within 0.05 au that come within 10 Earth radii, by the area of the target plane.
+    deep = (10 * R_EARTH / (0.05 * AU)) ** 2
+    search = 1e6 * 24 / (years / spent) / 2
+    draw = 1e8 * ((1 - deep) / rates["0.02 au", 2] + deep / rates["2 R_E", 2])
+    print("on paper: 10^6 objects for 24 years, 10^8 samples, machines with two such cores")
+    for machines in (1, 10, 100):
+        print(
+            f"{machines:4d} machines: {duration((search + draw) / machines)} "
+            f"(search {duration(search / machines)}, samples {duration(draw / machines)})"
+        )
+
+
+def nowhere(asteroid: Asteroid, settings: Settings) -> list[Passage]:
+    """No passage: what is left is the overhead of a task."""
+    return []
 
 
 class Rows(Screening):
@@ -141,22 +158,70 @@ def whole(args: argparse.Namespace) -> None:
     print(summary(output).text())
 
 
+def cneos(result: Path, data: Path) -> None:
+    """Passages of the CNEOS table (2021) that a result does not have, with the uncertainty they had then."""
+    table = read_results(result)
+    span = table.meta["settings"]["start_jd_tdb"], table.meta["settings"]["stop_jd_tdb"]
+    file = table.meta["catalogue"]
+    asteroids = catalogue() if str(file).startswith("embedded") else catalogue(file)
+    names = {key_of(n): str(a.number or a.name) for a in asteroids for n in a.names}
+    found: dict[str, list[tuple[float, float]]] = {}
+    for row in table:
+        key = str(row["number"]) if row["number"] > 0 else str(row["asteroid"])
+        found.setdefault(key, []).append((float(row["jd_tdb"].value), float(row["distance"].value)))
+    with gzip.open(data / "cneos_earth_1950_2040_lt0.05au.csv.gz") as raw:
+        rows = list(csv.DictReader(io.TextIOWrapper(raw)))
+    known = [
+        r for r in rows if key_of(r["des"]) in names and span[0] <= float(r["jd_tdb_rounded_min"]) < span[1]
+    ]
+    sure = [r for r in known if r["t_sigma3_min"].lstrip("<").isdigit() and _minutes(r) < 60.0]
+    lost = []
+    for r in known:
+        day, distance = float(r["jd_tdb_rounded_min"]), float(r["dist_au"])
+        near = found.get(names[key_of(r["des"])], [])
+        if not any(abs(d - day) < 0.01 + _minutes(r) / 1440 and abs(q - distance) < 1e-3 for d, q in near):
+            closest = min(near, key=lambda x: abs(x[0] - day), default=(float("nan"),) * 2)
+            lost.append((r, closest))
+    print(
+        f"{len(known)} passages predicted in 2021, {len(known) - len(lost)} found at that time and distance;"
+    )
+    print(
+        f"of the {len(sure)} whose time was known to an hour (3 sigma), {sum(r in sure for r, _ in lost)} not found"
+    )
+    print(
+        f"{'asteroid':>12} {'predicted':>18} {'au':>8} {'least au':>8} {'3 sigma (d)':>11} {'nearest here':>14}"
+    )
+    for r, (day, distance) in lost:
+        print(
+            f"{r['des']:>12} {r['cd_tdb']:>18} {r['dist_au']:>8} {r['dist_min_au']:>8} "
+            f"{_minutes(r) / 1440:11.2f} {day - float(r['jd_tdb_rounded_min']):+7.2f} d {distance:.5f}"
+        )
+
+
+def _minutes(row: dict[str, str]) -> float:
+    """3-sigma of the time, minutes."""
+    return float(row["t_sigma3_min"].lstrip("<") or 1e9)
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("what", choices=("throughput", "memory", "catalogue"))
+    parser.add_argument("what", choices=("throughput", "memory", "catalogue", "cneos"))
     parser.add_argument("file", nargs="?", type=Path)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--samples", type=int, default=100)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--rows", type=int, default=1_000_000)
     parser.add_argument("--output", type=Path)
+    parser.add_argument("--data", type=Path, default=Path(__file__).resolve().parents[2] / "shared" / "data")
     args = parser.parse_args()
     if args.what == "throughput":
         throughput()
     elif args.what == "memory":
         memory(args.rows)
+    elif args.what == "cneos":
+        cneos(args.file, args.data)
     else:
         whole(args)
     return 0

@@ -13,9 +13,13 @@ TABLES = {
     "apophis": "python benchmarks/sky.py apophis",
     "flyby": "flybystab bench flyby",
     "grains": "python benchmarks/piles.py grains",
+    "honesty": "python benchmarks/honesty.py scripted --encounters 300",
+    "honesty_real": "python benchmarks/honesty.py real --every 4",
+    "memory": "python benchmarks/screen.py memory",
     "other_planets": "python benchmarks/encounters.py planets",
     "outcomes": "python benchmarks/piles.py map",
     "stability": "python benchmarks/stability.py",
+    "throughput": "python benchmarks/screen.py throughput",
     "tracks": "python benchmarks/encounters.py tracks",
 }
 

@@ -47,7 +47,7 @@ Array = NDArray[np.float64]
 
 
 #: The margin of the catalogue body is computed, not bounded, where the bound is this far from rest, rad.
-SHARP = float(np.radians(0.1))
+SHARP = float(np.radians(0.01))
 
 
 @dataclass(frozen=True)
