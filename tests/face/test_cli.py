@@ -305,3 +305,21 @@ def test_zsh_reads_the_script_of_bash(capsys):
     _, zsh, _ = run(capsys, "completion", "zsh")
     assert zsh.endswith(bash)
     assert "bashcompinit" in zsh
+
+
+def test_stability_of_a_whole_catalogue(tmp_path, capsys):
+    file, out = tmp_path / "two.csv", tmp_path / "levels.ecsv"
+    head = "name,semi_axis_a_m,semi_axis_b_m,semi_axis_c_m,density_kg_m3,spin_period_h"
+    file.write_text(f"{head}\nslow,200,160,150,2000,8\nfast,200,160,150,2000,1.5\n")
+    assert main(["stability", "--all", str(file), "--output", str(out), "--json"]) == 0
+    rows = json.loads(capsys.readouterr().out)["rows"]
+    assert [r["level_40"] for r in rows] == [2, 0]
+    assert rows[1]["required_friction_angle_deg"] == "inf"
+    assert rows[1]["required_cohesion_Pa"] > 0
+    assert out.exists()
+    assert main(["stability", "--all", str(file)]) == 0
+    text = capsys.readouterr().out
+    assert "40 deg: 1 inadmissible" in text
+    assert main(["stability"]) == 1
+    assert "--all" in capsys.readouterr().err
+    assert main(["stability", "Apophis", "--output", str(out)]) == 1

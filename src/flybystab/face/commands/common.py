@@ -79,19 +79,24 @@ def tdb(text: str, name: str) -> Any:
         raise InvalidInput(name, text, "a date such as 2029-04-13, read as TDB") from None
 
 
-def asteroid_of(options: argparse.Namespace) -> Any:
-    """The asteroid named, with the material asked for."""
+def material_of(options: argparse.Namespace) -> Any:
+    """The material asked for."""
     import astropy.units as u
 
     from flybystab.aggregate.body import Material
-    from flybystab.survey.asteroid import Asteroid
 
-    material = Material(
+    return Material(
         friction_angle=options.friction * u.deg,
         cohesion=options.cohesion * u.Pa,
         yield_surface=options.surface,
     )
-    return Asteroid.from_catalogue(options.name, material=material)
+
+
+def asteroid_of(options: argparse.Namespace) -> Any:
+    """The asteroid named, with the material asked for."""
+    from flybystab.survey.asteroid import Asteroid
+
+    return Asteroid.from_catalogue(options.name, material=material_of(options))
 
 
 def check_picture(path: str | None, endings: tuple[str, ...] = FIGURES) -> None:

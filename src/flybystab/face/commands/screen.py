@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
-from flybystab.face.commands.common import material_arguments, show, span_arguments, tdb
+from flybystab.face.commands.common import material_arguments, material_of, show, span_arguments, tdb
 
 HELP = "a whole catalogue through its encounters"
 EXAMPLE = "flybystab screen --from 2026-01-01 --to 2036-01-01 --samples 100 --jobs 2"
@@ -41,7 +41,6 @@ def run(options: argparse.Namespace) -> None:
 
     import astropy.units as u
 
-    from flybystab.aggregate.body import Material
     from flybystab.face.document import table_document
     from flybystab.survey.executors import workers
     from flybystab.survey.population import Population
@@ -64,11 +63,7 @@ def run(options: argparse.Namespace) -> None:
             within=options.within * u.au,
             samples=options.samples,
             seed=options.seed,
-            material=Material(
-                friction_angle=options.friction * u.deg,
-                cohesion=options.cohesion * u.Pa,
-                yield_surface=options.surface,
-            ),
+            material=material_of(options),
             population=Population.from_file(options.population) if options.population else None,
             keep_samples=options.samples_output is not None,
         ),

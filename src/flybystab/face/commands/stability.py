@@ -1,24 +1,88 @@
-"""``flybystab stability NAME``: equilibrium and stability of an asteroid on its own."""
+"""``flybystab stability NAME`` and ``--all [FILE]``: equilibrium and stability of asteroids on their own."""
 
 from __future__ import annotations
 
 import argparse
 
 from flybystab import __version__
-from flybystab.face.commands.common import asteroid_of, material_arguments, show
+from flybystab.errors import InvalidInput
+from flybystab.face.commands.common import asteroid_of, material_arguments, material_of, show
 
-HELP = "equilibrium and stability of an asteroid on its own"
+HELP = "equilibrium and stability of an asteroid on its own, or of a whole catalogue"
 EXAMPLE = "flybystab stability Anteros --friction 30"
 
 
 def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
-    sub.add_argument("name", help="number, name or designation")
+    sub.add_argument("name", nargs="?", help="number, name or designation; with --all a catalogue file")
+    sub.add_argument(
+        "--all",
+        action="store_true",
+        help="classify the embedded catalogue, or the file given (own CSV, JPL SBDB, MPC, NEOCC .ke1)",
+    )
     material_arguments(sub)
+    sub.add_argument("--output", metavar="FILE", help="with --all: write the table (.ecsv, .parquet)")
 
 
 def run(options: argparse.Namespace) -> None:
     """Answer the command."""
+    if options.all:
+        _catalogue(options)
+    elif options.name is None:
+        raise InvalidInput("NAME", "(none)", "an asteroid, or --all for the whole catalogue")
+    elif options.output:
+        raise InvalidInput("--output", options.output, "--all with it: one asteroid is printed")
+    else:
+        _asteroid(options)
+
+
+def _catalogue(options: argparse.Namespace) -> None:
+    """A table of all asteroids."""
+    from pathlib import Path
+
+    import astropy.units as u
+
+    from flybystab.face.document import table_document
+    from flybystab.survey.classification import COLUMNS, classification, counts
+    from flybystab.survey.results import check_output, write_rows
+
+    output = None if options.output is None else check_output(options.output)
+    table = classification(
+        None if options.name is None else Path(options.name), material=material_of(options)
+    )
+    if output is not None:
+        bare = {n: table[n].value if isinstance(table[n], u.Quantity) else table[n] for n in table.colnames}
+        rows = (
+            {n: v[i].item() if hasattr(v[i], "item") else v[i] for n, v in bare.items()}
+            for i in range(len(table))
+        )
+        write_rows(rows, output, COLUMNS, table.meta)
+
+    def lines() -> list[str]:
+        head = f"{'asteroid':>24} {'friction':>8}  30 35 40 {'strain':>7} {'cohesion':>9}  not measured"
+        out = [f"{'':>24} {'deg':>8} {'level':>9} {'':>7} {'Pa':>9}", head]
+        for row in table:
+            if row["error"]:
+                out.append(f"{row['asteroid']:>24} {row['error']}")
+                continue
+            unknown = "; ".join(t for t in (row["assumed"], row["drawn"] and "drawn: " + row["drawn"]) if t)
+            out.append(
+                f"{row['asteroid']:>24} {row['required_friction_angle'].value:8.2f} {row['level_30']:3d}"
+                f"{row['level_35']:3d}{row['level_40']:3d} {row['critical_strain']:7.3g} "
+                f"{row['required_cohesion'].value:9.3g}  {unknown}"
+            )
+        for angle, found in counts(table).items():
+            out.append(f"{angle}: " + ", ".join(f"{n} {name}" for name, n in found.items()))
+        held = (
+            " (0 inadmissible, 1 admissible, 2 stable to infinitesimal, 3 to finite pushes at second order)"
+        )
+        return [*out, "levels" + held, *([f"table      {output}"] if output else [])]
+
+    show(options, lambda: table_document(table), lines)
+
+
+def _asteroid(options: argparse.Namespace) -> None:
+    """One asteroid."""
     import astropy.units as u
 
     from flybystab.aggregate.equilibrium import spin_limits
