@@ -66,6 +66,13 @@ def test_survival_from_target_plane(monkeypatch, tmp_path):
     assert names["low"] < names["probability"] < names["high"]
 
 
+def test_impact_odds_2024_yr4(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    names = ran("impact_odds_2024_yr4.py")
+    assert names["linear"] == pytest.approx(0.043, abs=0.01)  # CNEOS, June 2025
+    assert names["low"] < names["linear"] < names["high"]
+
+
 def test_screening_to_2050():
     names = ran("screening_to_2050.py")
     assert (names["name"], names["date"]) == ("Apophis", "2029-04-13")

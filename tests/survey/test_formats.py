@@ -58,6 +58,9 @@ def test_neocc_orbit(tmp_path):
     assert a.epoch.jd == 2461000.5
     assert a.quantity("a_au").value == 2.5158372264739257
     assert a.quantity("A2_au_d2").value == pytest.approx(-2.9e-14)
+    assert "notes" not in a.row
+    path.write_text(KE1.replace(" NGR   0.0", " NGR   0.2"))
+    assert "radiation pressure" in catalogue(path)[0].row["notes"]
     path.write_text(KE1.replace("ECLM", "EQUM"))
     with pytest.raises(InvalidInput, match="OEF2"):
         catalogue(path)
@@ -130,6 +133,11 @@ def test_sbdb_answer_with_its_covariance(tmp_path):
     assert covariance.values[2] == pytest.approx((2459101.039422462638 - 2459215.5) * 86400, abs=1e-3)
     path.write_text(text.replace('"tp"', '"tperi"'))
     with pytest.raises(InvalidInput, match="tp"):
+        catalogue(path)
+    other = text.replace('"value": "2.",', '"value": "2.15",', 1)  # the exponent NM
+    assert other != text
+    path.write_text(other)
+    with pytest.raises(InvalidInput, match="comet"):
         catalogue(path)
     path.write_text("{}")
     with pytest.raises(InvalidInput, match="SBDB"):

@@ -141,6 +141,8 @@ def from_neocc(text: str, file: str) -> tuple[dict[str, str], Covariance | None]
         out["H_mag"] = words["MAG"][0]
     if len(words.get("NGR", [])) == 2:
         out["A2_au_d2"] = repr(float(words["NGR"][1]) * 1e-10)
+        if float(words["NGR"][0]) != 0.0:
+            out["notes"] = f"solar radiation pressure is left out (area-to-mass ratio {words['NGR'][0]} m2/t)"
     out |= {"frame": FRAME, "orbit_source": f"ESA NEOCC ({file})", "orbit_solution": "NEOCC OEF2"}
     return out, _neocc_covariance(body, words, out, file)
 
@@ -225,6 +227,7 @@ def from_sbdb_answer(text: str, file: str) -> tuple[dict[str, str], Covariance |
         raise InvalidInput(
             "orbit file", file, f"an answer of the SBDB API with full precision ({error})"
         ) from None
+    _inverse_square(orbit, pushes, file)
     designation = full.partition("(")[2].rstrip(") ")
     row["number"] = key if key.isdigit() else ""
     row["designation"] = designation or ("" if key.isdigit() else key)
@@ -242,6 +245,18 @@ def from_sbdb_answer(text: str, file: str) -> tuple[dict[str, str], Covariance |
     row |= {"frame": FRAME, "orbit_solution": f"JPL {solution}", "orbit_source": f"JPL SBDB ({file})"}
     row["condition_code"] = str(orbit.get("condition_code") or "")
     return row, _sbdb_covariance(orbit, pushes, f"JPL SBDB, solution {solution} ({file})", file)
+
+
+def _inverse_square(orbit: Mapping[str, Any], pushes: Mapping[str, Any], file: str) -> None:
+    """Refuse A1, A2, A3 of another law than an asteroid's: a catalogue row has no column for it."""
+    wanted = {"ALN": 1.0, "NK": 0.0, "NM": 2.0, "R0": 1.0}
+    given = {p["name"]: float(p["value"]) for p in orbit.get("model_pars") or [] if p["name"] in wanted}
+    if pushes and given != wanted:
+        raise InvalidInput(
+            "A1, A2, A3",
+            f"with the law {given or 'of a comet'} in {file}",
+            "an acceleration that falls as 1/r2 (a comet: fs.Orbit.from_elements(..., law='comet'))",
+        )
 
 
 def _sbdb_covariance(
