@@ -1,25 +1,28 @@
-"""``flybystab bench flyby``: error against time of the flyby integrators."""
+"""``flybystab bench [WHAT]``: error against time."""
 
 from __future__ import annotations
 
 import argparse
 
 from flybystab import __version__
-from flybystab.face.commands.common import figure_argument, show
+from flybystab.face.bench import BENCHES
+from flybystab.face.commands.common import check_picture, figure_argument, show
 
-HELP = "error against time of the flyby integrators"
+HELP = "error against time: " + "; ".join(f"{name} ({about})" for name, about in BENCHES.items())
 EXAMPLE = "flybystab bench flyby --output bench.png"
 
 
 def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
-    sub.add_argument("what", choices=["flyby"], help="which benchmark")
+    sub.add_argument("what", nargs="?", default="flyby", choices=list(BENCHES), help="which one (flyby)")
     figure_argument(sub)
 
 
 def run(options: argparse.Namespace) -> None:
     """Answer the command."""
-    from flybystab.face.bench import flyby_bench, lines
+    from importlib import import_module
 
-    rows = flyby_bench(options.output)
-    show(options, lambda: {"flybystab": __version__, "rows": rows}, lambda: lines(rows))
+    check_picture(options.output)
+    bench = import_module(f"flybystab.face.bench.{options.what}")
+    rows = bench.rows(options.output)
+    show(options, lambda: {"flybystab": __version__, "rows": rows}, lambda: bench.lines(rows))

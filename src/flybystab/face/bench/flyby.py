@@ -44,7 +44,7 @@ def _best(run: Any, repeat: int) -> float:
     return min(times)
 
 
-def flyby_bench(figure: str | Path | None = None, repeat: int = 5) -> list[dict[str, Any]]:
+def rows(figure: str | Path | None = None, repeat: int = 5) -> list[dict[str, Any]]:
     """Rows of method, setting, relative error, wall time (s) and time over that of the default at 1e-6."""
     body, e = _case()
     t0 = body.dynamical_time
@@ -62,11 +62,11 @@ def flyby_bench(figure: str | Path | None = None, repeat: int = 5) -> list[dict[
 
     exact = default(1e-12, keep=200_000)
     truth = axes(exact.shape)
-    rows: list[dict[str, Any]] = []
+    out: list[dict[str, Any]] = []
 
     def add(method: str, setting: str, shape: Any, wall: float) -> None:
         error = float(np.abs(axes(shape) / truth - 1.0).max())
-        rows.append({"method": method, "setting": setting, "error_relative": error, "wall_s": wall})
+        out.append({"method": method, "setting": setting, "error_relative": error, "wall_s": wall})
 
     for tolerance in (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10):
         run = default(tolerance)
@@ -82,7 +82,7 @@ def flyby_bench(figure: str | Path | None = None, repeat: int = 5) -> list[dict[
         )  # fmt: skip
 
     gradients = [rigid(tolerance).velocity_gradient for tolerance in (1e-8, 1e-12)]
-    rows.append(
+    out.append(
         {
             "method": "default, rigid",
             "setting": "no yield, tol 1e-08",
@@ -137,7 +137,7 @@ def flyby_bench(figure: str | Path | None = None, repeat: int = 5) -> list[dict[
             )
             wall = time.perf_counter() - begin
             error = float(np.abs(axes(tensor(solution.y[:6, -1])) * a0 / target - 1.0).max())
-            rows.append(
+            out.append(
                 {
                     "method": f"SciPy {method}",
                     "setting": f"rtol {tolerance:.0e}",
@@ -145,12 +145,12 @@ def flyby_bench(figure: str | Path | None = None, repeat: int = 5) -> list[dict[
                     "wall_s": wall,
                 }
             )
-    reached = [r["wall_s"] for r in rows if r["method"] == "default" and r["error_relative"] <= 1e-6]
-    for row in rows:
+    reached = [r["wall_s"] for r in out if r["method"] == "default" and r["error_relative"] <= 1e-6]
+    for row in out:
         row["wall_over_default_at_1e-6"] = row["wall_s"] / min(reached)
     if figure is not None:
-        _plot(rows, figure)
-    return rows
+        _plot(out, figure)
+    return out
 
 
 def lines(rows: list[dict[str, Any]]) -> list[str]:

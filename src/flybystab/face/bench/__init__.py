@@ -1,0 +1,14 @@
+"""Benchmarks as commands: error against time.
+
+A benchmark is a module with ``rows(figure)``, which measures, draws the figure if a path is given and returns
+dictionaries with units in their keys, and ``lines(rows)``, the table as text. A new one is one new module and one new
+entry.
+"""
+
+from __future__ import annotations
+
+#: By name: the module below this package, and what it shows.
+BENCHES = {
+    "flyby": "integrators of one flyby",
+    "screen": "bound and dynamics of a screening",
+}
