@@ -18,6 +18,7 @@ TABLES = {
     "memory": "python benchmarks/screen.py memory",
     "other_planets": "python benchmarks/encounters.py planets",
     "outcomes": "python benchmarks/piles.py map",
+    "screen": "flybystab bench screen",
     "stability": "python benchmarks/stability.py",
     "throughput": "python benchmarks/screen.py throughput",
     "tracks": "python benchmarks/encounters.py tracks",

@@ -19,6 +19,7 @@ from scipy.spatial.transform import Rotation
 
 from flybystab.aggregate.body import YIELD_SURFACES, Body
 from flybystab.core import motion
+from flybystab.core.rheology import required_friction
 from flybystab.core.workspace import ARREST, CONTACT, JAM, LOSS, ONSET
 from flybystab.errors import InvalidInput
 from flybystab.flybys import flyby, flyby_many
@@ -45,6 +46,30 @@ def agree(body, e, attitude=None, rtol=1e-6):
 def test_grazing_named_case():
     p = agree(GRAZER, earth(2.3, 4.0), TILT)
     assert [x[0] for x in p.events] == ["onset", "arrest"]
+
+
+def test_a_peak_of_friction_beside_the_end_of_a_step_is_found():
+    """The largest friction is between samples and steps as a rule; over many scenes some peaks sit at a joint."""
+    rng = np.random.default_rng(3)
+    for _ in range(80):
+        axes = np.sort(rng.uniform(0.4, 1.0, 3))[::-1] * u.km
+        body = Body(axes, rng.uniform(1200, 3000) * u.kg / u.m**3, rng.uniform(2.3, 20.0) * u.h)
+        e = earth(rng.uniform(2.0, 8.0), rng.uniform(1.0, 15.0))
+        attitude = Rotation.random(random_state=rng).as_matrix()
+        found, exact = (
+            carried(body, e.t_start, e.t_stop, e.tide, attitude, unyielding=True, tolerance=tol, keep=keep)
+            for tol, keep in ((1e-8, 0), (1e-12, 100_000))
+        )
+        if not np.isfinite(exact.max_friction):
+            continue
+        assert found.max_friction == pytest.approx(exact.max_friction, abs=1e-7)
+        # no sampled stress of the finer run demands more than its maximum
+        h = exact.history
+        sampled = [
+            required_friction(0, 0.0, s, p, det)
+            for s, p, det in zip(h["deviator"], h["pressure"], h["determinant"], strict=True)
+        ]
+        assert max(sampled) <= exact.max_friction + 1e-12
 
 
 @pytest.mark.parametrize("excess", [1e-2, 1e-3, 1e-4, 1e-6])

@@ -33,6 +33,9 @@ _FRICTION = code(1)
 
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
+#: Fraction of a step at which the slope at its ends is probed: a maximum nearer than this is missed by its square.
+_BESIDE = 1e-4
+
 
 @kernel
 def yields(t: float, y: Array, par: Array, tide: TidePanels, ws: Workspace) -> float:
@@ -94,7 +97,7 @@ def _largest(
     f1 = _rigid_values(t + x1 * h, ws.ys, par, tide, ws, which)
     explicit_at(x2, ws.y, N_RIGID, ws.dense, ws.ys)
     f2 = _rigid_values(t + x2 * h, ws.ys, par, tide, ws, which)
-    for _ in range(36):
+    for _ in range(20):  # the place to 1e-4 of the interval, the maximum to its square
         if f1 < f2:
             a = x1
             x1, f1 = x2, f2
@@ -115,6 +118,24 @@ def _vertex_inside(f0: float, f1: float, f2: float) -> bool:
     """Whether the parabola through three equidistant values has its maximum between the outer two."""
     bend = f0 - 2.0 * f1 + f2
     return bend < 0.0 and abs(f2 - f0) <= -2.0 * bend
+
+
+@kernel
+def _summit(
+    f: Array, j: int, last: int, t: float, h: float, par: Array, tide: TidePanels, ws: Workspace, which: int
+) -> bool:
+    """Whether a maximum may lie beside sample `j` of ``f[: last + 1]``.
+
+    Inside the step its neighbours tell, by the parabola. At an end of the step there is one neighbour only, and a
+    maximum on the way to it shows in the slope: a point next to the end is higher than the end.
+    """
+    if 0 < j < last:
+        return _vertex_inside(f[j - 1], f[j], f[j + 1])
+    if last == 0:
+        return False
+    inside = j / N_SAMPLE + (_BESIDE if j == 0 else -_BESIDE)
+    explicit_at(inside, ws.y, N_RIGID, ws.dense, ws.ys)
+    return _rigid_values(t + inside * h, ws.ys, par, tide, ws, which) > f[j]
 
 
 @kernel
@@ -177,24 +198,26 @@ def follow_rigid(
         n = N_SAMPLE if end > 1.0 else int(np.rint(end * N_SAMPLE)) - 1
         # Extrema between the samples: of the yield function near zero, then of the friction mobilised before.
         if not unyielding and end > 1.0:
-            for j in range(1, N_SAMPLE):
+            spread = f[0].max() - f[0].min() + 0.02 * norm
+            for j in range(N_SAMPLE + 1):
                 if (
                     end > 1.0
-                    and _vertex_inside(f[0, j - 1], f[0, j], f[0, j + 1])
-                    and f[0, j] + abs(f[0, j + 1] - f[0, j - 1]) + 0.02 * norm > 0.0
+                    and f[0, j] + spread > 0.0
+                    and _summit(f[0], j, N_SAMPLE, t, h, par, tide, ws, _ONSET)
                 ):
-                    a, b = (j - 1.0) / N_SAMPLE, (j + 1.0) / N_SAMPLE
+                    a, b = max(j - 1.0, 0.0) / N_SAMPLE, min(j + 1.0, N_SAMPLE) / N_SAMPLE
                     x, value = _largest(a, b, t, h, par, tide, ws, _ONSET)
                     if value > 0.0:
                         end = x
                         n = int(np.floor(x * N_SAMPLE))
-        for j in range(1, n):
+        spread = f[1, : n + 1].max() - f[1, : n + 1].min()
+        for j in range(n + 1):
             if (
                 f[1, j] < np.inf
-                and _vertex_inside(f[1, j - 1], f[1, j], f[1, j + 1])
-                and f[1, j] + abs(f[1, j + 1] - f[1, j - 1]) > ws.mark[0]
+                and f[1, j] + spread > ws.mark[0]
+                and _summit(f[1], j, n, t, h, par, tide, ws, _FRICTION)
             ):
-                a, b = (j - 1.0) / N_SAMPLE, (j + 1.0) / N_SAMPLE
+                a, b = max(j - 1.0, 0.0) / N_SAMPLE, min(j + 1.0, n) / N_SAMPLE
                 x, value = _largest(a, b, t, h, par, tide, ws, _FRICTION)
                 if value > ws.mark[0]:
                     ws.mark[0], ws.mark[1] = value, t + x * h
