@@ -28,6 +28,9 @@ def save(name, figure):
 
 main(["flyby", "Apophis", "--output", str(IMAGES / "apophis.png")])
 
+for what in ("regions", "spin", "barrier", "failure"):
+    main(["figure", what, "--output", str(IMAGES / f"{what}.png")])
+
 figure = Figure(figsize=(6.4, 4.8), layout="constrained")
 q, v = np.linspace(1.1, 3.2, 15) * fs.R_earth, np.linspace(0, 21, 8) * u.km / u.s
 outcome_plot(figure.subplots(), outcome_map(PILE, q, v, phases=8))

@@ -21,10 +21,24 @@ STYLES = ("-", "--", ":", "-.")
 ANGLES = (1, 5, 10, 20, 30, 40)
 
 
-def _mark(axes: Any, points: Mapping[str, tuple[float, float]] | None) -> None:
-    for name, (x, y) in (points or {}).items():
-        axes.plot(x, y, "o", ms=3, color=BLACK)
-        axes.annotate(name, (x, y), xytext=(3, 3), textcoords="offset points", fontsize=7)
+def _mark(axes: Any, points: Mapping[str, tuple[float, float]], named: Sequence[str] | None) -> None:
+    """Dots; with names at those of `named`, or at all of them."""
+    count = 0
+    for name, (x, y) in points.items():
+        shown = named is None or name in named
+        axes.plot(x, y, "o", ms=4 if shown else 2, color=BLACK, mec="white", mew=0.4, zorder=5)
+        if shown:
+            left = x > 0.8
+            count += 1
+            axes.annotate(
+                name,
+                (x, y),
+                xytext=(-4 if left else 4, 3 if count % 2 else -8),
+                textcoords="offset points",
+                ha="right" if left else "left",
+                fontsize=7,
+                zorder=6,
+            )
 
 
 def axis_ratios(bodies: Mapping[str, Body]) -> dict[str, tuple[float, float]]:
@@ -39,12 +53,15 @@ def regions_plot(
     *,
     yield_surface: str = "drucker-prager",
     bodies: Mapping[str, Body] | None = None,
+    named: Sequence[str] | None = None,
     cells: int = 200,
 ) -> Any:
     """Friction angle that a shape needs at one spin ``w2 = omega^2/(pi G rho)``, in the plane of axis ratios.
 
     One contour per angle (deg): with that much friction all shapes between the contours of the same angle
-    stand. Grey: no friction suffices. The fluid shapes are at zero.
+    stand. Grey: no friction suffices. Hatched: not stable to infinitesimal pushes with exactly the friction that it
+    needs (associative flow); more friction than that stops them. The fluid shapes are at zero. `bodies` are marked by
+    their axis ratios, whatever their spin; `named` are those with a name (all by default).
     """
     ratio = np.linspace(0.05, 1.0, cells)
     table = stability_map(
@@ -53,17 +70,25 @@ def regions_plot(
         w2,
         40 * u.deg,
         yield_surface=yield_surface,
-        depth="friction",
+        depth="infinitesimal",
     )
     shape = table.level >= 0
     required = np.where(shape, np.minimum(table.required_friction_angle.to_value(u.deg), 90.0), np.nan)
     if np.nanmax(required) >= 90.0:
         axes.contourf(ratio, ratio, required, levels=[89.0, 91.0], colors=["0.8"])
+    unstable = np.where(shape & (table.curvature_at_yield < 0.0), 1.0, 0.0)
+    if unstable.any():
+        hatched = axes.contourf(ratio, ratio, unstable, levels=[0.5, 1.5], colors="none", hatches=["////"])
+        hatched.set_edgecolor("0.55")
+        hatched.set_linewidth(0.0)
     if np.nanmin(required) < max(angles):
-        lines = axes.contour(ratio, ratio, required, levels=sorted(angles), cmap="viridis", linewidths=1.2)
+        # dark to light with the angle, and numbers on the lines: legible in grey
+        lines = axes.contour(
+            ratio, ratio, required, levels=sorted(angles), cmap="viridis", linewidths=1.3, vmin=0, vmax=45
+        )
         axes.clabel(lines, fmt="%g°", fontsize=7)
     axes.plot([0, 1], [0, 1], color=BLACK, lw=0.8)
-    _mark(axes, axis_ratios(bodies or {}))
+    _mark(axes, axis_ratios(bodies or {}), named)
     axes.set_xlim(0, 1)
     axes.set_ylim(0, 1)
     axes.set_xlabel("axis ratio $a_2/a_1$")
@@ -94,6 +119,7 @@ def spin_plot(
     prolate: bool = False,
     yield_surface: str = "drucker-prager",
     bodies: Mapping[str, Body] | None = None,
+    named: Sequence[str] | None = None,
 ) -> Any:
     """Lower and upper spin limit ``omega^2/(pi G rho)`` against ``a3/a1``, one line per friction angle (deg).
 
@@ -107,7 +133,8 @@ def spin_plot(
         for j, r in enumerate(ratio):
             body = _unit_body((1.0, r, r) if prolate else (1.0, 1.0, r), rho, yield_surface)
             limits[j] = spin_limits(body, angle * u.deg).to_value(u.rad / u.s) ** 2 / (np.pi * G * rho)
-        style = {"color": shades[i % len(shades)], "ls": STYLES[i // len(shades) % len(STYLES)], "lw": 1.2}
+        # colour and line style both tell the angles apart
+        style = {"color": shades[i % len(shades)], "ls": STYLES[i % len(STYLES)], "lw": 1.2}
         axes.plot(ratio, limits[:, 1], label=f"{angle:g}°", **style)
         axes.plot(ratio, np.where(limits[:, 0] > 0, limits[:, 0], np.nan), **style)
     if not prolate:
@@ -120,18 +147,26 @@ def spin_plot(
         name: (float(b.axes[2] / b.axes[0]), float(b.omega @ b.omega / (np.pi * G * b.rho)))
         for name, b in (bodies or {}).items()
     }
-    _mark(axes, marks)
+    _mark(axes, marks, named)
     axes.set_xlabel("axis ratio $a_3/a_1$" + (" (prolate)" if prolate else " (oblate)"))
     axes.set_ylabel(r"$\omega^2/\pi G\rho$")
     axes.legend(frameon=False, fontsize=7)
     return axes
 
 
-def barrier_plot(axes: Any, body: Body, *, dilatancy: float = 1.0, longest: float = 2.0) -> Any:
-    """Energy that the weakest push loses against its strain: second order, third order, whole path."""
+def barrier_plot(axes: Any, body: Body, *, dilatancy: float = 1.0, longest: float | None = None) -> Any:
+    """Energy that a push loses against its strain: second order, third order, whole path.
+
+    Along the deviator of the push with the least barrier, up to 1.3 times its strain. The dot is the barrier: a
+    maximum, or the axis ratio of 6:1 where the model ends.
+    """
     s = stability(body, dilatancy=dilatancy)
+    ends = s.critical_strain.barrier
+    if longest is None:
+        longest = 1.3 * ends if 0.0 < ends < np.inf else 2.0
     strain = np.linspace(0.0, longest, 201)
-    p = push(body, s.direction, strain, dilatancy=dilatancy)
+    way = s.directions.barrier if np.all(np.isfinite(s.directions.barrier)) else s.direction
+    p = push(body, way, strain, dilatancy=dilatancy)
     binding = s.binding_energy.to_value(u.J)
     for loss, name, color, style in zip(
         p.loss,
@@ -141,10 +176,15 @@ def barrier_plot(axes: Any, body: Body, *, dilatancy: float = 1.0, longest: floa
         strict=True,
     ):
         axes.plot(strain, loss.to_value(u.J) / binding, color=color, ls=style, label=name)
+    if 0.0 < ends < np.inf and not s.at_apex.barrier:
+        top = s.critical_energy.barrier.to_value(u.J) / binding
+        words = {"maximum": "barrier", "edge": "barrier: the axis ratio passes 6:1"}
+        axes.plot(ends, top, "o", color=RED, zorder=5, label=words.get(s.barrier_kind, "barrier"))
     axes.set_xlabel("strain of the push")
     axes.set_ylabel("kinetic energy lost / binding energy")
-    top = max(float(p.loss.barrier.to_value(u.J).max()) / binding, 1e-12)
-    axes.set_ylim(-0.3 * top, 1.6 * top)
+    lost = p.loss.barrier.to_value(u.J) / binding
+    top = max(float(lost.max()), 1e-12)
+    axes.set_ylim(max(-0.3 * top, min(-0.03 * top, 1.1 * float(lost.min()))), 1.4 * top)
     axes.legend(frameon=False, fontsize=8)
     return axes
 
