@@ -1,6 +1,7 @@
 """Passages at fixed times on two-body orbits, for tests without an ephemeris; workers import this module."""
 
 import os
+import signal
 import sys
 import time
 
@@ -64,5 +65,7 @@ def screening(n=6, finder=three, **options):
 
 
 if __name__ == "__main__":
+    # Tests may themselves run in the background, where a shell has interrupts ignored.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     with workers(int([*sys.argv, "1"][2])) as pool:
         screening(16, slow, samples=3, seed=4).run(sys.argv[1], executor=pool, chunk=1)

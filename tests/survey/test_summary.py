@@ -18,6 +18,8 @@ ROWS = [
     {"asteroid": "lost", "verdict": "", "error": "NotConverged: x"},
 ]
 for row, n in zip(ROWS, (0, 5, 10, 0, 0), strict=True):
+    row |= {"contributors": "friction angle +0.99, size -0.10" if row.get("samples") else ""}
+    row |= {"decided_by": "dynamics" if row.get("margin", 9) < 9 else "bound"}
     row |= {"samples_dynamic": n, "friction_rise": 0.1 * n}
 for k, row in enumerate(ROWS):
     row |= {"planet": "earth", "time_tdb": "2029-04-13T21:46:00", "distance": 0.001 * (k + 1), "v_inf": 6.0}
@@ -33,7 +35,9 @@ def test_summary_counts_and_ranks(tmp_path):
     assert [str(n) for n in s.strongest["asteroid"]] == ["soft", "tight"]
     assert s.dynamic_share == pytest.approx(0.5)
     assert s.errors == {"NotConverged: x": 1}
+    assert s.contributors == {"friction angle": 3}
     text = s.text()
+    assert "follows most (passages): friction angle (3)" in text
     assert "unfinished" in text
     assert "margin -3.00 deg, 1 deg by the passage, yields in 40 % of the samples" in text
 

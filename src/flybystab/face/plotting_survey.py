@@ -9,6 +9,7 @@ import astropy.units as u
 import numpy as np
 from astropy.table import QTable
 
+from flybystab.outcome import Verdict
 from flybystab.survey.columns import VERDICTS
 from flybystab.survey.results import read_results
 from flybystab.survey.summary import summary
@@ -89,8 +90,10 @@ def inference_figure(table: QTable, path: str | Path) -> Path:
     return Path(path)
 
 
-def results_figure(results: QTable | str | Path, path: str | Path, names: int = 8) -> Path:
+def results_figure(results: QTable | str | Path, path: str | Path, names: int = 4) -> Path:
     """Plot a result table: what each passage adds to the mobilised friction, and how near that is to failure.
+
+    Named are the passages that add most (left) and those nearest to failure (right).
 
     Returns
     -------
@@ -105,16 +108,23 @@ def results_figure(results: QTable | str | Path, path: str | Path, names: int = 
     margin = table["margin"].to_value(u.deg)
     figure = _figure(10, 4.2)
     left, right = figure.subplots(1, 2)
+    stands = np.isfinite(rise) & np.isfinite(margin) & (verdict != Verdict.NOT_IN_EQUILIBRIUM)
+    bound = np.asarray(table["decided_by"], dtype=str) == "bound"
     for v in VERDICTS:
-        chosen = verdict == v
-        for panel, x, y in ((left, distance, rise), (right, rise, margin)):
-            ok = chosen & np.isfinite(x) & np.isfinite(y)
-            if ok.any():
-                panel.plot(x[ok], y[ok], ".", ms=4, color=COLOURS[v], label=f"{v} ({chosen.sum()})")
-    stands = np.isfinite(rise) & np.isfinite(margin) & (verdict != "NOT IN EQUILIBRIUM")
-    for k in np.flatnonzero(stands)[np.argsort(-rise[stands], kind="stable")][:names]:
+        for chosen, mark, how in (
+            (stands & (verdict == v) & ~bound, "o", "by the dynamics"),
+            (stands & (verdict == v) & bound, "v", "upper limit"),
+        ):
+            if chosen.any():
+                style = {"ls": "", "marker": mark, "ms": 3, "color": COLOURS[v], "alpha": 0.8}
+                left.plot(distance[chosen], rise[chosen], **style, label=f"{v}, {how} ({chosen.sum()})")
+                right.plot(rise[chosen], margin[chosen], **style)
+    exact = stands & ~bound
+    for k in np.flatnonzero(exact)[np.argsort(-rise[exact], kind="stable")][:names]:
         label = f"{table['asteroid'][k]} {str(table['time_tdb'][k])[:4]}"
         left.annotate(label, (distance[k], rise[k]), fontsize=6, xytext=(3, 2), textcoords="offset points")
+    for k in np.flatnonzero(stands)[np.argsort(margin[stands], kind="stable")][:names]:
+        label = f"{table['asteroid'][k]} {str(table['time_tdb'][k])[:4]}"
         right.annotate(label, (rise[k], margin[k]), fontsize=6, xytext=(3, 2), textcoords="offset points")
     left.set(xscale="log", yscale="log", xlabel="distance at closest approach (au)")
     left.set_ylabel("friction angle that the passage adds (deg)")
@@ -123,8 +133,11 @@ def results_figure(results: QTable | str | Path, path: str | Path, names: int = 
     right.axhline(0.0, color="0.6", lw=0.8)
     if left.get_legend_handles_labels()[0]:
         left.legend(fontsize=7)
+    out = int((verdict == Verdict.NOT_IN_EQUILIBRIUM).sum())
     figure.suptitle(
-        f"{table.meta.get('title', '')}: {len(table)} rows, {table.meta.get('ephemeris', '')}", fontsize=9
+        f"{len(table)} passages, ephemeris {table.meta.get('ephemeris', '-')}; not shown: {out} of bodies that "
+        "are not in equilibrium by themselves",
+        fontsize=9,
     )
     figure.savefig(path, dpi=150)
     return Path(path)

@@ -252,7 +252,9 @@ def wilson(successes: int, trials: int, z: float = 1.959964) -> tuple[float, flo
     centre = p + z * z / (2 * trials)
     half = z * np.sqrt(p * (1 - p) / trials + z * z / (4 * trials * trials))
     scale = 1 + z * z / trials
-    return max(0.0, (centre - half) / scale), min(1.0, (centre + half) / scale)
+    # Without rounding at the ends: no success has the lower limit zero.
+    low = 0.0 if successes == 0 else (centre - half) / scale
+    return low, 1.0 if successes == trials else (centre + half) / scale
 
 
 def contributors(inputs: dict[str, Array], outcome: Array, most: int = 3) -> str:

@@ -47,9 +47,11 @@ class Summary:
     closest : QTable
         Encounters of bodies in equilibrium that come closest to failure, worst first.
     strongest : QTable
-        Encounters of bodies in equilibrium that add most to the mobilised friction.
+        Encounters of bodies in equilibrium that add most to the mobilised friction, of those computed.
     reshaped : QTable
         Encounters in which any sample, or the catalogue body, yields.
+    contributors : dict of str to int
+        Inputs that the margin of a passage follows most, with the number of passages.
     errors : dict of str to int
         Reasons of failure.
     meta : dict
@@ -64,6 +66,7 @@ class Summary:
     closest: QTable
     strongest: QTable
     reshaped: QTable
+    contributors: dict[str, int]
     errors: dict[str, int]
     meta: dict[str, Any]
 
@@ -80,6 +83,9 @@ class Summary:
         lines += [f"  {name}: {n}" for name, n in self.verdicts.items()]
         if self.samples:
             lines.append(f"{self.samples} samples, {100 * self.dynamic_share:.2g} % of them by the dynamics")
+        if self.contributors:
+            most = ", ".join(f"{name} ({n})" for name, n in self.contributors.items())
+            lines.append(f"the margin follows most (passages): {most}")
         for title, table in (
             ("closest to failure", self.closest),
             ("most loaded by the passage", self.strongest),
@@ -113,7 +119,7 @@ def summary(results: QTable | str | Path, closest: int = 10) -> Summary:
         The file cannot be read, or is no table of encounters.
     """
     table = results if isinstance(results, QTable) else read_results(results)
-    missing = [c for c in (*SHORT, "samples", "error") if c not in table.colnames]
+    missing = [c for c in (*SHORT, "decided_by", "samples", "error") if c not in table.colnames]
     if missing:
         raise InvalidInput("result table", ", ".join(table.colnames[:5]), f"one with the columns {missing}")
     verdict = np.asarray(table["verdict"], dtype=str)
@@ -125,9 +131,15 @@ def summary(results: QTable | str | Path, closest: int = 10) -> Summary:
     order = order[stands[order]]
     rise = np.nan_to_num(np.asarray(table["friction_rise"].to_value(u.deg)), posinf=1e9)
     loaded = np.argsort(-rise, kind="stable")
-    loaded = loaded[stands[loaded]]
+    computed = np.asarray(table["decided_by"], dtype=str) == "dynamics"  # not upper limits
+    loaded = loaded[(stands & computed)[loaded]]
     touched = stands & ((verdict != Verdict.INTACT) | (yields > 0.0))
     counts = Counter(verdict[~failed])
+    first = (
+        Counter(str(c).split(", ")[0].rpartition(" ")[0] for c in table["contributors"] if c)
+        if "contributors" in table.colnames
+        else Counter()
+    )
     errors = Counter(e for e in np.asarray(table["error"], dtype=str) if e)
     return Summary(
         rows=len(table),
@@ -138,6 +150,7 @@ def summary(results: QTable | str | Path, closest: int = 10) -> Summary:
         closest=table[order[:closest]][list(SHORT)],
         strongest=table[loaded[:closest]][list(SHORT)],
         reshaped=table[order[touched[order]]][list(SHORT)],
+        contributors=dict(first.most_common(4)),
         errors=dict(errors.most_common(10)),
         meta=dict(table.meta),
     )

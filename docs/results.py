@@ -1,0 +1,282 @@
+"""Make docs/results.md and its figures: ``python docs/results.py [--jobs N] [--data DIRECTORY] [--keep]``.
+
+Three screenings, whose tables stay in ``out/results``: the embedded catalogue and, where the source tables are
+(``../shared/data`` by default), JPL's full-precision orbits of 4,056 asteroids until 2050, and the past. ``--keep``
+takes finished tables as they are and only writes the page again.
+"""
+
+import argparse
+import time
+from pathlib import Path
+
+import astropy.units as u
+import numpy as np
+from astropy.time import Time
+
+from flybystab.face.plotting_survey import inference_figure, results_figure
+from flybystab.survey.asteroid import Asteroid
+from flybystab.survey.catalogue import catalogue
+from flybystab.survey.columns import YIELDED
+from flybystab.survey.executors import workers
+from flybystab.survey.inference import infer, survived
+from flybystab.survey.population import Population
+from flybystab.survey.progress import ProgressBar
+from flybystab.survey.results import read_results
+from flybystab.survey.screening import Screening, listed, settings
+from flybystab.survey.summary import summary
+
+ROOT = Path(__file__).resolve().parents[1]
+OUT = ROOT / "out" / "results"
+NEW, OLD = "nea_sbdb_fullprec_2026-07.csv.gz", "nea_sbdb_fullprec_2020-09.csv.gz"
+SAMPLES = 100
+#: A pile without strength that turns slowly: what the tide could do at most.
+WEAK = {"cohesion_Pa": 0, "spin_period_h": {"kind": "uniform", "low": 4, "high": 12}, "replace_assumed": True}
+#: Name: catalogue (None: embedded), dates, largest distance (au), population.
+RUNS = {
+    "embedded": (None, "2026-01-01", "2050-01-01", 0.05, {}),
+    "full": (NEW, "2026-01-01", "2050-01-01", 0.05, {}),
+    "past": (None, "1950-01-01", "2026-01-01", 0.05, {}),
+    "deep": (OLD, "2000-01-01", "2021-01-01", 0.001, {}),
+    "weak": (OLD, "2000-01-01", "2021-01-01", 0.001, WEAK),
+}
+#: Passages that a reader may look for.
+FAMOUS = [
+    ("Apophis", "2029-04"),
+    ("Toutatis", "2004-09"),
+    ("Duende", "2013-02"),
+    ("YORP", "2005-07"),
+    ("2005 YU55", "2011-11"),
+    ("2002 MN", "2002-06"),
+    ("2008 TC3", "2008-10"),
+    ("2012 TC4", "2017-10"),
+    ("2019 OK", "2019-07"),
+    ("Florence", "2017-09"),
+    ("2014 HQ124", "2014-06"),
+    ("1999 AN10", "2027-08"),
+    ("1997 XF11", "2028-10"),
+    ("2001 WN5", "2028-06"),
+]
+
+
+def run(name, data, jobs, keep):
+    """The table of one screening, and the seconds it took (nan if it was there)."""
+    file, start, stop, within, population = RUNS[name]
+    path = OUT / f"{name}.ecsv"
+    if keep and path.exists():
+        return read_results(path), np.nan
+    chosen = listed(None if file is None else data / file)
+    if name == "weak":  # no period of the LCDB: all turn slowly
+        chosen = catalogue(data / file)
+    screening = Screening(
+        chosen,
+        settings(
+            start,
+            stop,
+            within=within * u.au,
+            samples=SAMPLES,
+            population=Population.from_mapping(population),
+        ),
+    )
+    began = time.monotonic()
+    with workers(jobs) as pool:
+        screening.run(path, executor=pool, progress=ProgressBar())
+    seconds = time.monotonic() - began
+    (OUT / f"{name}.seconds").write_text(f"{seconds:.1f} {jobs}\n")
+    return read_results(path), seconds
+
+
+def counts(table):
+    s = summary(table)
+    words = ", ".join(f"{n} {v}" for v, n in s.verdicts.items())
+    return (
+        f"{s.rows} passages: {words}" + (f"; {s.failed} not computed" if s.failed else "") + f". {s.samples} "
+        f"samples, {s.samples_dynamic} of them ({100 * s.dynamic_share:.2g} %) by the dynamics."
+    )
+
+
+def passages(table, order):
+    """A table of passages in Markdown."""
+    head = (
+        "| asteroid | date (TDB) | distance (km) | v_inf (km/s) | verdict | margin (deg) | passage adds (deg) "
+        "| P(yield), 95 % | follows most |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
+    )
+    rows = []
+    for k in order:
+        r = table[int(k)]
+        p = f"{r['p_yield']:.2g} ({r['p_yield_low']:.2g}-{r['p_yield_high']:.2g})"
+        adds = number(r["friction_rise"].to_value(u.deg), 3).replace("-0.000", "0.000")
+        adds = "< 0.010" if r["decided_by"] == "bound" and adds != "-" else adds
+        rows.append(
+            f"| {r['asteroid']} | {r['time_tdb'][:16].replace('T', ' ')} | {r['distance'].to_value(u.km):,.0f} "
+            f"| {r['v_inf'].to_value(u.km / u.s):.2f} | {r['verdict']} | {number(r['margin'].to_value(u.deg))} "
+            f"| {adds} | {p if np.isfinite(r['p_yield']) else '-'} "
+            f"| {r['contributors'] or '-'} |"
+        )
+    return head + "\n".join(rows) + "\n"
+
+
+def number(x, digits=2):
+    if np.isnan(x):
+        return "-"
+    return f"{x:.{digits}f}" if np.isfinite(x) else "beyond any" if x > 0 else "none is enough"
+
+
+def standing(table):
+    return (table["verdict"] != "NOT IN EQUILIBRIUM") & (table["verdict"] != "")
+
+
+def closest(table, n=10):
+    """Passages of bodies that stand, nearest to failure first: by the probability to yield, then the margin."""
+    p = np.nan_to_num(np.asarray(table["p_yield"], dtype=float))
+    order = np.lexsort((table["margin"].value, -p))
+    return [k for k in order if standing(table)[k]][:n]
+
+
+def loaded(table, n=10):
+    """Passages that add most; only what is computed counts, not upper limits."""
+    rise = np.nan_to_num(table["friction_rise"].to_value(u.deg), nan=-1.0, posinf=1e9)
+    computed = standing(table) & (table["decided_by"] == "dynamics")
+    return [k for k in np.argsort(-rise, kind="stable") if computed[k]][:n]
+
+
+def reshaped(table):
+    p = np.nan_to_num(np.asarray(table["p_yield"], dtype=float))
+    touched = standing(table) & (np.isin(table["verdict"], YIELDED) | (p > 0.0))
+    return [k for k in closest(table, len(table)) if touched[k]]
+
+
+def famous(*tables):
+    text = ""
+    for name, month in FAMOUS:
+        for table in tables:
+            same = [
+                k
+                for k in range(len(table))
+                if table["asteroid"][k] == name and table["time_tdb"][k].startswith(month)
+            ]
+            if same:
+                body = passages(table, same).split("\n")
+                text += "\n".join(body[:3] if not text else body[2:3]) + "\n"
+                break
+    return text
+
+
+def bounds():
+    """What survival says of four bodies, with a figure of each."""
+    text = ""
+    for name in ("Anteros", "Toutatis", "Duende", "Geographos"):
+        asteroid = Asteroid.from_catalogue(name)
+
+        found = survived(asteroid, Time("1950-01-01", scale="tdb"), Time("2026-01-01", scale="tdb"))
+        table = infer(asteroid, found)
+        inference_figure(table, ROOT / "docs" / "images" / f"infer_{name.lower()}.png")
+        strongest = max(table.meta["passages"], key=lambda p: p["adds_at_worst_attitude_deg"], default=None)
+        at = table[(table["cohesion"] == 0 * u.Pa) & (table["density"] == 2000 * u.kg / u.m**3)][0]
+        rest, any_, every = (
+            number(at[f"friction_{n}"].to_value(u.deg))
+            for n in ("equilibrium", "any_attitude", "every_attitude")
+        )
+        what = (
+            "no passage within 0.05 au since 1950"
+            if strongest is None
+            else f"{strongest['passage']}: adds {strongest['adds_at_worst_attitude_deg']:.2f} deg at the worst "
+            f"attitude, {strongest['adds_at_any_attitude_deg']:.2f} deg whatever it was"
+        )
+        text += f"| {asteroid.label} | {rest} | {any_} | {every} | {what} |\n"
+    head = (
+        "| body | shape and spin | passages, whatever the attitude | enough at every attitude | strongest passage |"
+        "\n| --- | --- | --- | --- | --- |\n"
+    )
+    return head + text
+
+
+def wall(name):
+    seconds, jobs = (OUT / f"{name}.seconds").read_text().split()
+    return f"{float(seconds):.0f} s on {jobs} worker{'s' if jobs != '1' else ''}"
+
+
+def main():
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--data", type=Path, default=ROOT.parent / "shared" / "data")
+    parser.add_argument("--keep", action="store_true")
+    args = parser.parse_args()
+    OUT.mkdir(parents=True, exist_ok=True)
+    tables = {name: run(name, args.data, args.jobs, args.keep)[0] for name in RUNS}
+    for name in ("full", "weak"):
+        results_figure(tables[name], ROOT / "docs" / "images" / f"results_{name}.png")
+    embedded, full, past, deep, weak = (tables[n] for n in RUNS)
+    touched = reshaped(full)
+    spun = [k for k in range(len(full)) if full["verdict"][k] == "NOT IN EQUILIBRIUM"]
+    hit = reshaped(weak)
+    page = f"""# Results
+
+Made by `python docs/results.py` on orbits of {full["catalogue"][0].rsplit("/")[-1]} (JPL, epoch mostly
+JD 2461200.5) and the embedded catalogue, ephemeris {full["ephemeris"][0]}. Each passage: the catalogue body with
+35 deg of friction and no cohesion, and
+{SAMPLES} samples of what is not known, seed 0.
+*Margin*: friction angle less the largest mobilised;
+*passage adds*: what the passage adds to the angle mobilised at rest; both are bounds where the quick bound decides.
+*P(yield)*: share of the samples that can exist and then flow or hit the planet, with its Wilson interval.
+*Follows most*: inputs whose ranks the margin follows, with rank correlations.
+
+Drawn from: {"; ".join(f"{k} {v}" for k, v in Population().stated().items())}.
+
+## Embedded catalogue, 2026 to 2050
+
+`flybystab screen --from 2026-01-01 --to 2050-01-01 --samples {SAMPLES} --jobs 2`: {wall("embedded")}.
+{counts(embedded)}
+
+{passages(embedded, closest(embedded))}
+## Full-precision catalogue, 2026 to 2050: closest to failure
+
+4,056 asteroids, Earth, within 0.05 au: {wall("full")}. {counts(full)}
+
+{passages(full, closest(full))}
+Passages that add more than 0.010 deg, as far as there are ten:
+
+{passages(full, [k for k in loaded(full) if full["friction_rise"][k] > 0.01 * u.deg])}
+Bodies that the dynamics reshapes at any sampled attitude: {len(touched) or "none"}.
+{passages(full, touched[:20]) if touched else ""}
+Not in equilibrium without cohesion, whatever passes by: {len(spun)} passages of
+{len({full["asteroid"][k] for k in spun})} bodies, which turn too fast for a cohesionless pile.
+
+![Full-precision catalogue](images/results_full.png)
+
+## Passages to know
+
+{famous(embedded, past, full, deep)}
+Of the embedded catalogue since 1950 ({counts(past)[:-1].lower()}), these added most:
+
+{passages(past, [k for k in loaded(past) if past["friction_rise"][k] > 0.01 * u.deg])}
+## Deep passages, 2000 to 2020
+
+{len(deep)} passages within 0.001 au (150,000 km) in JPL's catalogue of September 2020, mostly of bodies of a few to
+tens of metres whose shape, spin and density are drawn: {wall("deep")}. {counts(deep)}
+Bodies of that size turn in minutes and need cohesion to exist; the samples that have it, up to 100 Pa, feel nothing.
+
+What the tide could do at most is seen on slow piles without strength, `{WEAK}`:
+{counts(weak)} Passages in which any sample yields ({len(hit)}), worst first:
+
+{passages(weak, hit[:20])}
+![Slow piles without strength in deep passages](images/results_weak.png)
+
+## What survival says of four bodies
+
+Least friction angle (deg) without cohesion at 2000 kg/m3 (`flybystab infer NAME --output FILE`); the figures give it
+over density and cohesion.
+
+{bounds()}
+![Anteros](images/infer_anteros.png)
+![Duende](images/infer_duende.png)
+![Geographos](images/infer_geographos.png)
+![Toutatis](images/infer_toutatis.png)
+"""
+    (ROOT / "docs" / "results.md").write_text("\n".join(line.rstrip() for line in page.splitlines()) + "\n")
+    print(ROOT / "docs" / "results.md")
+
+
+if __name__ == "__main__":
+    main()
