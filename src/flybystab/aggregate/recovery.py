@@ -16,6 +16,7 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.aggregate.body import Body
+from flybystab.aggregate.stability import unit_deviator
 from flybystab.constants import G
 from flybystab.core.energy import velocity_gradient
 from flybystab.core.passage import Passage, passage
@@ -145,19 +146,12 @@ def _dilatancy(body: Body, dilatancy: float | None) -> float:
 
 
 def _push(body: Body, direction: Any, energy: float, dilatancy: float, tolerance: float) -> Passage:
-    d = to_si(direction, u.dimensionless_unscaled, "direction", shape=(3, 3))
-    d = 0.5 * (d + d.T)
-    d = d - np.trace(d) / 3.0 * np.eye(3)
-    size = np.linalg.norm(d)
-    if size == 0.0:
-        raise InvalidInput("direction", direction, "a rate of strain with a deviator")
+    d = unit_deviator(direction)
     m = body.material
     beta = dilatancy * least_slope(m.surface_code, np.sin(m.phi))
     squares = body.axes**2
     gradient = np.empty((3, 3))
-    velocity_gradient(
-        squares[0], squares[1], squares[2], components(d / size + beta / 3.0 * np.eye(3)), gradient
-    )
+    velocity_gradient(squares[0], squares[1], squares[2], components(d + beta / 3.0 * np.eye(3)), gradient)
     # K = tr(L I L^T)/2 with I = (m/5) S
     unit = body.mass.value / 10.0 * float(np.trace(gradient @ np.diag(squares) @ gradient.T))
     limit = max(EDGE, 1.001 * body.axes[0] / body.axes[2])

@@ -279,13 +279,7 @@ def push(body: Body, direction: Any, strain: Any, *, dilatancy: float = 1.0) -> 
     -------
     Push
     """
-    d = to_si(direction, u.dimensionless_unscaled, "direction", shape=(3, 3))
-    d = 0.5 * (d + d.T)
-    d = d - np.trace(d) / 3.0 * np.eye(3)
-    size = np.linalg.norm(d)
-    if size == 0.0:
-        raise InvalidInput("direction", direction, "a rate of strain with a deviator")
-    d = d / size
+    d = unit_deviator(direction)
     r2, r6 = np.sqrt(2.0), np.sqrt(6.0)
     x = np.array(
         [
@@ -352,3 +346,14 @@ def _strain_rate(scene: Any, x: Array) -> tuple[Array, bool]:
 def _inverse_radius(body: Body) -> float:
     """``R_F(a1^2, a2^2, a3^2)``, 1/m."""
     return float(carlson_fd(*(body.axes**2))[0])
+
+
+def unit_deviator(direction: Any) -> Array:
+    """Deviator (3, 3) of the symmetric part of a rate of strain, scaled to ``|D'| = 1``."""
+    d = to_si(direction, u.dimensionless_unscaled, "direction", shape=(3, 3))
+    d = 0.5 * (d + d.T)
+    d = d - np.trace(d) / 3.0 * np.eye(3)
+    size = np.linalg.norm(d)
+    if size == 0.0:
+        raise InvalidInput("direction", direction, "a rate of strain with a deviator")
+    return d / size
