@@ -58,7 +58,8 @@ class History:
 
 @dataclass(frozen=True)
 class FlybyError:
-    """Measured error of a result: its difference from a run with a 30 times larger step tolerance.
+    """Measured error of a result: its difference from a run with a 30 times larger step tolerance, or a 30 times
+    smaller one where that one does not converge.
 
     Attributes
     ----------

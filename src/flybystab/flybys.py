@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, NamedTuple
 
@@ -20,6 +20,7 @@ from flybystab.errors import FlybystabError, InvalidInput, NotConverged
 from flybystab.flyby_results import FlybyError, FlybyResult, FlybyTable, History
 from flybystab.outcome import Verdict, bound_fraction, classed
 from flybystab.sky.encounter import TAIL, Encounter
+from flybystab.units import to_si
 
 Array = NDArray[np.float64]
 
@@ -77,8 +78,8 @@ def flyby(
         raise InvalidInput("body", body, "a flybystab.Body")
     if not isinstance(encounter, Encounter):
         raise InvalidInput("encounter", encounter, "a flybystab.Encounter")
-    if not 1e-13 <= tolerance <= 1e-3:
-        raise InvalidInput("tolerance", tolerance, "a number in [1e-13, 1e-3]")
+    tolerance = to_si(tolerance, u.dimensionless_unscaled, "tolerance", low=1e-13, high=1e-3)
+    max_axis_ratio = _axis_ratio(max_axis_ratio)
     rotation = periapsis_axes(encounter).T @ _rotation(attitude)
 
     def carried(tol: float, keep: int = 0) -> _Carried:
@@ -96,7 +97,7 @@ def flyby(
             verdicts[other] = _verdict(same_run, encounter, same, holds)[0]
     measured = None
     if error:
-        loose = carried(min(1e-3, tolerance * LOOSER))
+        loose = _compared(carried, tolerance)
         difference = 0.0 if main.friction == loose.friction else abs(main.friction - loose.friction)
         measured = FlybyError(
             semi_axes=float(np.max(np.abs(_axes(loose.run.shape) / _axes(run.shape) - 1.0))),
@@ -139,6 +140,22 @@ def flyby(
         left_out=encounter.left_out,
         encounter=encounter,
     )
+
+
+def _axis_ratio(value: Any) -> float:
+    """The largest axis ratio, checked; infinite for no limit."""
+    ratio = float(value) if isinstance(value, int | float | np.number) else np.nan
+    if not ratio > 1.0:
+        raise InvalidInput("max_axis_ratio", value, "a number above 1")
+    return ratio
+
+
+def _compared(carried: Callable[[float], _Carried], tolerance: float) -> _Carried:
+    """The run that measures the error: a looser one, or a tighter one where flow stalls the looser."""
+    try:
+        return carried(min(1e-3, tolerance * LOOSER))
+    except NotConverged:
+        return carried(max(1e-13, tolerance / LOOSER))
 
 
 class _Carried(NamedTuple):

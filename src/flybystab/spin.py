@@ -11,9 +11,9 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.aggregate.body import Body, Material
-from flybystab.errors import InvalidInput
 from flybystab.flybys import TOLERANCE, flyby_many, periapsis_axes
 from flybystab.sky.encounter import Encounter
+from flybystab.units import whole
 
 Array = NDArray[np.float64]
 
@@ -93,7 +93,7 @@ def spin_sample(
     Raises
     ------
     InvalidInput
-        If `n` is not positive.
+        If `n` is not a positive whole number, or `seed` a negative one.
     """
     known = not isinstance(asteroid, Body) and asteroid.pole is not None and encounter.frame == "ICRF"
     bodies, rotations = spin_states(asteroid, n, seed, material, use_pole=known)
@@ -122,8 +122,7 @@ def spin_states(
     use_pole : bool
         Whether the catalogue's pole counts.
     """
-    if n < 1:
-        raise InvalidInput("n", n, "at least one attitude")
+    n, seed = whole(n, "n", 1), whole(seed, "seed", 0)
     bodies, rotations = [], []
     for turn, phase, height, longitude in np.random.default_rng(seed).random((n, 4)):
         if isinstance(asteroid, Body):

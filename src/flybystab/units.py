@@ -48,7 +48,7 @@ def to_si(
     UnitMismatch
         Wrong dimension, or no unit at all.
     InvalidInput
-        Wrong shape, not finite, or out of range.
+        Wrong shape, masked (missing), not finite, or out of range.
     """
     if not isinstance(value, Quantity):
         if unit != u.dimensionless_unscaled:
@@ -57,8 +57,11 @@ def to_si(
             value = np.asarray(value, dtype=float) * u.dimensionless_unscaled
         except (TypeError, ValueError):
             raise InvalidInput(name, value, "a number") from None
+    if np.any(getattr(value, "mask", False)):
+        raise InvalidInput(name, value, "values that are there: some are masked (missing)")
     try:
-        array = np.asarray(value.to_value(unit), dtype=float)
+        # A copy: what the caller does to the array afterwards is not ours.
+        array = np.array(value.to_value(unit), dtype=float)
     except u.UnitConversionError:
         raise UnitMismatch(name, value, f"a unit that converts to {unit}") from None
     if shape is not None and array.shape != shape:
@@ -71,6 +74,26 @@ def to_si(
         span = f"{'(' if open_low else '['}{low:g}, {high:g}{')' if open_high else ']'}"
         raise InvalidInput(name, value, f"a value in {span} {unit}".rstrip())
     return float(array) if shape == () else array
+
+
+def whole(value: Any, name: str, least: int) -> int:
+    """A whole number of at least `least`.
+
+    Raises
+    ------
+    InvalidInput
+        For anything else, booleans included.
+    """
+    if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
+        raise InvalidInput(name, value, f"a whole number, {least} or more")
+    return int(value)
+
+
+def frozen(value: Quantity) -> Quantity:
+    """A read-only copy in the same unit, for objects that must not change."""
+    copy = Quantity(value, copy=True)
+    copy.setflags(write=False)
+    return copy
 
 
 #: Equatorial radius of the Earth as a quantity, for scripts: ``periapsis=2.2 * fs.R_earth``.

@@ -8,9 +8,10 @@ from scipy.spatial.transform import Rotation
 
 from flybystab.aggregate.body import Body, Material
 from flybystab.constants import G
-from flybystab.errors import InvalidInput, UnitMismatch, UnknownName
+from flybystab.errors import InvalidInput, NotConverged, UnitMismatch, UnknownName
 from flybystab.flybys import flyby, flyby_many, periapsis_axes
 from flybystab.outcome import bound_fraction, classed
+from flybystab.spin import spin_sample
 
 
 def test_intact_with_margin():
@@ -212,3 +213,46 @@ def test_bound_fraction_against_sampling():
 )
 def test_class_edges_belong_to_the_heavier_class(bound, verdict, letter):
     assert classed(bound) == (verdict, letter)
+
+
+@pytest.mark.parametrize("ratio", [-5, 0, 1, np.nan, "6"])
+def test_an_axis_ratio_is_above_one(ratio):
+    with pytest.raises(InvalidInput, match="max_axis_ratio"):
+        flyby(PILE, earth(3.0), max_axis_ratio=ratio)
+
+
+@pytest.mark.parametrize("tolerance", ["x", 1e-2, 0.0])
+def test_tolerance_in_its_range(tolerance):
+    with pytest.raises(InvalidInput, match="tolerance"):
+        flyby(PILE, earth(3.0), tolerance=tolerance)
+
+
+def test_a_number_without_dimension_is_a_tolerance():
+    runs = [flyby(PILE, earth(3.0), tolerance=t, error=False, history=False) for t in (1e-6, 1e-6 * u.one)]
+    assert runs[0].max_required_friction_angle == runs[1].max_required_friction_angle
+
+
+def test_a_stalled_looser_run_costs_no_answer(monkeypatch):
+    """The error is then measured by a tighter run."""
+    import flybystab.flybys as flybys
+
+    asked = []
+    real = flybys._run
+
+    def stalls(body, encounter, rotation, tolerance, *rest, **options):
+        asked.append(tolerance)
+        if tolerance > 1e-7:
+            raise NotConverged("stalled")
+        return real(body, encounter, rotation, tolerance, *rest, **options)
+
+    monkeypatch.setattr(flybys, "_run", stalls)
+    r = flyby(PILE, earth(2.2), tolerance=1e-8)
+    assert r.verdict == "RESHAPED"
+    assert 0.0 < r.error.semi_axes < 1e-6
+    assert min(asked) < 1e-9
+
+
+@pytest.mark.parametrize(("name", "value"), [("n", 0), ("n", 1.5), ("n", "3"), ("seed", -1), ("seed", "a")])
+def test_samples_are_counted_in_whole_numbers(name, value):
+    with pytest.raises(InvalidInput, match=f"{name} = "):
+        spin_sample(PILE, earth(3.0), **{"n": 2, name: value})

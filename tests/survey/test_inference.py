@@ -129,3 +129,8 @@ def test_figure_and_bad_input(tmp_path):
         infer(a, attitudes=0)
     with pytest.raises(InvalidInput, match="cohesions"):
         infer(a, cohesions=[np.nan] * u.Pa)
+
+
+def test_a_name_is_not_an_asteroid():
+    with pytest.raises(InvalidInput, match="from_catalogue"):
+        infer("Toutatis")

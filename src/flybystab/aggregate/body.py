@@ -12,8 +12,8 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.constants import G
-from flybystab.errors import InvalidInput, UnknownName
-from flybystab.units import to_si
+from flybystab.errors import InvalidInput, UnitMismatch, UnknownName
+from flybystab.units import frozen, to_si
 
 #: Yield surfaces, in the order of their integer codes in :mod:`flybystab.core.rheology`.
 YIELD_SURFACES = ("drucker-prager", "drucker-prager-extension", "mohr-coulomb", "matsuoka-nakai")
@@ -63,6 +63,8 @@ class Material:
         if self.yield_surface not in YIELD_SURFACES:
             near = get_close_matches(str(self.yield_surface), YIELD_SURFACES, cutoff=0.4)
             raise UnknownName("yield surface", str(self.yield_surface), near, f"(known: {YIELD_SURFACES})")
+        if not isinstance(self.brittle, bool | np.bool_):
+            raise InvalidInput("brittle", self.brittle, "True or False")
         if self.bulk_modulus is not None:
             to_si(self.bulk_modulus, u.Pa, "bulk_modulus", low=0.0)
 
@@ -76,7 +78,7 @@ class Material:
         return replace(self, **changes)
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Body:
     """A homogeneous ellipsoid of granular material.
 
@@ -132,9 +134,14 @@ class Body:
                 )
             omega[2] = 2.0 * np.pi / period
         elif self.spin is not None:
+            if u.Hz in getattr(getattr(self.spin, "unit", None), "bases", ()):
+                raise UnitMismatch("spin", self.spin, "rad / s: hertz may count turns or radians")
             with u.set_enabled_equivalencies(u.dimensionless_angles()):
-                omega = to_si(self.spin, u.rad / u.s, "spin", shape=(3,)).copy()
+                omega = to_si(self.spin, u.rad / u.s, "spin", shape=(3,))
         rho = to_si(self.density, u.kg / u.m**3, "density", low=0.0, open_low=True)
+        for name in ("semi_axes", "density", "spin_period", "spin"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, frozen(getattr(self, name)))
         for name, value in (("axes", axes), ("rho", rho), ("omega", omega)):
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)

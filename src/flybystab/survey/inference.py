@@ -28,7 +28,7 @@ from flybystab.survey.attitude import attitude_matrix, isotropic_direction
 from flybystab.survey.catalogue import Asteroid
 from flybystab.survey.draws import identity, stream
 from flybystab.survey.quick import quick_margins, tide_size
-from flybystab.units import to_si
+from flybystab.units import to_si, whole
 
 _TOLERANCE = 1e-7
 #: A passage that adds less than this is not followed, rad.
@@ -81,8 +81,11 @@ def infer(
     )
     if np.any(rho <= 0.0):
         raise InvalidInput("densities", densities, "positive values")
-    if isinstance(attitudes, bool) or not isinstance(attitudes, int) or attitudes < 1:
-        raise InvalidInput("attitudes", attitudes, "a whole number, 1 or more")
+    whole(attitudes, "attitudes", 1)
+    if not isinstance(asteroid, Asteroid | Body):
+        raise InvalidInput(
+            "asteroid", asteroid, "an Asteroid (Asteroid.from_catalogue finds a name) or a Body"
+        )
     code = Material(yield_surface=yield_surface).surface_code
     bodies, turns = _attitudes(asteroid, attitudes, seed)
     cohesion = _cohesions(bodies[0]) if cohesions is None else _grid(cohesions, u.Pa, "cohesions")

@@ -41,7 +41,7 @@ from flybystab.survey.judging import Judged, Passage, contributors, inputs, judg
 from flybystab.survey.population import Population
 from flybystab.survey.results import Journal, check_output, table_of, write_rows
 from flybystab.survey.spread import Spread, spread
-from flybystab.units import to_si
+from flybystab.units import to_si, whole
 
 Array = NDArray[np.float64]
 
@@ -532,8 +532,7 @@ def settings(
     if not dates[0] < dates[1]:
         raise InvalidInput("stop", stop, f"a date after start = {start}")
     for name, number, least in (("samples", samples, 1), ("seed", seed, 0)):
-        if isinstance(number, bool) or not isinstance(number, int | np.integer) or number < least:
-            raise InvalidInput(name, number, f"a whole number, {least} or more")
+        whole(number, name, least)
     ephemeris().check(*(Time(d, format="jd", scale="tdb") for d in dates))
     names = (planets,) if isinstance(planets, str) else tuple(planets)
     if not names:
