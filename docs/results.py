@@ -18,7 +18,7 @@ from flybystab.survey.asteroid import Asteroid
 from flybystab.survey.catalogue import catalogue
 from flybystab.survey.columns import YIELDED
 from flybystab.survey.executors import workers
-from flybystab.survey.inference import infer, survived
+from flybystab.survey.inference import infer, strongest_passage, survived
 from flybystab.survey.population import Population
 from flybystab.survey.progress import ProgressBar
 from flybystab.survey.results import read_results
@@ -170,7 +170,7 @@ def bounds():
         found = survived(asteroid, Time("1950-01-01", scale="tdb"), Time("2026-01-01", scale="tdb"))
         table = infer(asteroid, found)
         inference_figure(table, ROOT / "docs" / "images" / f"infer_{name.lower()}.png")
-        strongest = max(table.meta["passages"], key=lambda p: p["adds_at_worst_attitude_deg"], default=None)
+        strongest = strongest_passage(table)
         at = table[(table["cohesion"] == 0 * u.Pa) & (table["density"] == 2000 * u.kg / u.m**3)][0]
         rest, any_, every = (
             number(at[f"friction_{n}"].to_value(u.deg))

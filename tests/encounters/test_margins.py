@@ -83,7 +83,7 @@ def test_a_slide_is_a_small_flow():
 
 
 def test_expectation_against_the_dynamics_on_a_grid():
-    """`benchmarks/margin.py` counts over 648 encounters: wrong in 4 %, mostly too safe."""
+    """`benchmarks/margin.py` counts over 1,296 encounters: wrong in 4 %, mostly too safe."""
     wrong, outcomes = 0, set()
     for q in (1.3, 1.7, 2.0, 2.3, 2.6):
         for v in (5.0, 15.0):

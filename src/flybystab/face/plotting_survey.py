@@ -11,6 +11,7 @@ from astropy.table import QTable
 
 from flybystab.outcome import Verdict
 from flybystab.survey.columns import VERDICTS
+from flybystab.survey.inference import strongest_passage
 from flybystab.survey.results import read_results
 from flybystab.survey.summary import summary
 
@@ -80,11 +81,9 @@ def inference_figure(table: QTable, path: str | Path) -> Path:
         figure.colorbar(filled, ax=list(panels), label="least friction (deg); hatched: none")
     axes = " x ".join(f"{2 * a:.0f}" for a in table.meta.get("semi_axes_m", []))
     title = f"{table.meta.get('asteroid', '')}: {axes} m, {table.meta.get('spin_period_h', np.nan):.4g} h"
-    strongest = max(
-        table.meta.get("passages", []), key=lambda p: p["adds_at_worst_attitude_deg"], default=None
-    )
+    strongest = strongest_passage(table)
     if strongest is not None:
-        title += f"; strongest passage: {strongest['passage']}"
+        title += f"; strongest tide: {strongest['passage']}"
     figure.suptitle(title, fontsize=9)
     figure.savefig(path, dpi=150)
     return Path(path)

@@ -11,6 +11,7 @@ shape.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import astropy.units as u
 import numpy as np
@@ -125,6 +126,7 @@ def infer(
         "passages": [
             {
                 "passage": _label(e),
+                "tide_s-2": float(sizes[k][0]),
                 "followed": bool(followed[k]),
                 "adds_at_any_attitude_deg": _largest(needs[..., k, 0] - rest),
                 "adds_at_worst_attitude_deg": _largest(needs[..., k, 1] - rest),
@@ -138,6 +140,14 @@ def infer(
         "reading": "bounds from passages hold for a body that has kept its shape since",
     }
     return table
+
+
+def strongest_passage(table: QTable) -> dict[str, Any] | None:
+    """The passage with the strongest tide out of ``meta["passages"]``; None without passages.
+
+    Not the one that adds most: what a passage adds may be a bound, which says nothing of the order.
+    """
+    return max(table.meta.get("passages", []), key=lambda p: p["tide_s-2"], default=None)
 
 
 def _largest(rise: np.ndarray) -> float:

@@ -47,7 +47,7 @@ def rows(figure: str | Path | None = None, samples: int = 200) -> list[dict[str,
             found = run(tolerance, quick)
             wall = time.perf_counter() - start
             both = found.dynamic & np.isfinite(found.margin) & np.isfinite(truth.margin)
-            error = np.rad2deg(np.abs(found.margin - truth.margin)[both])
+            error = np.rad2deg(np.abs(found.margin[both] - truth.margin[both]))
             out.append(
                 {
                     "periapsis_R_earth": distance,
