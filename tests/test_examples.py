@@ -49,6 +49,20 @@ def test_anteros_bounds():
     assert ran("anteros_bounds.py")["worst"] < 1e-9
 
 
+def test_bounds_of_four():
+    """Mean tension on the side of its closed form; the cohesion of 1950 DA meets the published one."""
+    found = ran("bounds_of_four.py")["found"]
+    for nominal, _, balance, density in found.values():
+        assert nominal.in_tension == (density < balance)
+    assert [name for name, row in found.items() if row[0].in_tension] == ["1950 DA"]
+    # Rozitis, MacLennan & Emery 2014: 64 (+12, -20) Pa
+    low, mid, high = found["1950 DA"][1].quantiles("cohesion").value
+    assert low < mid < high
+    assert 64 - 20 < mid < 64 + 12
+    # the density that 35 deg asks for lies above that of the balance, and no error of density moves it
+    assert found["1950 DA"][1].quantiles("least_density")[1].value > found["1950 DA"][2]
+
+
 def test_catalogue_on_the_spin_limit(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     names = ran("catalogue_on_the_spin_limit.py")
