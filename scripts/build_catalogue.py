@@ -193,7 +193,7 @@ class Sources:
         }
         self.lcdb = {}
         for r in rows(directory / "lcdb_summary_nea_2021.csv.gz"):
-            self.lcdb[r["Number"] if r["Number"] not in ("", "0") else r["Desig"]] = r
+            self.lcdb[r["Number"] if r["Number"] not in ("", "0", "-9") else r["Desig"]] = r
         self.apophis = json.loads((directory / "apophis_sbdb_jpl220.json").read_text())
         self.states = {r["des"]: r for r in rows(directory / "preflyby_states_fitted.csv")}
         self.literature = {r["key"]: r for r in rows(HERE / "literature.csv")}

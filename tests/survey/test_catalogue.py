@@ -84,6 +84,15 @@ def test_every_row_makes_a_valid_body_with_uncertainties_and_sources():
         assert 0.3 < r["a_au"].value < 5
 
 
+def test_unnumbered_bodies_with_trusted_lightcurves_are_in():
+    """The LCDB marks them all with the number -9."""
+    for name in ("1998 KY26", "2010 FC81", "2012 LZ1", "2016 PN"):
+        a = Asteroid.from_catalogue(name)
+        assert a.number is None
+        assert a.sources["spin"].startswith("LCDB 2021")
+        assert a.knows("amplitude_mag")
+
+
 def test_names_are_unique():
     keys = [key_of(n) for a in ALL for n in a.names]
     assert len(keys) == len(set(keys))
