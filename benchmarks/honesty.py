@@ -28,8 +28,9 @@ from flybystab.sky.planets import planet
 from flybystab.survey.catalogue import catalogue
 from flybystab.survey.draws import Attitudes, draws
 from flybystab.survey.judging import judge
+from flybystab.survey.passages import passages
 from flybystab.survey.quick import INTACT, NOT_IN_EQUILIBRIUM, quick_margins, tide_size
-from flybystab.survey.screening import passages, settings
+from flybystab.survey.settings import settings
 
 PLANETS = ("earth", "moon", "venus", "mars", "mercury", "jupiter")
 Sample = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]

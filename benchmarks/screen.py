@@ -29,10 +29,11 @@ from flybystab.constants import AU, R_EARTH
 from flybystab.sky.encounter import Encounter
 from flybystab.survey.catalogue import Asteroid, catalogue, key_of
 from flybystab.survey.formats import with_physical_data
-from flybystab.survey.judging import Passage
+from flybystab.survey.passages import Passage
 from flybystab.survey.progress import ProgressBar, duration
 from flybystab.survey.results import read_results
-from flybystab.survey.screening import Screening, Settings, settings
+from flybystab.survey.screening import Screening
+from flybystab.survey.settings import Settings, settings
 from flybystab.survey.summary import summary
 
 SPAN = ("2026-01-01", "2050-01-01")

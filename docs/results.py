@@ -22,7 +22,8 @@ from flybystab.survey.inference import infer, strongest_passage, survived
 from flybystab.survey.population import Population
 from flybystab.survey.progress import ProgressBar
 from flybystab.survey.results import read_results
-from flybystab.survey.screening import Screening, listed, settings
+from flybystab.survey.screening import Screening, listed
+from flybystab.survey.settings import settings
 from flybystab.survey.summary import summary
 
 ROOT = Path(__file__).resolve().parents[1]

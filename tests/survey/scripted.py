@@ -13,8 +13,9 @@ from flybystab.errors import NotConverged
 from flybystab.sky.encounter import Encounter
 from flybystab.survey.catalogue import Asteroid
 from flybystab.survey.executors import workers
-from flybystab.survey.judging import Passage
-from flybystab.survey.screening import Screening, settings
+from flybystab.survey.passages import Passage
+from flybystab.survey.screening import Screening
+from flybystab.survey.settings import settings
 
 NAMES = ["Apophis", "Anteros", "Toutatis", "1950 DA", "Bennu", "Duende"]
 SPAN = ("2026-01-01", "2036-01-01")

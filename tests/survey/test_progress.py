@@ -4,8 +4,7 @@ import io
 
 import pytest
 
-from flybystab.survey.progress import ProgressBar, duration
-from flybystab.survey.screening import Progress
+from flybystab.survey.progress import Progress, ProgressBar, duration
 
 STATE = Progress(30, 120, 10, 55, {"INTACT": 50, "RESHAPED": 5}, 4.0)
 

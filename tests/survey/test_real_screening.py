@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from flybystab.survey.catalogue import Asteroid, catalogue, key_of
-from flybystab.survey.screening import Screening, screen, settings
+from flybystab.survey.screening import Screening, screen
+from flybystab.survey.settings import settings
 
 SHARED = Path(os.environ.get("FLYBYSTAB_SHARED", Path(__file__).resolve().parents[3] / "shared")) / "data"
 

@@ -18,11 +18,13 @@ from flybystab.sky.planets import planet
 from flybystab.survey.catalogue import Asteroid
 from flybystab.survey.columns import COLUMNS, VERDICTS, share_of
 from flybystab.survey.draws import Attitudes, draws
-from flybystab.survey.judging import Passage, contributors, judge, wilson
+from flybystab.survey.judging import contributors, judge, wilson
+from flybystab.survey.passages import Passage
 from flybystab.survey.population import Population
 from flybystab.survey.quick import tide_size
 from flybystab.survey.results import read_results
-from flybystab.survey.screening import Screening, screen, settings
+from flybystab.survey.screening import Screening, screen
+from flybystab.survey.settings import settings
 
 
 def same(a, b):

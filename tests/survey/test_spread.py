@@ -11,8 +11,9 @@ from flybystab.constants import R_EARTH
 from flybystab.sky.encounter import Encounter
 from flybystab.sky.orbit import Orbit
 from flybystab.survey.catalogue import Asteroid
-from flybystab.survey.judging import Passage
-from flybystab.survey.screening import Screening, passages, screen, settings
+from flybystab.survey.passages import Passage, passages
+from flybystab.survey.screening import Screening, screen
+from flybystab.survey.settings import settings
 from flybystab.survey.spread import spread
 
 APOPHIS = Asteroid.from_catalogue("Apophis")

@@ -5,16 +5,51 @@ from __future__ import annotations
 import shutil
 import sys
 import time
+from dataclasses import dataclass
 from typing import TextIO
 
 import numpy as np
-
-from flybystab.survey.screening import Progress
 
 #: Seconds between two lines where there is no terminal.
 QUIET = 30.0
 #: Seconds between two pictures of the bar.
 FRAME = 0.1
+
+
+@dataclass(frozen=True)
+class Progress:
+    """How far a run is.
+
+    Attributes
+    ----------
+    done, total : int
+        Asteroids.
+    resumed : int
+        Of these, from a former run.
+    rows : int
+        Encounters.
+    verdicts : dict of str to int
+        Encounters by verdict; "error" counts rows that failed.
+    seconds : float
+        Since this run began.
+    """
+
+    done: int
+    total: int
+    resumed: int
+    rows: int
+    verdicts: dict[str, int]
+    seconds: float
+
+    @property
+    def rate(self) -> float:
+        """Asteroids per second in this run."""
+        return (self.done - self.resumed) / self.seconds if self.seconds > 0.0 else 0.0
+
+    @property
+    def remaining(self) -> float:
+        """Seconds left at this rate."""
+        return (self.total - self.done) / self.rate if self.rate > 0.0 else np.inf
 
 
 class ProgressBar:

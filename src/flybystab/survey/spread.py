@@ -18,7 +18,7 @@ from flybystab.sky.encounter import far_enough
 from flybystab.sky.orbit import later
 from flybystab.sky.planets import planet
 from flybystab.survey.draws import identity, stream
-from flybystab.survey.judging import Passage
+from flybystab.survey.passages import Passage
 
 #: Five sigma of the distance matter beyond this share of it: the tide then changes by three times as much.
 MATTERS = 1e-3

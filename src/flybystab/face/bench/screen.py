@@ -18,7 +18,8 @@ from flybystab.aggregate.body import Material
 from flybystab.sky.encounter import Encounter
 from flybystab.survey.asteroid import Asteroid
 from flybystab.survey.draws import Attitudes, draws
-from flybystab.survey.judging import Judged, Passage, judge
+from flybystab.survey.judging import Judged, judge
+from flybystab.survey.passages import Passage
 from flybystab.units import R_earth
 
 #: Periapsis distances, Earth radii.

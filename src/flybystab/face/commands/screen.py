@@ -46,7 +46,8 @@ def run(options: argparse.Namespace) -> None:
     from flybystab.survey.population import Population
     from flybystab.survey.progress import ProgressBar
     from flybystab.survey.results import check_output, read_results
-    from flybystab.survey.screening import Screening, listed, settings
+    from flybystab.survey.screening import Screening, listed
+    from flybystab.survey.settings import settings
     from flybystab.survey.summary import summary
 
     if options.population_default:
