@@ -3,7 +3,8 @@
     python benchmarks/stability.py [speed | minima | push | kappa]
 
 speed   a catalogue of 4,000 bodies by depth, and a 200 x 200 map of shapes (times after compilation)
-minima  least critical energies against 100,000 random directions: four yield surfaces, three dilatancies
+minima  least critical energies against 100,000 random directions, the best of them polished by SciPy's simplex:
+        four yield surfaces, three dilatancies
 push    second order, third order and barrier against the full dynamics of pushed bodies
 kappa   plastic bulk modulus, friction and dilatancy over decades, with kappa_crit where it exists
 """
@@ -15,6 +16,8 @@ import time
 
 import astropy.units as u
 import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize
 
 from flybystab.aggregate.body import YIELD_SURFACES, Body, Material
 from flybystab.aggregate.recovery import recovery_energy
@@ -24,7 +27,10 @@ from flybystab.constants import G
 from flybystab.core import classify as columns
 from flybystab.core.classify import classify
 from flybystab.core.jit import kernel
-from flybystab.core.push import LONGEST, barrier, pile, powers, second_order, third_order
+from flybystab.core.push import LONGEST, Pile, barrier, pile, powers, second_order, third_order
+from flybystab.core.search import BARRIER, SECOND, THIRD, level
+
+Array = NDArray[np.float64]
 
 COUNT = 4000
 SAMPLES = 100_000
@@ -72,21 +78,45 @@ def speed() -> None:
 
 
 @kernel
-def brute(b, x, out):  # type: ignore[no-untyped-def]
-    """Least second order, third order and barrier over the directions ``x[n, 5]``."""
-    out[:] = np.inf
+def brute(b, x, enough, out):  # type: ignore[no-untyped-def]
+    """Second order, third order and barrier (exact up to `enough`) of the directions ``x[n, 5]``."""
     for i in range(x.shape[0]):
         p1, p2, p3 = powers(b, x[i])
-        out[0] = min(out[0], second_order(p1, p2)[0])
-        out[1] = min(out[1], third_order(p1, p2, p3)[0])
-        out[2] = min(out[2], barrier(b, x[i], LONGEST, np.inf)[0])
+        out[0, i] = second_order(p1, p2)[0]
+        out[1, i] = third_order(p1, p2, p3)[0]
+        out[2, i] = barrier(b, x[i], LONGEST, enough)[0]
+
+
+def polished(b: Pile, starts: Array, order: int, ball: bool) -> float:
+    """Least critical energy at an order that SciPy's simplex reaches from the starts."""
+
+    def energy(x: Array) -> float:
+        r = np.linalg.norm(x)
+        return float(level(b, x / r if r > 1.0 or not ball else x, order, np.inf)[0])
+
+    least = np.inf
+    for x in starts:
+        for _ in range(3):
+            end = minimize(
+                energy, x, method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-9, "maxfev": 600}
+            )
+            x = end.x
+        least = min(least, end.fun)
+    return least
 
 
 def minima() -> None:
     print(
-        f"least critical energy over {SAMPLES} random directions / the one found (1 or more: none was missed)"
+        f"least critical energy / the one found (1 or more: none was missed): over {SAMPLES} random directions,"
     )
-    print(f"{'body':>22} {'surface':>25} {'dilatancy':>9} {'second':>8} {'third':>8} {'barrier':>8}")
+    print(
+        "and where SciPy's simplex ends from the best four of them; -: no push of that order leads anywhere"
+    )
+    print(
+        f"{'':>58} {'random directions':^27} {'and simplex':^29}\n"
+        f"{'body':>22} {'surface':>25} {'dilatancy':>9} {'second':>8} {'third':>8} {'barrier':>8}"
+        f"   {'second':>8} {'third':>8} {'barrier':>8}"
+    )
     rng = np.random.default_rng(0)
     x = rng.standard_normal((SAMPLES, 5))
     x /= np.linalg.norm(x, axis=1)[:, None]
@@ -94,7 +124,7 @@ def minima() -> None:
     ball = x.copy()
     ball[::2] *= rng.uniform(0, 1, (SAMPLES // 2, 1)) ** 0.2
     row, found = np.empty(columns.COLUMNS), np.empty((columns.DIRECTIONS, 5))
-    worst = np.full(3, np.inf)
+    worst = np.full(6, np.inf)
     for name, (axes, w2) in SHAPES.items():
         for code, surface in enumerate(YIELD_SURFACES):
             for dilatancy in (0.0, 0.5, 1.0):
@@ -102,21 +132,36 @@ def minima() -> None:
                 given = (*np.square(axes), spin, code, np.deg2rad(40.0), 0.0, dilatancy, 0.0)
                 b = pile(*given)
                 classify(*given, 5, row, found)
-                least = np.empty(3)
-                brute(b, ball if dilatancy == 1.0 else x, least)
                 ours = row[[columns.ENERGY_2, columns.ENERGY_3, columns.ENERGY_B]]
-                with np.errstate(invalid="ignore"):
-                    ratio = np.where(np.isinf(least) & np.isinf(ours), 1.0, least / ours)
+                if row[columns.LEVEL] < 1:
+                    print(f"{name:>22} {surface:>25} {dilatancy:9.1f}   does not stand with this friction")
+                    continue
+                where = ball if dilatancy == 1.0 else x
+                values = np.empty((3, SAMPLES))
+                brute(b, where, 1.2 * ours[2], values)
+                ratio = np.full(6, np.nan)
+                for i, order in enumerate((SECOND, THIRD, BARRIER)):
+                    if np.isfinite(ours[i]) or np.isfinite(values[i].min()):
+                        best = np.argsort(values[i])[:4]
+                        ratio[i] = values[i, best[0]] / ours[i]
+                        ratio[3 + i] = polished(b, where[best], order, dilatancy == 1.0) / ours[i]
                 worst = np.fmin(worst, ratio)
-                print(f"{name:>22} {surface:>25} {dilatancy:9.1f} " + " ".join(f"{v:8.5f}" for v in ratio))
-    print(f"{'least ratio':>58} " + " ".join(f"{v:8.5f}" for v in worst))
+                _print_ratios(f"{name:>22} {surface:>25} {dilatancy:9.1f}", ratio)
+    _print_ratios(f"{'least ratio':>58}", worst)
+
+
+def _print_ratios(head: str, ratio: Array) -> None:
+    cells = ["       -" if np.isnan(v) else f"{v:8.5f}" for v in ratio]
+    print(head, " ".join(cells[:3]), " ", " ".join(cells[3:]), flush=True)
 
 
 def push() -> None:
     print(
         "critical energies / binding energy; dynamics: least and median over 16 directions of the energy from"
     )
-    print("which the body does not come to rest inside the model (python -m flybystab: aggregate.recovery)")
+    print(
+        "which the body does not come to rest inside the model (flybystab.aggregate.recovery.recovery_energy)"
+    )
     print(
         f"{'body':>22} {'friction':>8} {'required':>8} {'dilatancy':>9} | {'second':>7} {'third':>7} {'barrier':>7}"
         f" {'kind':>8} | {'least':>7} {'median':>7} | {'least/barrier':>13}"

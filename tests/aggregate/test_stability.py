@@ -4,17 +4,19 @@ import astropy.units as u
 import numpy as np
 import pytest
 from scipy.linalg import expm
+from scipy.optimize import minimize
 
 from flybystab.aggregate.body import YIELD_SURFACES, Body, Material
 from flybystab.aggregate.equilibrium import equilibrium, spin_limits
 from flybystab.aggregate.fluids import maclaurin
 from flybystab.aggregate.stability import body_units, push, stability
 from flybystab.constants import G
+from flybystab.core import classify as columns
 from flybystab.core.certified import least_second_order, trust_region
-from flybystab.core.classify import first_to_flow
+from flybystab.core.classify import classify, first_to_flow
 from flybystab.core.energy import MASS, energy, velocity_gradient
 from flybystab.core.push import LONGEST, barrier, loss_at, pile, powers, second_order, third_order
-from flybystab.core.search import least
+from flybystab.core.search import BARRIER, ENERGY, MEDIUM, ROUGH, SECOND, THIRD, THREE, least, level
 from flybystab.core.tide import components, tensor
 from flybystab.errors import InvalidInput
 
@@ -109,9 +111,41 @@ def test_third_order_and_barrier_minima_beat_brute_force(case):
     least_second_order(b, seeds[0], seeds[1])
     samples = directions(3000, seed=3, ball=b.associative)
     brute = min(third_order(*powers(b, y))[0] for y in samples)
-    assert least(b, 3, False, seeds, 12, 3, 1e-4, x)[0] <= brute * (1 + 1e-6)
+    given = MEDIUM, THREE
+    assert least(b, THIRD, ENERGY, seeds, *given, 1e-4, ROUGH, x)[0] <= brute * (1 + 1e-6)
     brute = min(barrier(b, y, 3.0, np.inf)[0] for y in samples[:600])
-    assert least(b, 0, False, seeds, 12, 3, 1e-3, x)[0] <= brute * (1 + 1e-6)
+    assert least(b, BARRIER, ENERGY, seeds, *given, 1e-3, ROUGH, x)[0] <= brute * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("dilatancy", [0.0, 1.0])
+@pytest.mark.parametrize("code", range(4))
+def test_no_second_search_goes_below_the_minima(code, dilatancy):
+    """SciPy's simplex from the best of many random directions; Mohr-Coulomb has its minima in sharp valleys."""
+    given = (1.96, 0.7225, 0.5625), np.array([0.0, 0.0, 0.449]), code, np.deg2rad(40.0), 0.0, dilatancy, 0.0
+    b = pile(*given[0], *given[1:])
+    row, found = np.empty(columns.COLUMNS), np.empty((columns.DIRECTIONS, 5))
+    classify(*given[0], *given[1:], 5, row, found)
+    samples = directions(2000, seed=7, ball=dilatancy == 1.0)
+    for order, column in ((SECOND, columns.ENERGY_2), (THIRD, columns.ENERGY_3), (BARRIER, columns.ENERGY_B)):
+
+        def energy(x, order=order):
+            r = np.linalg.norm(x)
+            return level(b, x / r if dilatancy < 1.0 or r > 1.0 else x, order, np.inf)[0]
+
+        values = np.array([energy(x) for x in samples])
+        if not np.isfinite(row[column]):
+            assert not np.any(np.isfinite(values))
+            continue
+        least_found = values.min()
+        for i in np.argsort(values)[:3]:
+            x = samples[i]
+            for _ in range(2):
+                end = minimize(
+                    energy, x, method="Nelder-Mead", options={"xatol": 1e-6, "fatol": 1e-9, "maxfev": 400}
+                )
+                x = end.x
+            least_found = min(least_found, end.fun)
+        assert row[column] <= least_found * (1 + 1e-5)
 
 
 @pytest.mark.parametrize("code", range(4))

@@ -20,7 +20,21 @@ from flybystab.core.push import (
     slope_of_flow,
 )
 from flybystab.core.rheology import DRUCKER_PRAGER, EXTENSION_CONE
-from flybystab.core.search import least
+from flybystab.core.search import (
+    BARRIER,
+    COARSE,
+    DENSE,
+    ENERGY,
+    FOUR,
+    MEDIUM,
+    ROUGH,
+    SECOND,
+    STRAIN,
+    THIRD,
+    THREE,
+    YIELD,
+    least,
+)
 from flybystab.core.statics import demand, invariants, overload, rigid_stress
 from flybystab.core.tensors import eigensystem
 
@@ -72,7 +86,7 @@ def first_to_flow(b: Pile, x: Array) -> float:
         if size > 0.0:
             seeds[0] = b.stress / size
             _face_normal(b, seeds[1])
-        least(b, 1, False, seeds, 24, 3, 1e-7, x)
+        least(b, YIELD, ENERGY, seeds, DENSE, THREE, 1e-7, ROUGH, x)
         x /= np.sqrt(np.sum(x * x))
     p1, _, _ = powers(b, x)
     return p1 / MASS
@@ -207,8 +221,8 @@ def classify(
     else:
         xe = x.copy()
         seeds[:] = x
-        row[ENERGY_2], _ = least(b, 2, False, seeds, 24, 4, 1e-6, xe)
-        row[STRAIN_2], _ = least(b, 2, True, seeds, 24, 4, 1e-6, xs)
+        row[ENERGY_2], _ = least(b, SECOND, ENERGY, seeds, DENSE, FOUR, 1e-6, depth > 4, xe)
+        row[STRAIN_2], _ = least(b, SECOND, STRAIN, seeds, DENSE, FOUR, 1e-6, depth > 4, xs)
     directions[0] = xe
     directions[1] = xs
     if stable and row[ENERGY_2] == np.inf:
@@ -218,15 +232,17 @@ def classify(
     seeds[0] = xe
     seeds[1] = xs
     seeds[2] = x
-    row[ENERGY_3], row[STRAIN_3] = least(b, 3, False, seeds, 12, 3, 1e-4, xe)
+    row[ENERGY_3], row[STRAIN_3] = least(b, THIRD, ENERGY, seeds, MEDIUM, THREE, 1e-4, depth > 4, xe)
     directions[2] = xe
     if depth > 4:
-        row[STRAIN_3], _ = least(b, 3, True, seeds, 12, 3, 1e-4, xs)
+        row[STRAIN_3], _ = least(b, THIRD, STRAIN, seeds, MEDIUM, THREE, 1e-4, depth > 4, xs)
         directions[3] = xs
     if depth < 4:
         return
     seeds[2] = xe
-    row[ENERGY_B], row[STRAIN_B] = least(b, 0, False, seeds, 12 if depth > 4 else 6, 3, 1e-3, xe)
+    row[ENERGY_B], row[STRAIN_B] = least(
+        b, BARRIER, ENERGY, seeds, MEDIUM if depth > 4 else COARSE, THREE, 1e-3, depth > 4, xe
+    )
     directions[4] = xe
 
 
