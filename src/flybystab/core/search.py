@@ -27,6 +27,8 @@ from flybystab.core.tensors import eigensystem
 
 Array = NDArray[np.float64]
 
+# Flags are numpy's (:func:`flybystab.core.jit.code`): one compilation serves all orders.
+
 #: What is minimised: ``-P1`` (twice), the series, the barrier (see :func:`level`); its energy or its strain.
 BARRIER, YIELD, SECOND, THIRD = (code(i) for i in range(4))
 ENERGY, STRAIN = code(0), code(1)
@@ -36,7 +38,7 @@ COARSE, MEDIUM, DENSE = code(6), code(12), code(24)
 THREE, FOUR = code(3), code(4)
 
 #: A minimum that needs no polish.
-ROUGH = np.bool_(False)
+ROUGH: bool = np.bool_(False)  # type: ignore[assignment]
 
 #: Sweeps over the coordinates after which a descent ends where it is.
 MOST_SWEEPS = 60
