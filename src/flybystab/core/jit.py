@@ -2,17 +2,43 @@
 
 ``kernel`` is ``numba.njit`` with the on-disk cache, without the GIL and with IEEE division (a zero
 divisor gives inf or nan, which the callers test for, instead of an exception inside a kernel).
-``fastmath`` stays off: compensated sums and sign tests rely on the order of operations.
+``fastmath`` stays off: compensated sums and sign tests rely on the order of operations. ``summing_kernel`` is for
+the few inner loops that are plain sums: there the compiler may reorder additions and fuse products, which lets it
+use vector instructions; infinities and nan keep their meaning. ``pasted_kernel`` is one that is pasted into its
+caller.
 """
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 from numba import njit
+from numba.core import cgutils
+from numba.extending import intrinsic
+from numba.np.arrayobj import make_array
 
 kernel = njit(cache=True, nogil=True, error_model="numpy")
+_SUMS: Any = {"fastmath": {"reassoc", "contract", "nsz"}}
+summing_kernel = njit(cache=True, nogil=True, error_model="numpy", **_SUMS)
+# Handing over a tuple of arrays costs more than the few sums inside.
+pasted_kernel = njit(cache=True, nogil=True, error_model="numpy", inline="always", **_SUMS)
 
 
 def code(n: int) -> int:
     """An integer constant for kernels: numba compiles anew for each literal int, but not for numpy's."""
     return np.int64(n)  # type: ignore[return-value]
+
+
+def _borrowed(context, array):  # type: ignore[no-untyped-def]
+    def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
+        view = make_array(signature.return_type)(context, builder, args[0])
+        view.meminfo = cgutils.get_null_value(view.meminfo.type)
+        return view._getvalue()
+
+    return array(array), generate
+
+
+#: Inside a kernel: the same array without its reference count; the caller keeps it alive. Counting costs an
+#: atomic instruction at each use, which in a loop over bodies is most of the time.
+borrowed: Any = intrinsic(_borrowed)

@@ -1,16 +1,14 @@
 """All encounters of many asteroids: one compiled integration per asteroid, with the search inside it.
 
-DOP853 (Dormand & Prince; Hairer, Norsett & Wanner 1993, coefficients as published by scipy) among prescribed
-bodies. Each asteroid has its own steps, so that none disturbs another, and threads share the work. After each
-step every planet asked for is checked for a minimum of distance on the quintic through the ends of the step;
-a minimum below the threshold is refined on the integrator's own trajectory until ``r.v = 0``. An impact is
-reported and ends that track.
+DOP853 among prescribed bodies. Each asteroid has its own steps and only the forces that it needs, so that none
+disturbs another, and threads share the work. After each step every planet asked for is checked for a minimum of
+distance (:mod:`flybystab.sky.minima`). An impact, on whichever body, is reported and ends that track.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any
 
@@ -20,324 +18,145 @@ from astropy.table import QTable
 from astropy.time import Time
 from astropy.units import Quantity
 from numpy.typing import NDArray
-from scipy.integrate import DOP853
 
 from flybystab.constants import DAY
-from flybystab.core.jit import kernel
+from flybystab.core.jit import borrowed, kernel
 from flybystab.errors import InvalidInput, NotConverged
-from flybystab.sky.approach import _measure, relative
+from flybystab.sky.almanac import GRID, N_FAST, SLOT, gather
 from flybystab.sky.b_plane import target_plane
-from flybystab.sky.ephemeris import BODIES, Ephemeris, Window, body_states
-from flybystab.sky.forces import _GM, FORCES, acceleration_among, bodies, model, push
-from flybystab.sky.kepler import time_at_distance
+from flybystab.sky.dop853 import step
+from flybystab.sky.ephemeris import BODIES, Ephemeris, Window, body_state
+from flybystab.sky.field import Field, borrowed_field, borrowed_places, empty_places, field, rate
+from flybystab.sky.forces import FORCES
+from flybystab.sky.minima import _FINE, BENDING, WIDTH, chord_distance, crash, look
+from flybystab.sky.need import N_SHARES, NAMES, reduced, shares_along
 from flybystab.sky.orbit import Orbit, _ephemeris, default_forces, later, seconds
-from flybystab.sky.planets import planet
+from flybystab.sky.planets import PLANETS, planet
 from flybystab.sky.predictability import neighbour
 from flybystab.units import to_si
 
 Array = NDArray[np.float64]
 
-_A = np.ascontiguousarray(DOP853.A[:12, :12])
-_B = np.ascontiguousarray(DOP853.B)
-_C = np.ascontiguousarray(DOP853.C[:12])
-_E3 = np.ascontiguousarray(DOP853.E3)
-_E5 = np.ascontiguousarray(DOP853.E5)
-
-#: Columns of a raw result: body, time (s), state relative to the body (6; m, m/s), distance (m), v_inf^2
-#: (m2/s2), impact (0, 1).
-WIDTH = 11
-#: Longest step, s, and the unit of position (m) and velocity (m/s) in which the tolerance counts.
-_LONGEST, _LENGTH, _SPEED = 10.0 * DAY, 1.5e11, 3.0e4
-_CUTS = 8
-
-
-@kernel
-def _rate(model: Array, law: Array, t: float, y: Array, places: Array, rate: Array, out: Array) -> None:
-    """Write velocity and acceleration at ``t``, ``y[6]`` into ``out[6]``; bodies into ``places[10, 3]``."""
-    bodies(model, t, places, rate)
-    acceleration_among(model, places, rate, y[:3], y[3:], out[3:])
-    out[0], out[1], out[2] = y[3], y[4], y[5]
-    if law[0] != 0.0 or law[1] != 0.0 or law[2] != 0.0:
-        push(law, y[:3] - places[0], y[3:] - rate, out[3:])
-
-
-@kernel
-def _step(
-    model: Array, law: Array, t: float, y: Array, h: float, k: Array, new: Array, places: Array, rate: Array
-) -> float:
-    """One step of DOP853 from ``y`` with ``k[0]`` set; writes ``new`` and ``k``; the estimated error."""
-    w = np.empty(6)
-    for s in range(1, 12):
-        for j in range(6):
-            acc = 0.0
-            for i in range(s):
-                acc += _A[s, i] * k[i, j]
-            w[j] = y[j] + h * acc
-        _rate(model, law, t + _C[s] * h, w, places, rate, k[s])
-    for j in range(6):
-        acc = 0.0
-        for i in range(12):
-            acc += _B[i] * k[i, j]
-        new[j] = y[j] + h * acc
-    _rate(model, law, t + h, new, places, rate, k[12])
-    five = 0.0
-    three = 0.0
-    for j in range(6):
-        e5 = 0.0
-        e3 = 0.0
-        for i in range(13):
-            e5 += _E5[i] * k[i, j]
-            e3 += _E3[i] * k[i, j]
-        unit = _LENGTH if j < 3 else _SPEED
-        five += (e5 / unit) ** 2
-        three += (e3 / unit) ** 2
-    if five == 0.0 and three == 0.0:
-        return 0.0
-    return abs(h) * five / np.sqrt((five + 0.01 * three) * 6.0)
-
-
-@kernel
-def _refine(
-    model: Array, law: Array, gm: Array, t0: float, y0: Array, k0: Array, body: int, t: float, out: Array
-) -> float:
-    """Time of ``r.v = 0`` near ``t`` on the path through ``y0`` at ``t0``; relative state in ``out``."""
-    k = np.empty((13, 6))
-    k[0] = k0
-    y = np.empty(6)
-    places = np.empty((10, 3))
-    rate = np.zeros(3)
-    head = model[20:70].reshape((10, 5))
-    data = model[140:]
-    for _ in range(12):
-        _step(model, law, t0, y0, t - t0, k, y, places, rate)
-        # Places, and the planet's acceleration by a central difference over two minutes: a slow passage is
-        # steered by the Sun as much as by the planet.
-        place = body_states(head, data, gm, body, np.array([t, t - 60.0, t + 60.0]))
-        rv = 0.0
-        slope = 0.0
-        v2 = 0.0
-        for j in range(3):
-            out[j] = y[j] - place[0, j]
-            out[3 + j] = y[3 + j] - place[0, 3 + j]
-            rv += out[j] * out[3 + j]
-            v2 += out[3 + j] ** 2
-            slope += out[j] * (k[12, 3 + j] - (place[2, 3 + j] - place[1, 3 + j]) / 120.0)
-        slope += v2
-        if not slope > 1e-3 * v2:
-            return t
-        dt = -rv / slope
-        if abs(dt) < 1e-5:
-            # What is left is linear: shift along the relative velocity.
-            for j in range(3):
-                out[j] += dt * out[3 + j]
-            return t + dt
-        t += dt
-    return t
-
-
-@kernel
-def _two_body(gm: float, s: Array) -> tuple[float, float, float]:
-    """Periapsis distance (m), time to it (s) and v_inf^2 (m2/s2) of an inbound relative state ``s[6]``."""
-    r = np.sqrt(s[0] ** 2 + s[1] ** 2 + s[2] ** 2)
-    v2 = s[3] ** 2 + s[4] ** 2 + s[5] ** 2
-    h2 = (
-        (s[1] * s[5] - s[2] * s[4]) ** 2 + (s[2] * s[3] - s[0] * s[5]) ** 2 + (s[0] * s[4] - s[1] * s[3]) ** 2
-    )
-    energy = v2 - 2.0 * gm / r
-    q = max(h2 / (gm + np.sqrt(max(gm * gm + h2 * energy, 0.0))), 1.0)
-    return q, time_at_distance(gm, q, q * energy / gm, r), energy
-
-
-@kernel
-def _crash(row: Array, body: int, gm: float, t: float, sign: float) -> None:
-    """Fill a row for an impact from the relative state in ``row[2:8]`` at ``t`` (s), outside the planet."""
-    r = np.sqrt(row[2] ** 2 + row[3] ** 2 + row[4] ** 2)
-    q, ahead, energy = _two_body(gm, row[2:8])
-    inbound = sign * (row[2] * row[5] + row[3] * row[6] + row[4] * row[7])
-    row[0] = body
-    row[1] = t + sign * (ahead if inbound < 0.0 and ahead == ahead else 0.0)
-    row[8] = min(q, r)
-    row[9] = energy
-    row[10] = 1.0
-
-
-@kernel
-def _look(
-    model: Array,
-    law: Array,
-    gm: Array,
-    pair: Array,
-    first: Array,
-    body: int,
-    within: float,
-    floor: float,
-    out: Array,
-    n: int,
-) -> tuple[int, float]:
-    """Minima of distance inside one step: rows in ``out`` from ``n``; new count and time of an impact or nan.
-
-    ``pair`` holds the ends of the step in order of time, ``first`` the rate at the earlier end.
-    """
-    head = model[20:70].reshape((10, 5))
-    data = model[140:]
-    s = np.empty(6)
-    h = (pair[1, 0] - pair[0, 0]) / _CUTS
-    relative(pair, 0, head, data, gm, body, pair[0, 0], s)
-    fa = _measure(s, -1.0)
-    for i in range(_CUTS):
-        ta = pair[0, 0] + i * h
-        tb = pair[0, 0] + (i + 1) * h if i < _CUTS - 1 else pair[1, 0]
-        relative(pair, 0, head, data, gm, body, tb, s)
-        fb = _measure(s, -1.0)
-        start = fa
-        fa = fb
-        if not (start < 0.0 and fb >= 0.0):
-            continue
-        a, b, ga, gb = ta, tb, start, fb
-        for _ in range(60):
-            tm = (a * gb - b * ga) / (gb - ga)
-            if not (a < tm < b or b < tm < a):
-                tm = 0.5 * (a + b)
-            relative(pair, 0, head, data, gm, body, tm, s)
-            gmid = _measure(s, -1.0)
-            moved = abs(tm - b)
-            if (gmid < 0.0) == (gb < 0.0):
-                ga *= 0.5
-            else:
-                a, ga = b, gb
-            b, gb = tm, gmid
-            if moved < 1e-3 or gmid == 0.0:
-                break
-        d = np.sqrt(s[0] ** 2 + s[1] ** 2 + s[2] ** 2)
-        if d > within * 1.001 + 1e7:
-            continue
-        row = out[n]
-        t = _refine(model, law, gm, pair[0, 0], pair[0, 1:7], first, body, b, row[2:8])
-        d = np.sqrt(row[2] ** 2 + row[3] ** 2 + row[4] ** 2)
-        if d < floor:  # in and out again within one step
-            relative(pair, 0, head, data, gm, body, pair[0, 0], row[2:8])
-            _crash(row, body, gm[body], pair[0, 0], 1.0)
-            return n + 1, row[1]
-        if d > within:
-            continue
-        row[0] = body
-        row[10] = 0.0
-        row[1] = t
-        row[8] = d
-        row[9] = row[5] ** 2 + row[6] ** 2 + row[7] ** 2 - 2.0 * gm[body] / d
-        n += 1
-    return n, np.nan
+#: Longest step, s.
+_LONGEST = 30.0 * DAY
+_FULL, _STALLED = 1, 2
 
 
 @kernel
 def track_encounters(
-    model: Array,
+    field: Field,
     law: Array,
     t0: float,
     y0: Array,
     t_quiet: float,
     t_end: float,
-    targets: Array,
-    within: Array,
+    limits: Array,
     floors: Array,
     tolerance: float,
     out: Array,
-) -> tuple[int, float]:
+    n: int,
+) -> tuple[int, int, float]:
     """Encounters of one asteroid from ``t0`` to ``t_end``, s, not counting those before ``t_quiet``.
 
     Parameters
     ----------
-    model : ndarray
-        From :func:`flybystab.sky.forces.model`, without non-gravitational force.
+    field : Field
+        Forces, without the non-gravitational one.
     law : ndarray, shape (8,)
         A1, A2, A3 (m/s2) and their law; zeros for none.
     t0, y0 : float, ndarray
         Start (s) and barycentric state (m, m/s). Time may run backward.
-    targets, within, floors : ndarray
-        Bodies, their thresholds and the distances of impact, m.
+    limits, floors : ndarray, shape (10,)
+        Of each body: largest distance of an encounter (zero: only impacts count), distance of impact, m.
     tolerance : float
         Error per step, in units of 1.5e11 m and 30 km/s.
-    out : ndarray, shape (rows, 11)
-        Result; see ``WIDTH``.
+    out : ndarray, shape (rows, 12)
+        Result from row `n` on; see ``WIDTH``.
 
     Returns
     -------
     int
-        Number of rows; -1 if `out` was too small, -2 if the step size collapsed.
+        Number of rows.
+    int
+        0 done; 1 `out` was too small; 2 the step size collapsed.
     float
         Time reached, s.
     """
-    gm = model[_GM : _GM + 10]
-    k = np.empty((13, 6))
+    field = borrowed_field(field)
+    stages, places_kept = np.empty((13, 6)), empty_places()
+    spare_stages, spare_kept = np.empty((13, 6)), empty_places()
+    k, places = borrowed(stages), borrowed_places(places_kept)
+    spare, spare_places = borrowed(spare_stages), borrowed_places(spare_kept)
     y = y0.copy()
     new = np.empty(6)
-    places = np.empty((10, 3))
-    old_places = np.empty((10, 3))
-    rate = np.zeros(3)
+    old, now = np.empty((10, 3)), np.empty((10, 3))
+    work = np.empty(6)
     pair = np.empty((2, 10))
     sign = 1.0 if t_end >= t0 else -1.0
     h = sign * DAY
     t = t0
-    n = 0
-    _rate(model, law, t, y, places, rate, k[0])
+    rate(field, law, t, y, places, k[0])
+    gather(places, now)
     while (t_end - t) * sign > 0.0:
-        old_places[:] = places
         stop = t_quiet if (t_quiet - t) * sign > 0.0 else t_end
         last = abs(stop - t) <= abs(h)
         length = stop - t if last else h
-        error = _step(model, law, t, y, length, k, new, places, rate) / tolerance
+        error = step(field, law, t, y, length, k, new, places) / tolerance
         if not error <= 1.0:
             factor = 0.9 * error**-0.125 if error < 1e30 else 0.1
             h = length * max(factor, 0.1)
-            places[:] = old_places
             if abs(h) < 1e-3:
-                return -2, t
+                return n, _STALLED, t
             continue
         t_new = stop if last else t + length
+        old[:] = now
+        gather(places, now)
         if (t - t_quiet) * sign >= 0.0:
             early, late = (0, 1) if sign > 0.0 else (1, 0)
             pair[early, 0] = t
             pair[late, 0] = t_new
+            bend0 = 0.0
+            bend1 = 0.0
             for j in range(6):
                 pair[early, 1 + j] = y[j]
                 pair[late, 1 + j] = new[j]
             for j in range(3):
                 pair[early, 7 + j] = k[0, 3 + j]
                 pair[late, 7 + j] = k[12, 3 + j]
-            speed = max(
-                np.sqrt(y[3] ** 2 + y[4] ** 2 + y[5] ** 2), np.sqrt(new[3] ** 2 + new[4] ** 2 + new[5] ** 2)
-            )
-            for m in range(targets.size):
-                body = targets[m]
-                d0 = 0.0
+                bend0 += k[0, 3 + j] ** 2
+                bend1 += k[12, 3 + j] ** 2
+            bend = 3.0 * np.sqrt(max(bend0, bend1))
+            bulge = 0.125 * length * length
+            for body in range(10):
+                reach = max(limits[body], floors[body])
+                if chord_distance(y, old[body], new, now[body]) > reach + bulge * (bend + BENDING[body]):
+                    continue
+                if n + _FINE > out.shape[0]:
+                    return n, _FULL, t
                 d1 = 0.0
                 for j in range(3):
-                    d0 += (y[j] - old_places[body, j]) ** 2
-                    d1 += (new[j] - places[body, j]) ** 2
-                if np.sqrt(d0) + np.sqrt(d1) > 2.0 * within[m] + abs(length) * (1.1 * speed + 6.0e4):
-                    continue
-                if n + _CUTS > out.shape[0]:
-                    return -1, t
-                if d1 < floors[m] ** 2:
-                    place = body_states(model[20:70].reshape((10, 5)), model[140:], gm, body, np.array([t]))
+                    d1 += (new[j] - now[body, j]) ** 2
+                if d1 < floors[body] ** 2:
+                    body_state(field.head, field.data, field.gm, body, t, work)
                     for j in range(6):
-                        out[n, 2 + j] = y[j] - place[0, j]
-                    _crash(out[n], body, gm[body], t, sign)
-                    return n + 1, t_new
-                n, crash = _look(
-                    model,
+                        out[n, 2 + j] = y[j] - work[j]
+                    crash(out[n], body, field.gm[body], t, sign)
+                    return n + 1, 0, t_new
+                n, hit = look(
+                    field,
                     law,
-                    gm,
                     pair,
                     k[0] if sign > 0.0 else k[12],
                     body,
-                    within[m],
-                    floors[m],
+                    limits[body],
+                    floors[body],
                     out,
                     n,
+                    spare,
+                    spare_places,
                 )
-                if crash == crash:
-                    return n, crash
+                if hit == hit:
+                    return n, 0, hit
         t = t_new
         y[:] = new
         k[0] = k[12]
@@ -346,7 +165,69 @@ def track_encounters(
             h = length * min(max(grow, 0.2), 5.0)
         if abs(h) > _LONGEST:
             h = sign * _LONGEST
-    return n, t
+    return n, 0, t
+
+
+@kernel
+def search(
+    everything: Field,
+    laws: Array,
+    epochs: Array,
+    states: Array,
+    t_start: float,
+    t_stop: float,
+    limits: Array,
+    floors: Array,
+    tolerance: float,
+    least: float,
+    always: Array,
+    shares: Array,
+    first: int,
+    out: Array,
+) -> tuple[int, int, int, float]:
+    """Encounters of asteroids ``first``, ``first + 1``, ... until all are done or ``out`` is full.
+
+    ``least`` (m) is the share of a force below which it is left out, ``shares[n, 29]`` takes the estimates.
+    Other arguments as in :func:`track_encounters`, one row per asteroid.
+
+    Returns
+    -------
+    int
+        The asteroid to go on with.
+    int
+        Number of rows.
+    int
+        0 done, 1 `out` was too small for the next asteroid, 2 its step size collapsed.
+    float
+        Where it did, s.
+    """
+    n = 0
+    room = empty_places()
+    for i in range(first, epochs.size):
+        t0 = epochs[i]
+        y = states[i]
+        if t0 > t_start:
+            shares_along(everything, t0, y, t_start, room, shares[i])
+        if t0 < t_stop:
+            shares_along(everything, t0, y, t_stop, room, shares[i])
+        field = reduced(everything, shares[i], least, always)
+        m = n
+        for leg in range(2):
+            if leg == 0 and t0 > t_start:
+                quiet, end = min(t0, t_stop), t_start
+            elif leg == 1 and t0 < t_stop:
+                quiet, end = max(t0, t_start), t_stop
+            else:
+                continue
+            m, status, t = track_encounters(
+                field, laws[i], t0, y, quiet, end, limits, floors, tolerance, out, m
+            )
+            if status != 0:
+                return i, n, status, t
+        for row in range(n, m):
+            out[row, 11] = i
+        n = m
+    return epochs.size, n, 0, 0.0
 
 
 def find_encounters(
@@ -357,10 +238,11 @@ def find_encounters(
     within: Quantity = 0.05 * u.au,
     *,
     ephemeris: str | Ephemeris | None = None,
+    error: Quantity = 0.1 * u.km,
     tolerance: float = 1e-12,
     forces: tuple[str, ...] | None = None,
-    threads: int | None = None,
     growth: bool = False,
+    threads: int | None = None,
 ) -> QTable:
     """Every closest approach of every asteroid to every planet below a threshold.
 
@@ -376,17 +258,20 @@ def find_encounters(
         Largest distance between the centres; one value or one per planet.
     ephemeris : str or Ephemeris, optional
         ``"de421"``, ``"de440"``; the best installed by default.
+    error : Quantity
+        Displacement that counts: of the point masses and the Sun's 1PN an asteroid is given those that can move
+        it by more than a tenth of this before the end of the span; J2 of Sun, Earth and `planets` and its own
+        A1, A2, A3 always.
     tolerance : float
         Error per step of the integration, in units of 1.5e11 m and 30 km/s.
     forces : tuple of str, optional
-        Names of ``flybystab.sky.forces.FORCES``; by default all point masses, Sun 1PN, J2 of the Earth and of
-        `planets`, and A1, A2, A3 of orbits that have them.
-    threads : int, optional
-        Number of threads; the processors by default.
+        Exactly these forces, names as in ``flybystab.sky.forces.FORCES``, instead of choosing by `error`.
     growth : bool
         Follow a neighbour of each orbit as well, for the columns ``displacement`` (km, of the neighbour from
         the asteroid at closest approach), ``growth`` (over that at the epoch) and ``predictability``
         (:mod:`flybystab.sky.predictability`). Up to twice the time.
+    threads : int, optional
+        Number of threads; the processors by default.
 
     Returns
     -------
@@ -421,10 +306,11 @@ def find_encounters(
     reach = np.broadcast_to(
         to_si(within, u.m, "within", shape=None, low=0.0, open_low=True), (len(found),)
     ).astype(float)
+    accuracy = to_si(error, u.m, "error", low=0.0)
     eph = _ephemeris(ephemeris)
     middle = later(start, 0.5 * seconds(stop, start))
     t_start, t_stop = seconds(start, middle), seconds(stop, middle)
-    epochs = [seconds(orbit.epoch, middle) for _, orbit in rows]
+    epochs = _epochs(rows, middle)
     beside = [neighbour(orbit, middle, eph) for _, orbit in rows] if growth else []
     every = [t_start, t_stop, *epochs, *(seconds(n.orbit.epoch, middle) for n in beside)]
     window = eph.window(middle, min(every), max(every))
@@ -432,67 +318,110 @@ def find_encounters(
     if chosen is None:
         used = {name for _, orbit in rows for name in default_forces(orbit, *(b.name for b in found))}
         chosen = tuple(name for name in FORCES if name in used)
-    table = model(window, [n for n in chosen if n != "non-gravitational"])
-    targets = np.array([BODIES.index(b.name) for b in found])
-    floors = np.array([b.impact_distance for b in found])
+    everything = field(window, [n for n in chosen if n != "non-gravitational"])
+    limits = np.zeros(len(BODIES))
+    limits[[BODIES.index(b.name) for b in found]] = reach
+    floors = np.array([PLANETS[name].impact_distance for name in BODIES])
+    always = np.zeros(12, dtype=bool)
+    for name in ("sun", *(b.name for b in found)):
+        b = BODIES.index(name)
+        always[SLOT[b] + N_FAST * GRID[b]] = True
+    laws = np.zeros((len(rows), 8))
+    if "non-gravitational" in chosen:
+        for i, (_, orbit) in enumerate(rows):
+            if any(orbit.nongrav.a):
+                laws[i] = *orbit.nongrav.a, *orbit.nongrav.constants
+    states = _states(rows, window, epochs)
+    shares = np.zeros((len(rows), N_SHARES))
+    # A tenth: several shares add up, and passages on the way enlarge them.
+    least = 0.1 * accuracy if forces is None else 0.0
 
-    def law_of(orbit: Orbit) -> Array:
-        law = np.zeros(8)
-        if any(orbit.nongrav.a) and (forces is None or "non-gravitational" in forces):
-            law[:] = *orbit.nongrav.a, *orbit.nongrav.constants
-        return law
-
-    def one(item: tuple[int, tuple[str, Orbit]]) -> tuple[int, Array]:
-        i, (name, orbit) = item
-        law = law_of(orbit)
-        state = orbit.barycentric(window)
-        parts = []
-        legs = []
-        if epochs[i] > t_start:
-            legs.append((min(epochs[i], t_stop), t_start))
-        if epochs[i] < t_stop:
-            legs.append((max(epochs[i], t_start), t_stop))
-        for quiet, end in legs:
-            space = 256
-            while True:
-                out = np.empty((space, WIDTH))
-                n, reached = track_encounters(
-                    table, law, epochs[i], state, quiet, end, targets, reach, floors, tolerance, out
-                )
-                if n != -1:
-                    break
-                space *= 4
-            if n < 0:
+    def run(part: slice) -> list[Array]:
+        tables = everything, laws[part], epochs[part], states[part]
+        size = len(tables[2])
+        i, space, parts = 0, 64 * size + 256, []
+        while i < size:
+            out = np.empty((space, WIDTH))
+            i, n, status, reached = search(
+                *tables, t_start, t_stop, limits, floors, tolerance, least, always, shares[part], i, out
+            )
+            if status == _STALLED:
+                name = rows[part][i][0]
                 raise NotConverged(f"{name}: the step size collapsed at {later(middle, reached).iso} TDB")
-            parts.append(out[:n])
-        raw = np.concatenate(parts) if parts else np.empty((0, WIDTH))
-        return i, raw[np.argsort(raw[:, 1])]
+            out[:n, 11] += part.start
+            parts.append(out[:n].copy())
+            space *= 1 if n else 4
+        return parts
 
     workers = threads or os.cpu_count() or 1
-    if workers > 1 and len(rows) > 1:
+    # Parts small enough that threads end together, large enough that Python does not count.
+    size = max(1, min(64, -(-len(rows) // (4 * workers)))) if workers > 1 else max(len(rows), 1)
+    tasks = [slice(i, min(i + size, len(rows))) for i in range(0, len(rows), size)]
+    if workers > 1 and len(tasks) > 1:
         with ThreadPoolExecutor(workers) as pool:
-            results = list(pool.map(one, enumerate(rows)))
+            results = list(pool.map(run, tasks))
     else:
-        results = [one(item) for item in enumerate(rows)]
-    out = _table(rows, results, middle, window, chosen, tolerance)
+        results = [run(task) for task in tasks]
+    flat = [part for parts in results for part in parts]
+    raw = np.concatenate(flat) if flat else np.empty((0, WIDTH))
+    raw = raw[np.lexsort((raw[:, 1], raw[:, 11]))]
+    asked = np.isin(raw[:, 0], [BODIES.index(b.name) for b in found])
+    elsewhere = [
+        {"asteroid": rows[int(r[11])][0], "planet": BODIES[int(r[0])], "time_jd_tdb": later(middle, r[1]).jd}
+        for r in raw[~asked]
+    ]
+    raw = raw[asked]
+    kept, left_out = _forces_used(chosen, shares, least)
+    meta = {
+        "ephemeris": window.name,
+        "forces": list(kept),
+        "left_out_km": left_out,
+        "impacts_elsewhere": elsewhere,
+        "frame": "ICRF",
+        "time_scale": "TDB",
+        "tolerance": tolerance,
+    }
+    out = _table(rows, raw, middle, window, meta)
     if growth:
         from flybystab.sky.growth import add_growth
 
-        add_growth(out, beside, [law_of(orbit) for _, orbit in rows], window, table, tolerance, workers)
+        add_growth(out, beside, laws, window, everything, tolerance, workers)
     return out
 
 
+def _epochs(rows: list[tuple[str, Orbit]], origin: Time) -> Array:
+    """Epochs, s (TDB) from `origin`; whole days first, so that no digit is lost."""
+    zero = origin.tdb
+    pairs = np.array([(t.jd1, t.jd2) for t in (orbit.epoch for _, orbit in rows)]).reshape(-1, 2)
+    return ((pairs[:, 0] - zero.jd1) + (pairs[:, 1] - zero.jd2)) * DAY
+
+
+def _states(rows: list[tuple[str, Orbit]], window: Window, epochs: Array) -> Array:
+    """Barycentric states at the epochs, shape (n, 6), m and m/s."""
+    out = np.empty((len(rows), 6))
+    centres = np.array([orbit.centre for _, orbit in rows], dtype=object)
+    for i, (_, orbit) in enumerate(rows):
+        out[i, :3] = orbit.position.to_value(u.m)
+        out[i, 3:] = orbit.velocity.to_value(u.m / u.s)
+    for centre in set(centres) - {"ssb"}:
+        where = centres == centre
+        out[where] += window.states(BODIES.index(centre), epochs[where])
+    return out
+
+
+def _forces_used(
+    chosen: tuple[str, ...], shares: Array, least: float
+) -> tuple[tuple[str, ...], dict[str, float]]:
+    """Forces that at least one asteroid was given, and of each other one its largest share, km."""
+    largest = {name: float(v) for name, v in zip(NAMES, shares.max(axis=0, initial=0.0), strict=True) if name}
+    out = {name for name, value in largest.items() if value < least and name in chosen and len(shares)}
+    return tuple(n for n in chosen if n not in out), {n: largest[n] / 1e3 for n in chosen if n in out}
+
+
 def _table(
-    rows: list[tuple[str, Orbit]],
-    results: Iterable[tuple[int, Array]],
-    origin: Time,
-    window: Window,
-    forces: tuple[str, ...],
-    tolerance: float,
+    rows: list[tuple[str, Orbit]], raw: Array, origin: Time, window: Window, meta: dict[str, Any]
 ) -> QTable:
-    kept = [(i, raw) for i, raw in results if len(raw)]
-    index = np.concatenate([np.full(len(raw), i) for i, raw in kept]) if kept else np.zeros(0, dtype=int)
-    raw = np.concatenate([raw for _, raw in kept]) if kept else np.zeros((0, WIDTH))
+    index = raw[:, 11].astype(int)
     gm = window.gm[raw[:, 0].astype(int)]
     speed2 = raw[:, 9] + 2.0 * gm / raw[:, 8]
     b, _ = target_plane(raw[:, 2:8], gm)
@@ -509,13 +438,7 @@ def _table(
     out["index"] = index
     out["position"] = (raw[:, 2:5] * u.m).to(u.km)
     out["velocity"] = (raw[:, 5:8] * u.m / u.s).to(u.km / u.s)
-    out.meta = {
-        "ephemeris": window.name,
-        "forces": list(forces),
-        "frame": "ICRF",
-        "time_scale": "TDB",
-        "tolerance": tolerance,
-    }
+    out.meta = meta
     return out
 
 

@@ -23,28 +23,29 @@ from numpy.typing import NDArray
 from flybystab.constants import AU, C_LIGHT, DAY
 from flybystab.core.jit import kernel
 from flybystab.errors import UnknownName
-from flybystab.sky.ephemeris import BODIES, Window, series_position, series_state
+from flybystab.sky.ephemeris import BELT, BELT_GM, BODIES, Window, series_position, series_state
 from flybystab.sky.planets import PLANETS
 
 Array = NDArray[np.float64]
 
 #: Every force the package knows, in the order in which their accelerations are reported.
 FORCES = (
-    *(f"{name} point mass" for name in BODIES),
+    *(f"{name} point mass" for name in (*BODIES, *BELT)),
     "sun 1PN",
     *(f"{name} J2" for name in BODIES),
     "non-gravitational",
 )
-N_BODIES = len(BODIES)
-_PN, _J2, _NON = N_BODIES, N_BODIES + 1, 2 * N_BODIES + 1
+N_BODIES, N_ALL = len(BODIES), len(BODIES) + len(BELT)
+_PN, _J2, _NON = N_ALL, N_ALL + 1, N_ALL + 1 + N_BODIES
 
 # Layout of a model, one flat array that a C callback can be handed as a pointer:
 #   [0] length  [1] Earth/Moon ratio  [2..5] switches: 1PN, any J2, non-gravitational, unused
 #   [6..8] A1 A2 A3 (m/s2)  [9..13] law: ALN, r0 (m), m, n, k  [14] address, [15] rows and [16] count of a log
-#   [20] head (10 x 5)  [70] gm (10)  [80] radius of the core (10)  [90] J2: c, pole (10 x 4)
-#   [130] GM in use (10; zero: left out)  [140...] coefficients
+#   [20] head (26 x 5)  [150] gm (26)  [176] radius of the core (10)  [186] J2: c, pole (10 x 4)
+#   [226] GM in use (26; zero: left out)  [252...] coefficients
+# Rows 0 to 9 are BODIES, rows 10 to 25 are BELT.
 LOG_ADDRESS, LOG_ROWS, LOG_COUNT = 14, 15, 16
-_HEAD, _GM, _INNER, _FLAT, _USED, _DATA = 20, 70, 80, 90, 130, 140
+_HEAD, _GM, _INNER, _FLAT, _USED, _DATA = 20, 150, 176, 186, 226, 252
 INNER = 0.9
 
 
@@ -90,7 +91,8 @@ def model(window: Window, forces: Iterable[str], nongrav: NonGravitational | Non
     out[0] = out.size
     out[1] = window.gm[4] / window.gm[3]
     out[_HEAD:_GM] = window.head.ravel()
-    out[_GM:_INNER] = window.gm
+    out[_GM : _GM + N_BODIES] = window.gm
+    out[_GM + N_BODIES : _INNER] = list(BELT_GM.values())
     out[_DATA:] = window.data
     for i, name in enumerate(BODIES):
         body = PLANETS[name]
@@ -102,6 +104,9 @@ def model(window: Window, forces: Iterable[str], nongrav: NonGravitational | Non
             strength = 1.5 * body.j2 * window.gm[i] * body.radius**2
             out[_FLAT + 4 * i : _FLAT + 4 * i + 4] = strength, *body.pole
     out[2] = float("sun 1PN" in chosen)
+    for i, name in enumerate(BELT, N_BODIES):
+        if f"{name} point mass" in chosen:
+            out[_USED + i] = BELT_GM[name]
     if "non-gravitational" in chosen and nongrav is not None and any(nongrav.a):
         out[4] = 1.0
         out[6:9] = nongrav.a
@@ -111,8 +116,11 @@ def model(window: Window, forces: Iterable[str], nongrav: NonGravitational | Non
 
 @kernel
 def bodies(model: Array, t: float, out: Array, sun_rate: Array) -> None:
-    """Write the positions (m) of all bodies at ``t`` into ``out[10, 3]``, and the Sun's velocity (m/s)."""
-    head = model[_HEAD:_GM].reshape((10, 5))
+    """Write the positions (m) of bodies at ``t`` into ``out[26, 3]``, and the Sun's velocity (m/s).
+
+    Massive asteroids that are not in use are left out.
+    """
+    head = model[_HEAD:_GM].reshape((26, 5))
     data = model[_DATA:]
     if model[2] != 0.0 or model[4] != 0.0:
         state = np.empty(6)
@@ -128,6 +136,11 @@ def bodies(model: Array, t: float, out: Array, sun_rate: Array) -> None:
         far = out[4, j]
         out[4, j] = out[3, j] + far
         out[3, j] -= model[1] * far
+    for i in range(10, 26):
+        if model[_USED + i] != 0.0:
+            series_position(head, data, i, t, out[i])
+            for j in range(3):
+                out[i, j] += out[0, j]
 
 
 @kernel
@@ -206,7 +219,7 @@ def fade(s: float) -> float:
 def acceleration_among(model: Array, places: Array, sun_rate: Array, x: Array, v: Array, out: Array) -> None:
     """Write into ``out[3]`` the acceleration (m/s2) at ``x`` (m), ``v`` (m/s); bodies at ``places`` (m)."""
     ax = ay = az = 0.0
-    for i in range(10):
+    for i in range(26):
         gm = model[_USED + i]
         if gm == 0.0:
             continue
@@ -214,7 +227,7 @@ def acceleration_among(model: Array, places: Array, sun_rate: Array, x: Array, v
         dy = places[i, 1] - x[1]
         dz = places[i, 2] - x[2]
         r2 = dx * dx + dy * dy + dz * dz
-        inner = model[_INNER + i]
+        inner = model[_INNER + i] if i < 10 else 0.0
         c = gm / (r2 * np.sqrt(r2)) if r2 > inner * inner else gm * core(r2 / (inner * inner)) / inner**3
         ax += c * dx
         ay += c * dy
@@ -247,7 +260,7 @@ def acceleration_among(model: Array, places: Array, sun_rate: Array, x: Array, v
 @kernel
 def acceleration(model: Array, t: float, x: Array, v: Array, out: Array) -> None:
     """Write into ``out[3]`` the acceleration (m/s2) at ``t`` (s), ``x`` (m), ``v`` (m/s)."""
-    places = np.empty((10, 3))
+    places = np.empty((26, 3))
     sun_rate = np.zeros(3)
     bodies(model, t, places, sun_rate)
     acceleration_among(model, places, sun_rate, x, v, out)
@@ -279,18 +292,20 @@ def shares(window: Window, t: Array, states: Array, nongrav: NonGravitational | 
 @kernel
 def _sizes(model: Array, t: Array, states: Array, out: Array) -> None:
     """Write the size (m/s2) of each force of ``FORCES`` at each point of a track into ``out[n, forces]``."""
-    places = np.empty((10, 3))
+    places = np.empty((26, 3))
     rate = np.zeros(3)
     a = np.empty(3)
     d = np.empty(3)
     for n in range(t.size):
         bodies(model, t[n], places, rate)
-        for i in range(10):
+        for i in range(26):
             r2 = 0.0
             for j in range(3):
                 d[j] = states[n, j] - places[i, j]
                 r2 += d[j] * d[j]
             out[n, i] = model[_GM + i] / r2
+            if i >= 10:
+                continue
             a[:] = 0.0
             oblateness(model[_FLAT + 4 * i], model[_FLAT + 4 * i + 1 : _FLAT + 4 * i + 4], d, a)
             out[n, _J2 + i] = np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2)

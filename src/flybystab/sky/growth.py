@@ -11,9 +11,11 @@ from astropy.table import QTable
 from numpy.typing import NDArray
 
 from flybystab.constants import DAY
-from flybystab.core.jit import kernel
+from flybystab.core.jit import borrowed, kernel
+from flybystab.sky.dop853 import step
 from flybystab.sky.ephemeris import BODIES, Window
-from flybystab.sky.finder import _LONGEST, _rate, _step
+from flybystab.sky.field import Field, borrowed_field, borrowed_places, empty_places, rate
+from flybystab.sky.finder import _LONGEST
 from flybystab.sky.orbit import seconds
 from flybystab.sky.planets import planet
 from flybystab.sky.predictability import Neighbour, predictability
@@ -22,25 +24,27 @@ Array = NDArray[np.float64]
 
 
 @kernel
-def carry(model: Array, law: Array, t0: float, y0: Array, times: Array, tolerance: float, out: Array) -> int:
+def carry(
+    field: Field, law: Array, t0: float, y0: Array, times: Array, tolerance: float, out: Array
+) -> int:
     """Write barycentric states (m, m/s) at ``times`` (s), in order away from ``t0``, into ``out[n, 6]``.
 
     Steps and tolerance as in :func:`flybystab.sky.finder.track_encounters`. Returns the number written.
     """
-    k = np.empty((13, 6))
+    field = borrowed_field(field)
+    stages, room = np.empty((13, 6)), empty_places()
+    k, places = borrowed(stages), borrowed_places(room)
     y = y0.copy()
     new = np.empty(6)
-    places = np.empty((10, 3))
-    rate = np.zeros(3)
     t = t0
     h = DAY
-    _rate(model, law, t, y, places, rate, k[0])
+    rate(field, law, t, y, places, k[0])
     for n in range(times.size):
         while t != times[n]:
             sign = 1.0 if times[n] > t else -1.0
             last = abs(times[n] - t) <= abs(h)
             length = times[n] - t if last else sign * abs(h)
-            error = _step(model, law, t, y, length, k, new, places, rate) / tolerance
+            error = step(field, law, t, y, length, k, new, places) / tolerance
             if not error <= 1.0:
                 factor = 0.9 * error**-0.125 if error < 1e30 else 0.1
                 h = length * max(factor, 0.1)
@@ -62,9 +66,9 @@ def carry(model: Array, law: Array, t0: float, y0: Array, times: Array, toleranc
 def add_growth(
     table: QTable,
     neighbours: Sequence[Neighbour],
-    laws: Sequence[Array],
+    laws: Array,
     window: Window,
-    model: Array,
+    field: Field,
     tolerance: float,
     threads: int,
 ) -> None:
@@ -78,9 +82,11 @@ def add_growth(
     ----------
     table : QTable
         From :func:`flybystab.find_encounters`.
-    neighbours, laws : sequences
-        Of each asteroid: neighbour, and A1, A2, A3 with their law.
-    window, model, tolerance
+    neighbours : sequence
+        Of each asteroid.
+    laws : ndarray, shape (n, 8)
+        A1, A2, A3 of each asteroid with their law.
+    window, field, tolerance
         Of the search.
     """
     t = seconds(table["time"][0], window.epoch) if len(table) else 0.0
@@ -99,7 +105,7 @@ def add_growth(
             law[:3] = beside.orbit.nongrav.a
         for side in (rows[times[rows] >= start], rows[times[rows] < start][::-1]):
             out = np.empty((side.size, 6))
-            done = carry(model, law, start, state, times[side], tolerance, out)
+            done = carry(field, law, start, state, times[side], tolerance, out)
             for row, found in zip(side[:done], out, strict=False):
                 away = found[:3] - window.states(int(bodies[row]), times[row : row + 1])[0, :3]
                 if table["impact"][row]:
