@@ -16,6 +16,8 @@ C_LIGHT = 299_792_458.0
 
 #: Day, s.
 DAY = 86_400.0
+#: Julian year, s.
+YEAR = 365.25 * DAY
 
 #: Hour, s.
 HOUR = 3_600.0

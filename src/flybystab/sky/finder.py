@@ -19,7 +19,7 @@ from astropy.time import Time
 from astropy.units import Quantity
 from numpy.typing import NDArray
 
-from flybystab.constants import DAY
+from flybystab.constants import DAY, YEAR
 from flybystab.core.jit import borrowed, kernel
 from flybystab.errors import InvalidInput, NotConverged
 from flybystab.sky.almanac import GRID, N_FAST, SLOT, gather
@@ -40,6 +40,9 @@ Array = NDArray[np.float64]
 #: Longest step, s.
 _LONGEST = 30.0 * DAY
 _FULL, _STALLED = 1, 2
+#: Tolerance over the error (m) that it leaves the median asteroid with after ten years; the error grows with the
+#: square of time (``flybystab bench sky``).
+_AT_10_YEARS, _TOLERANCES = 1e-12 / 100.0, (1e-15, 1e-8)
 
 
 @kernel
@@ -178,7 +181,7 @@ def search(
     t_stop: float,
     limits: Array,
     floors: Array,
-    tolerance: float,
+    tolerances: Array,
     least: float,
     always: Array,
     shares: Array,
@@ -220,7 +223,7 @@ def search(
             else:
                 continue
             m, status, t = track_encounters(
-                field, laws[i], t0, y, quiet, end, limits, floors, tolerance, out, m
+                field, laws[i], t0, y, quiet, end, limits, floors, tolerances[i], out, m
             )
             if status != 0:
                 return i, n, status, t
@@ -239,7 +242,7 @@ def find_encounters(
     *,
     ephemeris: str | Ephemeris | None = None,
     error: Quantity = 0.1 * u.km,
-    tolerance: float = 1e-12,
+    tolerance: float | None = None,
     forces: tuple[str, ...] | None = None,
     growth: bool = False,
     threads: int | None = None,
@@ -262,8 +265,9 @@ def find_encounters(
         Displacement that counts: of the point masses and the Sun's 1PN an asteroid is given those that can move
         it by more than a tenth of this before the end of the span; J2 of Sun, Earth and `planets` and its own
         A1, A2, A3 always.
-    tolerance : float
-        Error per step of the integration, in units of 1.5e11 m and 30 km/s.
+    tolerance : float, optional
+        Error per step of the integration, in units of 1.5e11 m and 30 km/s; by default what keeps the median
+        asteroid within `error` to the end of its span: ``1e-12 (error/0.1 km) (10 yr/span)^2``, from 1e-15 to 1e-8.
     forces : tuple of str, optional
         Exactly these forces, names as in ``flybystab.sky.forces.FORCES``, instead of choosing by `error`.
     growth : bool
@@ -318,6 +322,11 @@ def find_encounters(
     if chosen is None:
         used = {name for _, orbit in rows for name in default_forces(orbit, *(b.name for b in found))}
         chosen = tuple(name for name in FORCES if name in used)
+    longest = np.maximum(np.abs(epochs - t_start), np.abs(epochs - t_stop))
+    if tolerance is None:
+        tolerances = np.clip(_AT_10_YEARS * accuracy * (10.0 * YEAR / longest) ** 2, *_TOLERANCES)
+    else:
+        tolerances = np.full(len(rows), float(tolerance))
     everything = field(window, [n for n in chosen if n != "non-gravitational"])
     limits = np.zeros(len(BODIES))
     limits[[BODIES.index(b.name) for b in found]] = reach
@@ -338,12 +347,13 @@ def find_encounters(
 
     def run(part: slice) -> list[Array]:
         tables = everything, laws[part], epochs[part], states[part]
+        steps = tolerances[part]
         size = len(tables[2])
         i, space, parts = 0, 64 * size + 256, []
         while i < size:
             out = np.empty((space, WIDTH))
             i, n, status, reached = search(
-                *tables, t_start, t_stop, limits, floors, tolerance, least, always, shares[part], i, out
+                *tables, t_start, t_stop, limits, floors, steps, least, always, shares[part], i, out
             )
             if status == _STALLED:
                 name = rows[part][i][0]
@@ -379,13 +389,13 @@ def find_encounters(
         "impacts_elsewhere": elsewhere,
         "frame": "ICRF",
         "time_scale": "TDB",
-        "tolerance": tolerance,
+        "tolerance": float(tolerances.min(initial=1.0)),
     }
     out = _table(rows, raw, middle, window, meta)
     if growth:
         from flybystab.sky.growth import add_growth
 
-        add_growth(out, beside, laws, window, everything, tolerance, workers)
+        add_growth(out, beside, laws, window, everything, tolerances, workers)
     return out
 
 

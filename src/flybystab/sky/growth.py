@@ -24,9 +24,7 @@ Array = NDArray[np.float64]
 
 
 @kernel
-def carry(
-    field: Field, law: Array, t0: float, y0: Array, times: Array, tolerance: float, out: Array
-) -> int:
+def carry(field: Field, law: Array, t0: float, y0: Array, times: Array, tolerance: float, out: Array) -> int:
     """Write barycentric states (m, m/s) at ``times`` (s), in order away from ``t0``, into ``out[n, 6]``.
 
     Steps and tolerance as in :func:`flybystab.sky.finder.track_encounters`. Returns the number written.
@@ -69,7 +67,7 @@ def add_growth(
     laws: Array,
     window: Window,
     field: Field,
-    tolerance: float,
+    tolerances: Array,
     threads: int,
 ) -> None:
     """Add to a table of encounters ``displacement`` (km), ``growth`` and ``predictability``.
@@ -86,7 +84,7 @@ def add_growth(
         Of each asteroid.
     laws : ndarray, shape (n, 8)
         A1, A2, A3 of each asteroid with their law.
-    window, field, tolerance
+    window, field, tolerances
         Of the search.
     """
     t = seconds(table["time"][0], window.epoch) if len(table) else 0.0
@@ -105,7 +103,7 @@ def add_growth(
             law[:3] = beside.orbit.nongrav.a
         for side in (rows[times[rows] >= start], rows[times[rows] < start][::-1]):
             out = np.empty((side.size, 6))
-            done = carry(field, law, start, state, times[side], tolerance, out)
+            done = carry(field, law, start, state, times[side], tolerances[i], out)
             for row, found in zip(side[:done], out, strict=False):
                 away = found[:3] - window.states(int(bodies[row]), times[row : row + 1])[0, :3]
                 if table["impact"][row]:
