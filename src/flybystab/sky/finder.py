@@ -325,6 +325,8 @@ def find_encounters(
     longest = np.maximum(np.abs(epochs - t_start), np.abs(epochs - t_stop))
     if tolerance is None:
         tolerances = np.clip(_AT_10_YEARS * accuracy * (10.0 * YEAR / longest) ** 2, *_TOLERANCES)
+        if growth:  # the displacement of a neighbour may be metres
+            tolerances = np.minimum(tolerances, 1e-14)
     else:
         tolerances = np.full(len(rows), float(tolerance))
     everything = field(window, [n for n in chosen if n != "non-gravitational"])
@@ -395,7 +397,10 @@ def find_encounters(
     if growth:
         from flybystab.sky.growth import add_growth
 
-        add_growth(out, beside, laws, window, everything, tolerances, workers)
+        def field_of(i: int) -> Field:
+            return reduced(everything, shares[i], least, always)
+
+        add_growth(out, beside, laws, window, field_of, tolerances, workers)
     return out
 
 

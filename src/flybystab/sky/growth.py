@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 
 import astropy.units as u
@@ -66,7 +66,7 @@ def add_growth(
     neighbours: Sequence[Neighbour],
     laws: Array,
     window: Window,
-    field: Field,
+    field_of: Callable[[int], Field],
     tolerances: Array,
     threads: int,
 ) -> None:
@@ -84,8 +84,10 @@ def add_growth(
         Of each asteroid.
     laws : ndarray, shape (n, 8)
         A1, A2, A3 of each asteroid with their law.
-    window, field, tolerances
+    window, tolerances
         Of the search.
+    field_of : callable
+        Number of an asteroid to the forces that it was given: the neighbour has the same.
     """
     t = seconds(table["time"][0], window.epoch) if len(table) else 0.0
     times = t + (table["time"] - table["time"][0]).to_value(u.s) if len(table) else np.zeros(0)
@@ -99,6 +101,7 @@ def add_growth(
         state = beside.orbit.barycentric(window)
         rows = np.flatnonzero(index == i)
         law = laws[i].copy()
+        field = field_of(i)
         if law.any():
             law[:3] = beside.orbit.nongrav.a
         for side in (rows[times[rows] >= start], rows[times[rows] < start][::-1]):
