@@ -1,4 +1,4 @@
-"""One step of DOP853 in a field (Dormand & Prince; Hairer, Norsett & Wanner 1993; coefficients of SciPy)."""
+"""Steps of DOP853 in a field (Dormand & Prince; Hairer, Norsett & Wanner 1993; coefficients of SciPy)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DOP853
 
-from flybystab.core.jit import summing_kernel
+from flybystab.constants import DAY
+from flybystab.core.jit import pasted_kernel, summing_kernel
 from flybystab.sky.almanac import Places
 from flybystab.sky.field import Field, rate
 
@@ -22,6 +23,8 @@ _E3 = np.ascontiguousarray(DOP853.E3)
 _E5 = np.ascontiguousarray(DOP853.E5)
 #: Units of position (m) and velocity (m/s) in which the tolerance counts.
 _LENGTH, _SPEED = 1.5e11, 3.0e4
+#: Longest step, and the one below which it has collapsed, s.
+LONGEST, SHORTEST = 30.0 * DAY, 1e-3
 
 
 @summing_kernel
@@ -65,3 +68,42 @@ def step(
     if five == 0.0 and three == 0.0:
         return 0.0
     return abs(h) * five / np.sqrt((five + 0.01 * three) * 6.0)
+
+
+@pasted_kernel
+def advance(
+    field: Field,
+    law: Array,
+    t: float,
+    y: Array,
+    h: float,
+    stop: float,
+    tolerance: float,
+    k: Array,
+    new: Array,
+    places: Places,
+) -> tuple[float, float]:
+    """One step of at most ``|h|`` s toward ``stop``, shortened until its error is below ``tolerance``.
+
+    Writes as :func:`step`.
+
+    Returns
+    -------
+    float
+        Time reached, s; exactly ``stop`` in the last step; nan where the step size collapsed.
+    float
+        Length of the next step, positive, s: from this one's error, or as it was where ``stop`` cut it short.
+    """
+    h = abs(h)
+    sign = 1.0 if stop > t else -1.0
+    while h > SHORTEST:
+        last = abs(stop - t) <= h
+        length = stop - t if last else sign * h
+        error = step(field, law, t, y, length, k, new, places) / tolerance
+        scale = 0.9 * error**-0.125 if error > 0.0 else 5.0
+        if error <= 1.0:
+            if not last or scale < 1.0:
+                h = abs(length) * min(max(scale, 0.2), 5.0)
+            return stop if last else t + length, min(h, LONGEST)
+        h = abs(length) * (max(scale, 0.1) if error < 1e30 else 0.1)
+    return np.nan, h

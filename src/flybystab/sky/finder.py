@@ -1,8 +1,7 @@
-"""All encounters of many asteroids: one compiled integration per asteroid, with the search inside it.
+"""All encounters of many asteroids.
 
-DOP853 among prescribed bodies. Each asteroid has its own steps and only the forces that it needs, so that none
-disturbs another, and threads share the work. After each step every planet asked for is checked for a minimum of
-distance (:mod:`flybystab.sky.minima`). An impact, on whichever body, is reported and ends that track.
+Each asteroid is followed on its own (:mod:`flybystab.sky.track`), so that none disturbs another, and threads share
+the work.
 """
 
 from __future__ import annotations
@@ -20,217 +19,25 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.constants import DAY, YEAR
-from flybystab.core.jit import borrowed, kernel
 from flybystab.errors import InvalidInput, NotConverged
-from flybystab.sky.almanac import GRID, N_FAST, SLOT, gather
+from flybystab.sky.almanac import GRID, N_FAST, SLOT
 from flybystab.sky.b_plane import target_plane
-from flybystab.sky.dop853 import step
-from flybystab.sky.ephemeris import BODIES, Ephemeris, Window, body_state
-from flybystab.sky.field import Field, borrowed_field, borrowed_places, empty_places, field, rate
+from flybystab.sky.ephemeris import BODIES, Ephemeris, Window
+from flybystab.sky.field import Field, field
 from flybystab.sky.forces import FORCES
-from flybystab.sky.minima import _FINE, BENDING, WIDTH, chord_distance, crash, look
-from flybystab.sky.need import N_SHARES, NAMES, reduced, shares_along
+from flybystab.sky.minima import WIDTH
+from flybystab.sky.need import N_SHARES, NAMES, reduced
 from flybystab.sky.orbit import Orbit, _ephemeris, default_forces, later, seconds
 from flybystab.sky.planets import PLANETS, planet
 from flybystab.sky.predictability import neighbour
+from flybystab.sky.track import STALLED, search
 from flybystab.units import to_si
 
 Array = NDArray[np.float64]
 
-#: Longest step, s.
-_LONGEST = 30.0 * DAY
-_FULL, _STALLED = 1, 2
 #: Tolerance over the error (m) that it leaves the median asteroid with after ten years; the error grows with the
 #: square of time (``flybystab bench sky``).
 _AT_10_YEARS, _TOLERANCES = 1e-12 / 100.0, (1e-15, 1e-8)
-
-
-@kernel
-def track_encounters(
-    field: Field,
-    law: Array,
-    t0: float,
-    y0: Array,
-    t_quiet: float,
-    t_end: float,
-    limits: Array,
-    floors: Array,
-    tolerance: float,
-    out: Array,
-    n: int,
-) -> tuple[int, int, float]:
-    """Encounters of one asteroid from ``t0`` to ``t_end``, s, not counting those before ``t_quiet``.
-
-    Parameters
-    ----------
-    field : Field
-        Forces, without the non-gravitational one.
-    law : ndarray, shape (8,)
-        A1, A2, A3 (m/s2) and their law; zeros for none.
-    t0, y0 : float, ndarray
-        Start (s) and barycentric state (m, m/s). Time may run backward.
-    limits, floors : ndarray, shape (10,)
-        Of each body: largest distance of an encounter (zero: only impacts count), distance of impact, m.
-    tolerance : float
-        Error per step, in units of 1.5e11 m and 30 km/s.
-    out : ndarray, shape (rows, 12)
-        Result from row `n` on; see ``WIDTH``.
-
-    Returns
-    -------
-    int
-        Number of rows.
-    int
-        0 done; 1 `out` was too small; 2 the step size collapsed.
-    float
-        Time reached, s.
-    """
-    field = borrowed_field(field)
-    stages, places_kept = np.empty((13, 6)), empty_places()
-    spare_stages, spare_kept = np.empty((13, 6)), empty_places()
-    k, places = borrowed(stages), borrowed_places(places_kept)
-    spare, spare_places = borrowed(spare_stages), borrowed_places(spare_kept)
-    y = y0.copy()
-    new = np.empty(6)
-    old, now = np.empty((10, 3)), np.empty((10, 3))
-    work = np.empty(6)
-    pair = np.empty((2, 10))
-    sign = 1.0 if t_end >= t0 else -1.0
-    h = sign * DAY
-    t = t0
-    rate(field, law, t, y, places, k[0])
-    gather(places, now)
-    while (t_end - t) * sign > 0.0:
-        stop = t_quiet if (t_quiet - t) * sign > 0.0 else t_end
-        last = abs(stop - t) <= abs(h)
-        length = stop - t if last else h
-        error = step(field, law, t, y, length, k, new, places) / tolerance
-        if not error <= 1.0:
-            factor = 0.9 * error**-0.125 if error < 1e30 else 0.1
-            h = length * max(factor, 0.1)
-            if abs(h) < 1e-3:
-                return n, _STALLED, t
-            continue
-        t_new = stop if last else t + length
-        old[:] = now
-        gather(places, now)
-        if (t - t_quiet) * sign >= 0.0:
-            early, late = (0, 1) if sign > 0.0 else (1, 0)
-            pair[early, 0] = t
-            pair[late, 0] = t_new
-            bend0 = 0.0
-            bend1 = 0.0
-            for j in range(6):
-                pair[early, 1 + j] = y[j]
-                pair[late, 1 + j] = new[j]
-            for j in range(3):
-                pair[early, 7 + j] = k[0, 3 + j]
-                pair[late, 7 + j] = k[12, 3 + j]
-                bend0 += k[0, 3 + j] ** 2
-                bend1 += k[12, 3 + j] ** 2
-            bend = 3.0 * np.sqrt(max(bend0, bend1))
-            bulge = 0.125 * length * length
-            for body in range(10):
-                reach = max(limits[body], floors[body])
-                if chord_distance(y, old[body], new, now[body]) > reach + bulge * (bend + BENDING[body]):
-                    continue
-                if n + _FINE > out.shape[0]:
-                    return n, _FULL, t
-                d1 = 0.0
-                for j in range(3):
-                    d1 += (new[j] - now[body, j]) ** 2
-                if d1 < floors[body] ** 2:
-                    body_state(field.head, field.data, field.gm, body, t, work)
-                    for j in range(6):
-                        out[n, 2 + j] = y[j] - work[j]
-                    crash(out[n], body, field.gm[body], t, sign)
-                    return n + 1, 0, t_new
-                n, hit = look(
-                    field,
-                    law,
-                    pair,
-                    k[0] if sign > 0.0 else k[12],
-                    body,
-                    limits[body],
-                    floors[body],
-                    out,
-                    n,
-                    spare,
-                    spare_places,
-                )
-                if hit == hit:
-                    return n, 0, hit
-        t = t_new
-        y[:] = new
-        k[0] = k[12]
-        grow = 0.9 * error**-0.125 if error > 0.0 else 5.0
-        if not last or grow < 1.0:
-            h = length * min(max(grow, 0.2), 5.0)
-        if abs(h) > _LONGEST:
-            h = sign * _LONGEST
-    return n, 0, t
-
-
-@kernel
-def search(
-    everything: Field,
-    laws: Array,
-    epochs: Array,
-    states: Array,
-    t_start: float,
-    t_stop: float,
-    limits: Array,
-    floors: Array,
-    tolerances: Array,
-    least: float,
-    always: Array,
-    shares: Array,
-    first: int,
-    out: Array,
-) -> tuple[int, int, int, float]:
-    """Encounters of asteroids ``first``, ``first + 1``, ... until all are done or ``out`` is full.
-
-    ``least`` (m) is the share of a force below which it is left out, ``shares[n, 29]`` takes the estimates.
-    Other arguments as in :func:`track_encounters`, one row per asteroid.
-
-    Returns
-    -------
-    int
-        The asteroid to go on with.
-    int
-        Number of rows.
-    int
-        0 done, 1 `out` was too small for the next asteroid, 2 its step size collapsed.
-    float
-        Where it did, s.
-    """
-    n = 0
-    room = empty_places()
-    for i in range(first, epochs.size):
-        t0 = epochs[i]
-        y = states[i]
-        if t0 > t_start:
-            shares_along(everything, t0, y, t_start, room, shares[i])
-        if t0 < t_stop:
-            shares_along(everything, t0, y, t_stop, room, shares[i])
-        field = reduced(everything, shares[i], least, always)
-        m = n
-        for leg in range(2):
-            if leg == 0 and t0 > t_start:
-                quiet, end = min(t0, t_stop), t_start
-            elif leg == 1 and t0 < t_stop:
-                quiet, end = max(t0, t_start), t_stop
-            else:
-                continue
-            m, status, t = track_encounters(
-                field, laws[i], t0, y, quiet, end, limits, floors, tolerances[i], out, m
-            )
-            if status != 0:
-                return i, n, status, t
-        for row in range(n, m):
-            out[row, 11] = i
-        n = m
-    return epochs.size, n, 0, 0.0
 
 
 def find_encounters(
@@ -357,7 +164,7 @@ def find_encounters(
             i, n, status, reached = search(
                 *tables, t_start, t_stop, limits, floors, steps, least, always, shares[part], i, out
             )
-            if status == _STALLED:
+            if status == STALLED:
                 name = rows[part][i][0]
                 raise NotConverged(f"{name}: the step size collapsed at {later(middle, reached).iso} TDB")
             out[:n, 11] += part.start

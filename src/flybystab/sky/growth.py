@@ -12,10 +12,9 @@ from numpy.typing import NDArray
 
 from flybystab.constants import DAY
 from flybystab.core.jit import borrowed, kernel
-from flybystab.sky.dop853 import step
+from flybystab.sky.dop853 import advance
 from flybystab.sky.ephemeris import BODIES, Window
 from flybystab.sky.field import Field, borrowed_field, borrowed_places, empty_places, rate
-from flybystab.sky.finder import _LONGEST
 from flybystab.sky.orbit import seconds
 from flybystab.sky.planets import planet
 from flybystab.sky.predictability import Neighbour, predictability
@@ -27,36 +26,23 @@ Array = NDArray[np.float64]
 def carry(field: Field, law: Array, t0: float, y0: Array, times: Array, tolerance: float, out: Array) -> int:
     """Write barycentric states (m, m/s) at ``times`` (s), in order away from ``t0``, into ``out[n, 6]``.
 
-    Steps and tolerance as in :func:`flybystab.sky.finder.track_encounters`. Returns the number written.
+    Steps as in :func:`flybystab.sky.track.track_encounters`. Returns the number written.
     """
     field = borrowed_field(field)
     stages, room = np.empty((13, 6)), empty_places()
     k, places = borrowed(stages), borrowed_places(room)
     y = y0.copy()
     new = np.empty(6)
-    t = t0
     h = DAY
+    t = t0
     rate(field, law, t, y, places, k[0])
     for n in range(times.size):
         while t != times[n]:
-            sign = 1.0 if times[n] > t else -1.0
-            last = abs(times[n] - t) <= abs(h)
-            length = times[n] - t if last else sign * abs(h)
-            error = step(field, law, t, y, length, k, new, places) / tolerance
-            if not error <= 1.0:
-                factor = 0.9 * error**-0.125 if error < 1e30 else 0.1
-                h = length * max(factor, 0.1)
-                if abs(h) < 1e-3:
-                    return n
-                continue
-            t = times[n] if last else t + length
+            t, h = advance(field, law, t, y, h, times[n], tolerance, k, new, places)
+            if t != t:  # the step size collapsed
+                return n
             y[:] = new
             k[0] = k[12]
-            grow = 0.9 * error**-0.125 if error > 0.0 else 5.0
-            if not last or grow < 1.0:
-                h = length * min(max(grow, 0.2), 5.0)
-            if abs(h) > _LONGEST:
-                h = _LONGEST
         out[n] = y
     return times.size
 

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 #: (m2/s2), impact (0, 1), asteroid.
 WIDTH = 12
 #: Pieces in which ``r.v`` is sampled; more where the body's pull or the Sun's tide can turn a slow path round.
-_CUTS, _FINE = 8, 64
+_CUTS, FINE = 8, 64
 #: Largest acceleration of each of ``BODIES``, m/s2: GM_sun over the square of its perihelion distance; the Moon's
 #: with the Earth's pull.
 BENDING = np.array([1e-5, 0.0629, 0.0116, 0.0062, 0.0093, 0.0032, 2.5e-4, 8e-5, 2e-5, 7e-6])
@@ -80,7 +80,7 @@ def cuts(field: Field, pair: Array, body: int) -> int:
         vb += b[3 + j] ** 2
         bend += (b[3 + j] - a[3 + j]) ** 2
     pull = max(np.sqrt(bend) / h, field.gm[body] / max(min(ra, rb), 1.0))
-    return _FINE if min(va, vb) < 4.0 * np.sqrt(max(ra, rb)) * pull else _CUTS
+    return FINE if min(va, vb) < 4.0 * np.sqrt(max(ra, rb)) * pull else _CUTS
 
 
 @kernel
