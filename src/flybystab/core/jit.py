@@ -39,6 +39,7 @@ def _borrowed(context, array):  # type: ignore[no-untyped-def]
     return array(array), generate
 
 
-#: Inside a kernel: the same array without its reference count; the caller keeps it alive. Counting costs an
-#: atomic instruction at each use, which in a loop over bodies is most of the time.
+#: Inside a kernel: the same array without its reference count. Counting costs an atomic instruction at each use,
+#: which in a loop over bodies is most of the time. Only an argument may be borrowed, as its caller keeps it alive: a
+#: local is freed after its last use, and the next array would lie in its place.
 borrowed: Any = intrinsic(_borrowed)

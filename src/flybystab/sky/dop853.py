@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.integrate import DOP853
 
 from flybystab.constants import DAY
-from flybystab.core.jit import pasted_kernel, summing_kernel
+from flybystab.core.jit import borrowed, kernel, pasted_kernel, summing_kernel
 from flybystab.sky.almanac import Places
-from flybystab.sky.field import Field, rate
+from flybystab.sky.field import Field, empty_places, rate
 
 Array = NDArray[np.float64]
 
@@ -25,6 +27,26 @@ _E5 = np.ascontiguousarray(DOP853.E5)
 _LENGTH, _SPEED = 1.5e11, 3.0e4
 #: Longest step, and the one below which it has collapsed, s.
 LONGEST, SHORTEST = 30.0 * DAY, 1e-3
+
+
+class Room(NamedTuple):
+    """Where a step is worked out: rates ``k[13, 6]`` of its stages and places of the bodies."""
+
+    k: Array
+    places: Places
+
+
+@kernel
+def empty_room() -> Room:
+    """Room for one integration."""
+    return Room(np.empty((13, 6)), empty_places())
+
+
+@kernel
+def borrowed_room(room: Room) -> Room:
+    """The same room without reference counts, for use inside a kernel that has it as an argument."""
+    p = room.places
+    return Room(borrowed(room.k), Places(borrowed(p.fast), borrowed(p.slow), borrowed(p.belt)))
 
 
 @summing_kernel

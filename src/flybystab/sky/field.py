@@ -100,7 +100,7 @@ def empty_places() -> Places:
 
 @kernel
 def borrowed_field(f: Field) -> Field:
-    """The same field without reference counts, for use inside a kernel that its caller hands it to."""
+    """The same field without reference counts, for use inside a kernel that has it as an argument."""
     b = f.book
     return Field(
         Almanac(borrowed(b.when), borrowed(b.fast), borrowed(b.slow), borrowed(b.belt)),
@@ -116,12 +116,6 @@ def borrowed_field(f: Field) -> Field:
         borrowed(f.data),
         borrowed(f.gm),
     )
-
-
-@kernel
-def borrowed_places(p: Places) -> Places:
-    """The same room without reference counts."""
-    return Places(borrowed(p.fast), borrowed(p.slow), borrowed(p.belt))
 
 
 @pasted_kernel
@@ -230,4 +224,4 @@ def rate(field: Field, law: Array, t: float, y: Array, places: Places, out: Arra
         _push(law, y, places, out)
 
 
-__all__ = ["Field", "borrowed_field", "borrowed_places", "empty_places", "field", "rate"]
+__all__ = ["Field", "borrowed_field", "empty_places", "field", "rate"]

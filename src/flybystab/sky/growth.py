@@ -11,10 +11,10 @@ from astropy.table import QTable
 from numpy.typing import NDArray
 
 from flybystab.constants import DAY
-from flybystab.core.jit import borrowed, kernel
-from flybystab.sky.dop853 import advance
+from flybystab.core.jit import kernel
+from flybystab.sky.dop853 import Room, advance, borrowed_room, empty_room
 from flybystab.sky.ephemeris import BODIES, Window
-from flybystab.sky.field import Field, borrowed_field, borrowed_places, empty_places, rate
+from flybystab.sky.field import Field, borrowed_field, rate
 from flybystab.sky.orbit import seconds
 from flybystab.sky.planets import planet
 from flybystab.sky.predictability import Neighbour, predictability
@@ -23,14 +23,15 @@ Array = NDArray[np.float64]
 
 
 @kernel
-def carry(field: Field, law: Array, t0: float, y0: Array, times: Array, tolerance: float, out: Array) -> int:
+def carry(
+    field: Field, law: Array, t0: float, y0: Array, times: Array, tolerance: float, room: Room, out: Array
+) -> int:
     """Write barycentric states (m, m/s) at ``times`` (s), in order away from ``t0``, into ``out[n, 6]``.
 
     Steps as in :func:`flybystab.sky.track.track_encounters`. Returns the number written.
     """
     field = borrowed_field(field)
-    stages, room = np.empty((13, 6)), empty_places()
-    k, places = borrowed(stages), borrowed_places(room)
+    k, places = borrowed_room(room)
     y = y0.copy()
     new = np.empty(6)
     h = DAY
@@ -92,7 +93,7 @@ def add_growth(
             law[:3] = beside.orbit.nongrav.a
         for side in (rows[times[rows] >= start], rows[times[rows] < start][::-1]):
             out = np.empty((side.size, 6))
-            done = carry(field, law, start, state, times[side], tolerances[i], out)
+            done = carry(field, law, start, state, times[side], tolerances[i], empty_room(), out)
             for row, found in zip(side[:done], out, strict=False):
                 away = found[:3] - window.states(int(bodies[row]), times[row : row + 1])[0, :3]
                 if table["impact"][row]:

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.constants import DAY
-from flybystab.core.jit import borrowed, kernel
+from flybystab.core.jit import kernel
 from flybystab.sky.almanac import gather
-from flybystab.sky.dop853 import advance
+from flybystab.sky.dop853 import Room, advance, borrowed_room, empty_room
 from flybystab.sky.ephemeris import body_state
-from flybystab.sky.field import Field, borrowed_field, borrowed_places, empty_places, rate
+from flybystab.sky.field import Field, borrowed_field, empty_places, rate
 from flybystab.sky.minima import BENDING, FINE, chord_distance, crash, look
 from flybystab.sky.need import reduced, shares_along
 
@@ -36,6 +36,8 @@ def track_encounters(
     limits: Array,
     floors: Array,
     tolerance: float,
+    room: Room,
+    spare_room: Room,
     out: Array,
     n: int,
 ) -> tuple[int, int, float]:
@@ -53,6 +55,8 @@ def track_encounters(
         Of each body: largest distance of an encounter (zero: only impacts count), distance of impact, m.
     tolerance : float
         Error per step, in units of 1.5e11 m and 30 km/s.
+    room, spare_room : Room
+        For the integration and for the refinement of minima.
     out : ndarray, shape (rows, 12)
         Result from row `n` on; see ``WIDTH``.
 
@@ -66,10 +70,8 @@ def track_encounters(
         Time reached, s.
     """
     field = borrowed_field(field)
-    stages, places_kept = np.empty((13, 6)), empty_places()
-    spare_stages, spare_kept = np.empty((13, 6)), empty_places()
-    k, places = borrowed(stages), borrowed_places(places_kept)
-    spare, spare_places = borrowed(spare_stages), borrowed_places(spare_kept)
+    k, places = borrowed_room(room)
+    spare, spare_places = borrowed_room(spare_room)
     y = y0.copy()
     new = np.empty(6)
     old, now = np.empty((10, 3)), np.empty((10, 3))
@@ -173,14 +175,14 @@ def search(
         Where it did, s.
     """
     n = 0
-    room = empty_places()
+    room, spare_room, places = empty_room(), empty_room(), empty_places()
     for i in range(first, epochs.size):
         t0 = epochs[i]
         y = states[i]
         if t0 > t_start:
-            shares_along(everything, t0, y, t_start, room, shares[i])
+            shares_along(everything, t0, y, t_start, places, shares[i])
         if t0 < t_stop:
-            shares_along(everything, t0, y, t_stop, room, shares[i])
+            shares_along(everything, t0, y, t_stop, places, shares[i])
         field = reduced(everything, shares[i], least, always)
         m = n
         for leg in range(2):
@@ -191,7 +193,7 @@ def search(
             else:
                 continue
             m, status, t = track_encounters(
-                field, laws[i], t0, y, quiet, end, limits, floors, tolerances[i], out, m
+                field, laws[i], t0, y, quiet, end, limits, floors, tolerances[i], room, spare_room, out, m
             )
             if status != 0:
                 return i, n, status, t
