@@ -61,6 +61,15 @@ def two(asteroid: Asteroid, settings: Settings) -> list[Passage]:
     return at(DISTANCES["2 R_E"], asteroid, settings)
 
 
+#: Distance, asteroids, samples of each.
+CASES = (
+    ("0.02 au", 200, 100),
+    ("10 R_E", 100, 100),
+    ("4 R_E", 50, 100),
+    ("2 R_E", 20, 100),
+    ("2 R_E", 1, 1000),
+    ("0.02 au", 1, 100_000),
+)
 FINDERS = dict(zip(DISTANCES, (far, ten, four, two), strict=True))
 
 
@@ -74,21 +83,29 @@ def measured(run: Screening, executor: Executor | None) -> tuple[float, int, int
 
 def throughput() -> None:
     bodies = [a for a in catalogue() if a.name != "Bennu"]
-    head = [("workers", 7), ("samples", 8), ("by dynamics", 11), ("samples/s", 10)]
+    head = [
+        ("asteroids", 9),
+        ("workers", 7),
+        ("samples", 8),
+        ("by dynamics", 11),
+        ("samples/s", 10),
+        ("ratio", 5),
+    ]
     print(f"{'distance':>9} " + " ".join(f"{name:>{width}}" for name, width in head))
-    rates: dict[tuple[str, int], float] = {}
+    rates: dict[tuple[str, int, int], float] = {}
     with ProcessPoolExecutor(2) as pool:
         # The first runs compile, in the workers, too.
-        measured(Screening(bodies[:20], settings(*SPAN, samples=20), two), pool)
+        measured(Screening(bodies[:20], settings(*SPAN, samples=40), two), pool)
         measured(Screening(bodies[:4], settings(*SPAN, samples=20), two), None)
-        for name, finder in FINDERS.items():
-            n = {"0.02 au": 200, "10 R_E": 100, "4 R_E": 50, "2 R_E": 20}[name]
+        for name, n, samples in CASES:
             for workers in (1, 2):
-                run = Screening(bodies[:n], settings(*SPAN, samples=100), finder)
-                spent, samples, dynamic = measured(run, pool if workers == 2 else None)
-                rates[name, workers] = samples / spent
+                chosen = bodies[:n] if n > 1 else [Asteroid.from_catalogue("Anteros")]
+                run = Screening(chosen, settings(*SPAN, samples=samples), FINDERS[name])
+                spent, judged, dynamic = measured(run, pool if workers == 2 else None)
+                rate = rates[name, n, workers] = judged / spent
                 print(
-                    f"{name:>9} {workers:7d} {samples:8d} {100 * dynamic / samples:10.1f}% {samples / spent:10.0f}"
+                    f"{name:>9} {n:9d} {workers:7d} {judged:8d} {100 * dynamic / judged:10.1f}% {rate:10.0f} "
+                    f"{rate / rates[name, n, 1]:5.2f}"
                 )
         nothing = Screening(bodies, settings(*SPAN), nowhere)
         spent, _, _ = measured(nothing, pool)
@@ -105,7 +122,7 @@ def throughput() -> None:
     # Passages within 0.05 au that come within 10 Earth radii, by the area of the target plane.
     deep = (10 * R_EARTH / (0.05 * AU)) ** 2
     search = 1e6 * 24 / (years / spent) / 2
-    draw = 1e8 * ((1 - deep) / rates["0.02 au", 2] + deep / rates["2 R_E", 2])
+    draw = 1e8 * ((1 - deep) / rates["0.02 au", 200, 2] + deep / rates["2 R_E", 20, 2])
     print("on paper: 10^6 objects for 24 years, 10^8 samples, machines with two such cores")
     for machines in (1, 10, 100):
         print(

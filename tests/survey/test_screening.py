@@ -1,5 +1,6 @@
 """The chain from asteroids to rows: verdicts, probabilities, reproducibility, failure, stop and resume."""
 
+import json
 import pickle
 import re
 import signal
@@ -25,6 +26,7 @@ from flybystab.survey.quick import tide_size
 from flybystab.survey.results import read_results
 from flybystab.survey.screening import Screening, screen
 from flybystab.survey.settings import settings
+from flybystab.survey.tasks import Part
 
 
 def same(a, b):
@@ -93,6 +95,39 @@ def test_same_rows_for_any_executor_and_order():
     assert not np.array_equal(here["margin"], other["margin"], equal_nan=True) or not np.array_equal(
         here["contributors"], other["contributors"]
     )
+
+
+def test_samples_may_be_split_at_will():
+    """Parts of any size, in any order, on any number of workers: the same rows and samples, bit for bit."""
+    run = screening(3, samples=41, seed=8, keep_samples=True)
+    whole = dict(run.results())
+    text = {i: json.dumps(rows) for i, rows in whole.items()}
+    assert sum(r["samples_dynamic"] for r in whole[1]["rows"]) > 20
+    for workers, block, chunk in ((1, 1, 1), (3, 5, 2), (2, 16, 1), (2, 1000, 3)):
+        with ThreadPoolExecutor(workers) as pool:
+            split = dict(run.results(pool, block=block, chunk=chunk, window=workers))
+        assert {i: json.dumps(rows) for i, rows in split.items()} == text
+
+
+def test_a_deep_passage_is_work_for_every_worker():
+    """The parts of one asteroid's samples are calls of their own, each of them small."""
+
+    sizes = []
+
+    class Counting(ThreadPoolExecutor):
+        def submit(self, work, *given, **more):
+            if isinstance(given[0], Part):
+                sizes.append(len(given[0].attitudes.uniform))
+            return super().submit(work, *given, **more)
+
+    run = Screening([Asteroid.from_catalogue("Anteros")], settings(*SPAN, samples=200, seed=1), three)
+    with Counting(2) as pool:
+        (_, result), *more = run.results(pool, block=10)
+    assert not more
+    assert len(result["rows"]) == 3
+    assert sum(sizes) >= 192  # all but the first samples of the deep passage at least
+    assert max(sizes) <= 80
+    assert len(sizes) >= 15
 
 
 def test_quick_verdicts_are_those_of_the_dynamics():

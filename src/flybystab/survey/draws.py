@@ -69,9 +69,9 @@ class Draws(NamedTuple):
     phase: Array
     drawn: tuple[str, ...]
 
-    def only(self, i: int) -> Draws:
-        """Sample `i` alone."""
-        arrays = {name: getattr(self, name)[i : i + 1] for name in self._fields if name != "drawn"}
+    def part(self, first: int, last: int) -> Draws:
+        """Samples `first` to ``last - 1``."""
+        arrays = {name: getattr(self, name)[first:last] for name in self._fields if name != "drawn"}
         return self._replace(**arrays)
 
     def body(self, i: int, material: Material) -> Body:
@@ -229,9 +229,9 @@ class Attitudes:
         numbers = stream(seed, "attitude", identity(asteroid), *encounter).random((len(draws.rho), 3))
         return cls(asteroid, draws, numbers)
 
-    def only(self, i: int) -> Attitudes:
-        """Attitude of sample `i` alone."""
-        return Attitudes(self.asteroid, self.draws.only(i), self.uniform[i : i + 1])
+    def part(self, first: int, last: int) -> Attitudes:
+        """Attitudes of samples `first` to ``last - 1``."""
+        return Attitudes(self.asteroid, self.draws.part(first, last), self.uniform[first:last])
 
     def pole(self, i: int) -> Array:
         """Direction of the angular momentum of sample `i`, ICRF."""

@@ -27,6 +27,18 @@ def _end_with(sentinel: int) -> None:
     os._exit(1)
 
 
+def _start(pool: ProcessPoolExecutor, jobs: int) -> None:
+    """Start all processes with interrupts blocked: they inherit that, and Ctrl-C finds none half-way up."""
+    mask = getattr(signal, "pthread_sigmask", None)
+    before = mask(signal.SIG_BLOCK, {signal.SIGINT}) if mask else None
+    try:
+        for _ in range(jobs):
+            pool.submit(os.getpid)
+    finally:
+        if mask:
+            mask(signal.SIG_SETMASK, before)
+
+
 @contextmanager
 def workers(jobs: int = 1, dask: str | None = None, timeout: float = 30.0) -> Iterator[Executor | None]:
     """An executor for `screen` and `Screening.run`, closed at the end.
@@ -74,6 +86,7 @@ def workers(jobs: int = 1, dask: str | None = None, timeout: float = 30.0) -> It
         # Fresh processes: a fork of a process with threads can hang.
         pool = ProcessPoolExecutor(jobs, mp_context=get_context("spawn"), initializer=_follow_parent)
         try:
+            _start(pool, jobs)
             yield pool
         finally:
             pool.shutdown(wait=True, cancel_futures=True)

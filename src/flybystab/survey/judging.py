@@ -49,6 +49,17 @@ class Judged:
     error: list[str]
     numerical: float = np.nan
 
+    @classmethod
+    def joined(cls, parts: Sequence[Judged]) -> Judged:
+        """The samples of all parts, in their order."""
+        return cls(
+            [v for p in parts for v in p.verdict],
+            np.concatenate([p.margin for p in parts]),
+            np.concatenate([p.rest for p in parts]),
+            np.concatenate([p.dynamic for p in parts]),
+            [e for p in parts for e in p.error],
+        )
+
 
 def judge(
     passage: Passage,
@@ -133,16 +144,11 @@ def judge_each(
     tolerance: float = 1e-7,
 ) -> Judged:
     """Verdicts on bodies, each in a passage of its own (arguments as of :func:`judge`)."""
-    one = [
-        judge(p, draw.only(i), attitudes.only(i), material, tolerance=tolerance)
-        for i, p in enumerate(passages)
-    ]
-    return Judged(
-        [j.verdict[0] for j in one],
-        np.array([j.margin[0] for j in one]),
-        np.array([j.rest[0] for j in one]),
-        np.array([j.dynamic[0] for j in one]),
-        [j.error[0] for j in one],
+    return Judged.joined(
+        [
+            judge(p, draw.part(i, i + 1), attitudes.part(i, i + 1), material, tolerance=tolerance)
+            for i, p in enumerate(passages)
+        ]
     )
 
 

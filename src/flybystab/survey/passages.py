@@ -55,6 +55,11 @@ class Passage:
     orbit: Orbit | None = None
     missed: bool = False
 
+    @property
+    def key(self) -> tuple[str, str]:
+        """What names the passage in the random streams."""
+        return self.planet, f"{self.time.tdb.jd:.1f}"
+
     def bounds(self) -> tuple[float, float]:
         """Bounds on the tide, as of :func:`tide_size`, from distance and speed alone; infinite where unknown.
 

@@ -7,7 +7,6 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab import __version__
 from flybystab.constants import AU
@@ -16,22 +15,27 @@ from flybystab.outcome import Verdict
 from flybystab.sky.ephemeris import ephemeris
 from flybystab.survey.catalogue import Asteroid
 from flybystab.survey.columns import VERDICTS, YIELDED, share_of
-from flybystab.survey.draws import Attitudes, Draws, draws, nominal
-from flybystab.survey.judging import Judged, contributors, inputs, judge, judge_each, wilson
-from flybystab.survey.passages import Finder, Passage, passages
+from flybystab.survey.draws import Attitudes, Draws, nominal
+from flybystab.survey.judging import Judged, contributors, inputs, judge, wilson
+from flybystab.survey.passages import Passage
 from flybystab.survey.settings import Settings
-from flybystab.survey.spread import Spread, spread
+from flybystab.survey.spread import Spread
 
-Array = NDArray[np.float64]
+#: Values by column; a column that is left out is empty.
+Row = dict[str, Any]
 
 #: The margin of the catalogue body is computed, not bounded, where the bound is this far from rest, rad.
 SHARP = float(np.radians(0.01))
 
 
-def screen_passage(passage: Passage, settings: Settings) -> tuple[dict[str, Any], list[dict[str, Any]]]:
-    """Row of one encounter, and the rows of its samples if they are kept."""
+def failed_row(asteroid: Asteroid, settings: Settings, error: FlybystabError) -> Row:
+    """Row of an asteroid that could not be followed."""
+    return _head(asteroid, settings) | {"error": f"{type(error).__name__}: {error}"}
+
+
+def body_row(passage: Passage, settings: Settings) -> Row:
+    """Row of an encounter with what happens to the catalogue body; without a verdict where that is not known."""
     asteroid, material = passage.asteroid, settings.material
-    where = (passage.planet, f"{passage.time.tdb.jd:.1f}")
     row = _head(asteroid, settings) | {
         "planet": passage.planet,
         "time_tdb": passage.time.tdb.isot,
@@ -41,13 +45,13 @@ def screen_passage(passage: Passage, settings: Settings) -> tuple[dict[str, Any]
     }
     try:
         known = nominal(asteroid, material, settings.population)
-        attitude = Attitudes.at(asteroid, known, settings.seed, "nominal", *where)
+        attitude = Attitudes.at(asteroid, known, settings.seed, "nominal", *passage.key)
         main = judge(
             passage, known, attitude, material, tolerance=settings.tolerance, sharp=SHARP, measure=True
         )
     except FlybystabError as error:
-        return row | {"error": f"{type(error).__name__}: {error}"}, []
-    row |= {
+        return row | {"error": f"{type(error).__name__}: {error}"}
+    return row | {
         "verdict": main.verdict[0],
         "margin": float(np.rad2deg(main.margin[0])),
         "decided_by": "dynamics" if main.dynamic[0] else "bound",
@@ -67,22 +71,16 @@ def screen_passage(passage: Passage, settings: Settings) -> tuple[dict[str, Any]
         "samples": 0,
         "samples_dynamic": 0,
     }
-    if settings.samples <= 1:
-        return row, []
-    draw = draws(asteroid, settings.samples, settings.seed, settings.population)
-    attitudes = Attitudes.at(asteroid, draw, settings.seed, *where)
-    orbits = spread(passage, settings.samples, settings.seed)
-    if orbits.passages is None:
-        result = judge(passage, draw, attitudes, material, tolerance=settings.tolerance)
-    else:
-        result = judge_each(orbits.passages, draw, attitudes, material, tolerance=settings.tolerance)
-    distances = _distances(passage, orbits, settings.samples)
+
+
+def sampled_row(row: Row, passage: Passage, orbits: Spread, draw: Draws, result: Judged) -> Row:
+    """The row of the catalogue body with what happens to the samples."""
     counts = Counter(result.verdict)
-    judged = settings.samples - counts[""]
+    judged = len(draw.rho) - counts[""]
     stands = judged - counts[Verdict.NOT_IN_EQUILIBRIUM]
     yielded = sum(counts[v] for v in YIELDED)
     low, high = wilson(yielded, stands)
-    row |= {
+    row = row | {
         "samples": judged,
         "samples_dynamic": int(result.dynamic.sum()),
         **{share_of(v): counts[v] / judged if judged else np.nan for v in VERDICTS},
@@ -90,23 +88,16 @@ def screen_passage(passage: Passage, settings: Settings) -> tuple[dict[str, Any]
         "p_yield_low": low,
         "p_yield_high": high,
         "distance_sigma": orbits.sigma / 1000.0,
-        "contributors": contributors(inputs(draw) | {"distance": distances}, result.margin),
+        "contributors": contributors(
+            inputs(draw) | {"distance": orbits.distances(passage, len(draw.rho))}, result.margin
+        ),
         "drawn": "; ".join((*draw.drawn, *(("orbit",) if orbits.passages else ()))),
         "assumed": "; ".join(filter(None, (row["assumed"], orbits.note))),
     }
     failures = [e for e in result.error if e]
     if failures and not row["error"]:
         row["error"] = f"{len(failures)} samples: {failures[0]}"
-    if not settings.keep_samples:
-        return row, []
-    return row, list(_samples(passage, distances, draw, attitudes, result))
-
-
-def _distances(passage: Passage, orbits: Spread, samples: int) -> Array:
-    """Distance of each sample's passage, m."""
-    if orbits.passages is None:
-        return np.full(samples, passage.distance)
-    return np.array([p.distance for p in orbits.passages])
+    return row
 
 
 def _rise(most: float, rest: float) -> float:
@@ -114,9 +105,10 @@ def _rise(most: float, rest: float) -> float:
     return most - rest if np.isfinite(rest) else np.nan
 
 
-def _samples(
-    passage: Passage, distances: Array, draw: Draws, attitudes: Attitudes, result: Judged
-) -> Iterator[dict[str, Any]]:
+def sample_rows(passage: Passage, orbits: Spread, attitudes: Attitudes, result: Judged) -> Iterator[Row]:
+    """Rows of the samples of one encounter."""
+    draw = attitudes.draws
+    distances = orbits.distances(passage, len(draw.rho))
     for i in range(len(draw.rho)):
         pole = attitudes.pole(i)
         yield {
@@ -140,7 +132,7 @@ def _samples(
         }
 
 
-def _head(asteroid: Asteroid, settings: Settings) -> dict[str, Any]:
+def _head(asteroid: Asteroid, settings: Settings) -> Row:
     return {
         "asteroid": asteroid.name,
         "number": -1 if asteroid.number is None else asteroid.number,
@@ -153,28 +145,3 @@ def _head(asteroid: Asteroid, settings: Settings) -> dict[str, Any]:
         "ephemeris": ephemeris().name,
         "version": __version__,
     }
-
-
-def screen_asteroid(
-    asteroid: Asteroid, settings: Settings, finder: Finder = passages
-) -> dict[str, list[dict[str, Any]]]:
-    """All rows of one asteroid: the unit of work. What fails is a row that says why."""
-    try:
-        found = finder(asteroid, settings)
-    except FlybystabError as error:
-        return {
-            "rows": [_head(asteroid, settings) | {"error": f"{type(error).__name__}: {error}"}],
-            "samples": [],
-        }
-    rows, samples = [], []
-    for passage in found:
-        row, more = screen_passage(passage, settings)
-        rows.append(row)
-        samples += more
-    return {"rows": rows, "samples": samples}
-
-
-def _work(
-    asteroids: list[Asteroid], settings: Settings, finder: Finder
-) -> list[dict[str, list[dict[str, Any]]]]:
-    return [screen_asteroid(a, settings, finder) for a in asteroids]

@@ -1,20 +1,20 @@
 """Many bodies through many encounters: which passages could reshape which asteroids, and how likely.
 
-Each asteroid is one task. Its encounters are found; at each one the catalogue body and the samples of
-:mod:`flybystab.survey.population` meet the tide. What the bound of :mod:`flybystab.survey.quick` decides is
-decided by it, the rest by the dynamics (:mod:`flybystab.survey.judging`). Tasks share nothing, and their
-random numbers depend on the seed and the asteroid only, so that any executor gives the same rows.
+Each asteroid is one task (:mod:`flybystab.survey.tasks`). Its encounters are found; at each one the catalogue body
+and the samples of :mod:`flybystab.survey.population` meet the tide. What the bound of :mod:`flybystab.survey.quick`
+decides is decided by it, the rest by the dynamics (:mod:`flybystab.survey.judging`), split over the workers where
+there is much of it. Tasks share nothing, and their random numbers depend on the seed, the asteroid and the sample
+only, so that any executor gives the same rows.
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import os
 import time as clock
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from collections.abc import Callable, Container, Iterator, Sequence
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +25,7 @@ from astropy.units import Quantity
 
 from flybystab import __version__
 from flybystab.aggregate.body import Material
-from flybystab.errors import InvalidInput, OutputFailed, WorkersLost
+from flybystab.errors import InvalidInput, OutputFailed
 from flybystab.sky.ephemeris import ephemeris
 from flybystab.survey.catalogue import Asteroid, catalogue
 from flybystab.survey.columns import COLUMNS, SAMPLE_COLUMNS
@@ -35,8 +35,9 @@ from flybystab.survey.passages import Finder, passages
 from flybystab.survey.population import Population
 from flybystab.survey.progress import Progress
 from flybystab.survey.results import Journal, check_output, table_of, write_rows
-from flybystab.survey.rows import _work, screen_asteroid
+from flybystab.survey.scheduling import scheduled, window_of
 from flybystab.survey.settings import Settings, settings
+from flybystab.survey.tasks import Rows, begin, block_of, joined
 
 
 class Screening:
@@ -90,10 +91,11 @@ class Screening:
         self,
         executor: Executor | None = None,
         *,
-        skip: Iterable[int] = (),
+        skip: Container[int] = (),
         chunk: int = 1,
         window: int | None = None,
-    ) -> Iterator[tuple[int, dict[str, list[dict[str, Any]]]]]:
+        block: int | None = None,
+    ) -> Iterator[tuple[int, Rows]]:
         """Results of the asteroids that are not in `skip`, as they are done: (position, result).
 
         Parameters
@@ -103,38 +105,25 @@ class Screening:
         chunk : int
             Asteroids in one call of a worker.
         window : int, optional
-            Calls in flight at a time: memory does not grow with the length of the list.
+            Calls in flight at a time; four a worker by default.
+        block : int, optional
+            Samples by the dynamics in one call of a worker. The rows do not depend on it.
         """
-        done = set(skip)
-        todo = [i for i in range(len(self.asteroids)) if i not in done]
+        todo = (i for i in range(len(self.asteroids)) if i not in skip)
         if executor is None:
             for i in todo:
-                yield i, screen_asteroid(self.asteroids[i], self.settings, self.finder)
+                yield i, joined(begin(self.asteroids[i], self.settings, self.finder), self.settings)
             return
-        chunks = iter([todo[k : k + chunk] for k in range(0, len(todo), chunk)])
-        limit = window or 4 * int(getattr(executor, "_max_workers", 0) or os.cpu_count() or 1)
-        pending: dict[Future[Any], list[int]] = {}
-        try:
-            while True:
-                while len(pending) < limit and (part := next(chunks, None)) is not None:
-                    future = executor.submit(
-                        _work, [self.asteroids[i] for i in part], self.settings, self.finder
-                    )
-                    pending[future] = part
-                if not pending:
-                    return
-                finished, _ = wait(pending, return_when=FIRST_COMPLETED)
-                for future in finished:
-                    part = pending.pop(future)
-                    try:
-                        results = future.result()
-                    except (BrokenExecutor, CancelledError) as error:
-                        lost = ", ".join(self.asteroids[i].name for i in part)
-                        raise WorkersLost(f"workers died or went away ({error}); in work: {lost}") from None
-                    yield from zip(part, results, strict=True)
-        finally:
-            for future in pending:
-                future.cancel()
+        yield from scheduled(
+            self.asteroids,
+            todo,
+            self.settings,
+            self.finder,
+            executor,
+            chunk=chunk,
+            window=window or window_of(executor),
+            block=block or block_of(self.settings.samples),
+        )
 
     def run(
         self,

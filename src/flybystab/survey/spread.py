@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 import astropy.units as u
 import numpy as np
+from numpy.typing import NDArray
 
 from flybystab.errors import FlybystabError
 from flybystab.sky.distribution import EncounterDistribution, encounter_distribution
@@ -46,6 +47,12 @@ class Spread(NamedTuple):
     passages: list[Passage] | None
     sigma: float
     note: str
+
+    def distances(self, passage: Passage, samples: int) -> NDArray[np.float64]:
+        """Distance of each sample's passage, m."""
+        if self.passages is None:
+            return np.full(samples, passage.distance)
+        return np.array([p.distance for p in self.passages])
 
 
 def spread(passage: Passage, samples: int, seed: int) -> Spread:

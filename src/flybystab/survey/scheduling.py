@@ -1,0 +1,137 @@
+"""Work of a screening on the workers of an executor: what is sent next, and what has come back."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Iterable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any, NamedTuple
+
+from flybystab.errors import WorkersLost
+from flybystab.survey.catalogue import Asteroid
+from flybystab.survey.judging import Judged
+from flybystab.survey.passages import Finder
+from flybystab.survey.settings import Settings
+from flybystab.survey.tasks import Begun, Part, Rows, begin, joined
+
+
+def _begin(
+    asteroids: list[Asteroid], settings: Settings, finder: Finder, block: int
+) -> list[list[Rows | Begun]]:
+    return [begin(a, settings, finder, block) for a in asteroids]
+
+
+def _judge(part: Part, settings: Settings) -> Judged:
+    return part.judged(settings)
+
+
+@dataclass(eq=False)
+class _Asteroid:
+    """An asteroid in work: its passages, and how many of them are not done."""
+
+    position: int
+    work: list[Rows | Begun]
+    open: int
+
+
+class _Piece(NamedTuple):
+    """Where the answer of a call for a part belongs."""
+
+    asteroid: _Asteroid
+    passage: Begun
+    first: int
+
+
+def scheduled(
+    asteroids: Sequence[Asteroid],
+    todo: Iterable[int],
+    settings: Settings,
+    finder: Finder,
+    executor: Executor,
+    *,
+    chunk: int,
+    window: int,
+    block: int,
+) -> Iterator[tuple[int, Rows]]:
+    """Rows of the asteroids at the positions `todo`, as they are done: (position, rows).
+
+    Parts of asteroids that are begun go before new asteroids, so that few are open at a time.
+
+    Parameters
+    ----------
+    chunk : int
+        Asteroids in one call of a worker.
+    window : int
+        Calls in flight at a time: memory does not grow with the length of the list.
+    block : int
+        Samples by the dynamics in one part (:func:`flybystab.survey.tasks.begun`).
+
+    Raises
+    ------
+    WorkersLost
+        With the names of the asteroids in work.
+    """
+    positions = iter(todo)
+    waiting: deque[Iterator[tuple[_Piece, Part]]] = deque()
+    calls: dict[Future[Any], list[int] | _Piece] = {}
+
+    def send() -> bool:
+        """Send one call; False if there is nothing to send."""
+        while waiting:
+            if (found := next(waiting[0], None)) is not None:
+                piece, part = found
+                calls[executor.submit(_judge, part, settings)] = piece
+                return True
+            waiting.popleft()
+        if chosen := list(islice(positions, chunk)):
+            future = executor.submit(_begin, [asteroids[i] for i in chosen], settings, finder, block)
+            calls[future] = chosen
+        return bool(chosen)
+
+    try:
+        while True:
+            while len(calls) < window and send():
+                pass
+            if not calls:
+                return
+            finished, _ = wait(calls, return_when=FIRST_COMPLETED)
+            for future in finished:
+                call = calls.pop(future)
+                try:
+                    answer = future.result()
+                except (BrokenExecutor, CancelledError) as error:
+                    names = ", ".join(asteroids[i].name for i in _positions(call))
+                    raise WorkersLost(f"workers died or went away ({error}); in work: {names}") from None
+                if isinstance(call, _Piece):
+                    call.passage.take(call.first, answer)
+                    call.asteroid.open -= not call.passage.left
+                    if not call.asteroid.open:
+                        yield call.asteroid.position, joined(call.asteroid.work, settings)
+                    continue
+                for i, work in zip(call, answer, strict=True):
+                    left = [w for w in work if isinstance(w, Begun)]
+                    if left:
+                        waiting.append(_pieces(_Asteroid(i, work, len(left)), left))
+                    else:
+                        yield i, joined(work, settings)
+    finally:
+        for future in calls:
+            future.cancel()
+
+
+def _pieces(asteroid: _Asteroid, left: Sequence[Begun]) -> Iterator[tuple[_Piece, Part]]:
+    for passage in left:
+        for first, part in passage.parts():
+            yield _Piece(asteroid, passage, first), part
+
+
+def _positions(call: list[int] | _Piece) -> list[int]:
+    return [call.asteroid.position] if isinstance(call, _Piece) else call
+
+
+def window_of(executor: Executor) -> int:
+    """Calls in flight that keep all workers busy."""
+    return 4 * int(getattr(executor, "_max_workers", 0) or os.cpu_count() or 1)
