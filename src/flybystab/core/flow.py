@@ -43,7 +43,8 @@ from flybystab.core.workspace import (
 
 Array = NDArray[np.float64]
 
-#: Lode angle, rad, by which `D` may be past the fan of a corner: rounding of the switch, far below any other error.
+#: Lode angle, rad, by which `D` may be past the fan of a corner, and share of a face that counts as its end: the switch
+#: is located no better, and it is far below any other error.
 _SLACK = 1e-9
 
 
@@ -99,6 +100,25 @@ def _health(
 
 
 @kernel
+def _record_end(
+    t: float,
+    y: Array,
+    dy: Array,
+    par: Array,
+    tide: TidePanels,
+    limit2: float,
+    ws: Workspace,
+    hist: Array,
+    count: Counts,
+) -> None:
+    """Append the last state of a flow to the history."""
+    if hist.shape[0] > 1:
+        _health(t, y, dy, par, tide, limit2, ws)
+        p, strength, det = ws.work.m[W_SCRATCH, 1, 2], ws.work.m[W_SCRATCH, 1, 1], ws.work.m[W_SCRATCH, 2, 0]
+        record(t, FLOWING, y, par, p, strength, det, ws, hist, count)
+
+
+@kernel
 def choose_part(t: float, y: Array, par: Array, tide: TidePanels, near: float, ws: Workspace) -> None:
     """Find the part of the yield section for a flow: a face if `D` is normal to one and can stay so, or a corner.
 
@@ -112,9 +132,11 @@ def choose_part(t: float, y: Array, par: Array, tide: TidePanels, near: float, w
     rate(FLOWING, t, y, ws.spare[:15], par, tide, ws.work)
     place, past = ws.work.m[W_SCRATCH, 2, 1], ws.work.m[W_SCRATCH, 2, 2]
     if abs(past) <= near:
-        if 0.0 <= place <= 1.0:
+        # A stress at the very end of the face belongs to the corner: it may have just come there along the face, and
+        # chosen again the face would end in a step of no length.
+        if _SLACK <= place <= 1.0 - _SLACK:
             return
-        compression = place > 1.0
+        compression = place > 0.5
     else:
         compression = past > 0.0
     par[PART] = COMPRESSION_CORNER if compression else EXTENSION_CORNER
@@ -217,6 +239,7 @@ def follow_flow(
             copy(ws.y1, y, N_FULL)
             t += h
             if reason != SWITCH:
+                _record_end(t, y, f0, par, tide, limit2, ws, hist, count)
                 return reason, t
             choose_part(t, y, par, tide, near, ws)
             if _health(t, y, f0, par, tide, limit2, ws) < 0.0:
@@ -227,6 +250,7 @@ def follow_flow(
         copy(ws.y1, y, N_FULL)
         _, d, _ = deviator(y[6:12], ws.stress)
         if d < D_REST:
+            _record_end(t, y, f0, par, tide, limit2, ws, hist, count)
             return ARREST, t
         h *= min(6.0, max(0.2, 0.9 * error ** (-0.2))) if error > 0.0 else 6.0
     return DONE, t
