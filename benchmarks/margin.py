@@ -16,7 +16,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import flybystab as fs
-from flybystab.flybys import flyby_many
+from flybystab.many import flyby_many
 from flybystab.margins import HOLDS, RECOVERS, RUNS_AWAY, flyby_margin
 
 GCC = u.g / u.cm**3

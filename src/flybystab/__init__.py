@@ -32,10 +32,10 @@ _HOME = {
     "equilibrium": "aggregate.equilibrium",
     "find_encounters": "sky.finder",
     "flyby": "flybys",
-    "flyby_many": "flybys",
+    "flyby_many": "many",
     "flyby_margin": "margins",
     "infer": "survey.inference",
-    "periapsis_axes": "flybys",
+    "periapsis_axes": "attitudes",
     "screen": "survey.screening",
     "spin_sample": "spin",
     "stability": "aggregate.stability",
@@ -49,10 +49,12 @@ if TYPE_CHECKING:
     from flybystab.aggregate.body import Body, Material
     from flybystab.aggregate.equilibrium import equilibrium
     from flybystab.aggregate.stability import stability
+    from flybystab.attitudes import periapsis_axes
     from flybystab.errors import FlybystabError
     from flybystab.face.cite import cite
     from flybystab.flyby_results import FlybyResult
-    from flybystab.flybys import flyby, flyby_many, periapsis_axes
+    from flybystab.flybys import flyby
+    from flybystab.many import flyby_many
     from flybystab.margins import flyby_margin
     from flybystab.odds import survival
     from flybystab.outcome import Verdict

@@ -14,11 +14,13 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.aggregate.body import Body
+from flybystab.attitudes import attitude_matrix, periapsis_axes
 from flybystab.core.jit import kernel
 from flybystab.core.motion import rotated_to_body, rotation_matrix
+from flybystab.core.passage import passage
 from flybystab.core.tide import TidePanels, tide_at
-from flybystab.errors import InvalidInput
-from flybystab.flybys import _rotation, _run, periapsis_axes
+from flybystab.errors import InvalidInput, NotConverged
+from flybystab.rows import span_of
 from flybystab.sky.encounter import Encounter
 
 Array = NDArray[np.float64]
@@ -79,9 +81,28 @@ def rigid_course(
         raise InvalidInput("body", body, "a flybystab.Body")
     if not isinstance(encounter, Encounter):
         raise InvalidInput("encounter", encounter, "a flybystab.Encounter")
-    rotation = periapsis_axes(encounter).T @ _rotation(attitude)
-    run = _run(body, encounter, rotation, tolerance, np.inf, ROWS, unyielding=True)
-    assert run.history is not None
+    rotation = periapsis_axes(encounter).T @ attitude_matrix(attitude)
+    start, stop, limit, _ = span_of(encounter)
+    material = body.material
+    run = passage(
+        body.axes,
+        body.rho,
+        body.omega,
+        rotation,
+        start,
+        limit,
+        encounter.tide,
+        t_rest=stop,
+        phi=material.phi,
+        cohesion=material.c_pa,
+        surface=material.surface_code,
+        unyielding=True,
+        tolerance=tolerance,
+        max_axis_ratio=np.inf,
+        keep=ROWS,
+    )
+    if run.reason == "stuck" or run.history is None:
+        raise NotConverged(f"the rigid course stopped {run.time - start:.1f} s after the start")
     time = run.history["time"]
     turned = np.empty((len(time), 3, 3))
     spin, tide = np.empty((len(time), 3)), np.empty((len(time), 6))

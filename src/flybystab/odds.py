@@ -13,7 +13,7 @@ from scipy.stats import binomtest
 
 from flybystab.aggregate.body import Body, Material
 from flybystab.errors import InvalidInput
-from flybystab.flybys import flyby_many
+from flybystab.many import flyby_many
 from flybystab.outcome import Verdict
 from flybystab.sky.distribution import EncounterDistribution
 from flybystab.sky.encounter import Encounter

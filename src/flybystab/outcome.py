@@ -7,8 +7,8 @@ from enum import StrEnum
 import numpy as np
 from numpy.typing import NDArray
 
-from flybystab.constants import G
-from flybystab.core.ellipsoid import gravity_coefficients, potential_coefficient
+from flybystab.core import judgement
+from flybystab.core.outcome import bound_share
 
 Array = NDArray[np.float64]
 
@@ -32,8 +32,16 @@ class Verdict(StrEnum):
     NOT_IN_EQUILIBRIUM = "NOT IN EQUILIBRIUM"
 
 
-#: Mass that a RESHAPED body may lose: the rounding of the quadrature below.
-ALL_BOUND = 1.0 - 1e-6
+#: Verdicts by their codes in :mod:`flybystab.core.judgement`; what could not be computed is none of them.
+VERDICTS = {
+    judgement.INTACT: Verdict.INTACT,
+    judgement.RESHAPED: Verdict.RESHAPED,
+    judgement.MASS_LOSS: Verdict.MASS_LOSS,
+    judgement.DISRUPTED: Verdict.DISRUPTED,
+    judgement.IMPACT: Verdict.IMPACT,
+    judgement.BEYOND_MODEL: Verdict.BEYOND_MODEL,
+    judgement.NOT_IN_EQUILIBRIUM: Verdict.NOT_IN_EQUILIBRIUM,
+}
 
 
 def bound_fraction(shape: Array, velocity_gradient: Array, density: float) -> float:
@@ -53,33 +61,23 @@ def bound_fraction(shape: Array, velocity_gradient: Array, density: float) -> fl
     density : float
         kg/m3.
     """
-    values, vectors = np.linalg.eigh(shape)
-    a = np.sqrt(values)
-    potential = np.pi * G * density
-    coefficients = np.array(gravity_coefficients(*values))
-    bound = potential * potential_coefficient(*values)
-    flow = vectors.T @ velocity_gradient @ vectors @ np.diag(a)
-    form = 0.5 * flow.T @ flow + potential * np.diag(coefficients * values)
-    if np.linalg.eigvalsh(form)[-1] < bound:
-        return 1.0
-    # Gauss-Legendre in the polar cosine (measured from the axis that escapes most), trapezoid in longitude.
-    _, axes = np.linalg.eigh(form)
-    diagonal = np.diag(axes.T @ form @ axes)
-    mu, weight = np.polynomial.legendre.leggauss(128)
-    longitude = (np.arange(256) + 0.5) * np.pi / 256
-    sine2 = 1.0 - mu**2
-    across = diagonal[0] * np.cos(longitude) ** 2 + diagonal[1] * np.sin(longitude) ** 2
-    value = diagonal[2] * mu[:, None] ** 2 + sine2[:, None] * across[None, :]
-    radius3 = np.minimum(1.0, (bound / value) ** 1.5)
-    return float(0.5 * weight @ radius3.mean(axis=1))
+    return float(
+        bound_share(
+            np.array(shape, dtype=float, order="C"),
+            np.array(velocity_gradient, dtype=float, order="C"),
+            float(density),
+        )
+    )
 
 
 def classed(bound: float) -> tuple[Verdict, str | None]:
     """Verdict and Richardson class of a body that has flowed; class edges belong to the heavier class."""
-    if bound >= ALL_BOUND:
-        return Verdict.RESHAPED, None
-    if bound > 0.9:
-        return Verdict.MASS_LOSS, "M"
-    if bound > 0.5:
-        return Verdict.MASS_LOSS, "B"
-    return Verdict.DISRUPTED, "S"
+    verdict = VERDICTS[judgement.class_of(bound)]
+    return verdict, letter_of(verdict, bound)
+
+
+def letter_of(verdict: Verdict, bound: float) -> str | None:
+    """Class of Richardson et al. (1998) of a verdict: M, B or S; None for bodies that lost nothing."""
+    if verdict == Verdict.MASS_LOSS:
+        return "M" if bound > 0.9 else "B"
+    return "S" if verdict == Verdict.DISRUPTED else None

@@ -11,7 +11,9 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.aggregate.body import Body, Material
-from flybystab.flybys import TOLERANCE, flyby_many, periapsis_axes
+from flybystab.attitudes import periapsis_axes
+from flybystab.many import flyby_many
+from flybystab.rows import TOLERANCE
 from flybystab.sky.encounter import Encounter
 from flybystab.units import whole
 

@@ -109,6 +109,8 @@ def test_energy_and_momentum_budget_of_a_flyby(surface, dilatancy, q):
     e = earth(q)
     r = Rotation.from_euler("zxz", [20, 50, 10], degrees=True).as_matrix()
     p = carried(body, e.t_start, e.t_stop, e.tide, r, tolerance=1e-10, keep=50000)
+    # Associative Mohr-Coulomb: the stress reaches the end of a face, and a solver that takes the face again stalls.
+    assert p.reason == "done"
     h = p.history
     k = tides(e.tide, h["time"])
     flow = h["velocity_gradient"] @ h["shape"]
@@ -137,15 +139,19 @@ def test_energy_and_momentum_budget_of_a_flyby(surface, dilatancy, q):
     edges = np.flatnonzero(np.diff(h["regime"])) + 1
     scale = np.abs(np.diff(energy)).max() + kinetic(h["shape"][0], h["velocity_gradient"][0])
     for a, b in zip([0, *edges], [*edges, len(h["time"])], strict=True):
-        part = {"time": h["time"][a:b]}
         regime = h["regime"][a]
         samples = 4 if regime == 0 else 2
-        n = (b - a - 1) // samples * samples
-        work = simpson(part, (power - (loss if regime == 1 else 0.0))[a:b], samples)
-        assert energy[a + n] - energy[a] == pytest.approx(work, abs=2e-7 * scale), regime
+        end = a + (b - a - 1) // samples * samples
+        if end > a and np.ptp(last := np.diff(h["time"][end - samples : end + 1])) > 1e-6 * last.max():
+            end -= samples  # a step cut short by the end of the regime
+        if end == a:
+            continue
+        part, rows = {"time": h["time"][a : end + 1]}, slice(a, end + 1)
+        work = simpson(part, (power - (loss if regime == 1 else 0.0))[rows], samples)
+        assert energy[end] - energy[a] == pytest.approx(work, abs=2e-7 * scale), regime
         np.testing.assert_allclose(
-            spin[a + n] - spin[a],
-            simpson(part, torque[a:b], samples),
+            spin[end] - spin[a],
+            simpson(part, torque[rows], samples),
             atol=2e-7 * np.linalg.norm(spin[0]),
         )
         seen.add(int(regime))

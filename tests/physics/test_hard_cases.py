@@ -22,7 +22,8 @@ from flybystab.core import motion
 from flybystab.core.rheology import required_friction
 from flybystab.core.workspace import ARREST, CONTACT, JAM, LOSS, ONSET
 from flybystab.errors import InvalidInput
-from flybystab.flybys import flyby, flyby_many
+from flybystab.flybys import flyby
+from flybystab.many import flyby_many
 
 DENSITY = 2000 * u.kg / u.m**3
 TILT = Rotation.from_euler("zxz", [30, 40, 70], degrees=True).as_matrix()
@@ -89,6 +90,20 @@ def test_grazing_yield(excess, dilatancy):
     assert (arrest - onset) / np.sqrt(excess) == pytest.approx(5600.0, rel=0.03)
     strain = np.abs(np.log(axes_of(p.shape) / GRAZER.axes)).max()
     assert strain / excess**2 == pytest.approx(1.37, rel=0.07 if excess > 1e-5 else 0.7)
+
+
+@pytest.mark.parametrize("tolerance", [1e-6, 1e-8])
+def test_history_of_a_grazing_yield_runs_forward(tolerance):
+    """The onset lies between two samples of a step that are both below yield; no row after it is rigid."""
+    e = earth(2.3, 4.0)
+    demand = carried(GRAZER, e.t_start, e.t_stop, e.tide, TILT, unyielding=True, tolerance=1e-11)
+    body = GRAZER.with_(material=material(np.rad2deg(demand.max_friction) * (1.0 - 1e-6)))
+    p = carried(body, e.t_start, e.t_stop, e.tide, TILT, tolerance=tolerance, keep=20000)
+    time, regime = p.history["time"], p.history["regime"]
+    assert [x[0] for x in p.events] == ["onset", "arrest"]
+    assert np.all(np.diff(time) >= 0.0)
+    assert time[regime == 1].min() == p.events[0][1]
+    assert time[regime == 1].max() == p.events[1][1]
 
 
 def test_just_enough_friction_never_yields():
@@ -338,16 +353,71 @@ def test_error_estimate_covers_the_true_error():
 
 
 def test_many_is_the_same_as_one_by_one():
-    bodies = [PILE, PILE.with_(material=material(8)), PILE.with_(spin_period=-6 * u.h)]
-    encounters = [earth(2.2), earth(2.2), earth(1.6)]
-    attitudes = [None, TILT, TILT]
-    table = flyby_many(bodies, encounters, attitudes, workers=2)
-    for i in range(3):
-        r = flyby(bodies[i], encounters[i], attitudes[i], error=False, history=False)
-        assert table.verdict[i] == r.verdict
-        np.testing.assert_array_equal(table.semi_axes[i], r.semi_axes)
-        assert table.spin[i] == r.spin
-        assert table.max_required_friction_angle[i] == r.max_required_friction_angle
-        assert table.spin_ratio[i] == r.spin_ratio
+    near = earth(2.2)
+    bodies = [
+        PILE,
+        PILE.with_(material=material(8)),
+        PILE.with_(spin_period=-6 * u.h),
+        PILE.with_(spin_period=None, material=material(30, yield_surface="mohr-coulomb", dilatancy=1.0)),
+        PILE.with_(material=material(35, cohesion=80 * u.Pa, brittle=True)),
+        PILE.with_(spin_period=2 * u.h),
+        PILE,
+        PILE,
+    ]
+    encounters = [near, near, earth(1.6), earth(1.3), earth(1.8), near, earth(0.9), earth(1.2, v_inf=1.0)]
+    attitudes = [None, TILT, TILT, Rotation.from_matrix(TILT), TILT, None, TILT, None]
+    tables = [flyby_many(bodies, encounters, attitudes, workers=w) for w in (1, 2)]
+    seen = set()
+    for i in range(len(bodies)):
+        for history, table in zip((False, True), tables, strict=True):
+            r = flyby(bodies[i], encounters[i], attitudes[i], error=False, history=history)
+            assert table.verdict[i] == r.verdict
+            assert table.bound_fraction[i] == r.bound_fraction
+            np.testing.assert_array_equal(table.semi_axes[i], r.semi_axes)
+            assert table.spin[i] == r.spin
+            assert table.max_required_friction_angle[i] == r.max_required_friction_angle
+            assert table.margin[i] == r.margin
+            np.testing.assert_array_equal(table.spin_ratio[i], r.spin_ratio)
+            np.testing.assert_array_equal(table.pole_change[i], r.pole_change)
+            seen.add(str(r.verdict))
+    assert len(seen) >= 4
     with pytest.raises(InvalidInput, match="as many encounters"):
         flyby_many(bodies, encounters[:2])
+    assert len(flyby_many([], [])) == 0
+
+
+def test_a_row_that_cannot_be_computed_leaves_the_others_alone():
+    e = earth(3.0)
+    table = flyby_many([PILE] * 3, [e] * 3, [None, np.diag([1.0, 1.0, -1.0]), None], workers=2)
+    assert list(table.verdict) == ["INTACT", "FAILED", "INTACT"]
+    assert "det A = +1" in table.failure[1]
+    assert np.isnan(table.spin_ratio[1])
+    assert table.failure[0] == ""
+
+
+@pytest.mark.parametrize("workers", [0, -1, "x", 1.5, True])
+def test_workers_are_a_whole_number(workers):
+    with pytest.raises(InvalidInput, match="workers = "):
+        flyby_many([PILE], [earth(3.0)], workers=workers)
+
+
+def test_the_row_that_is_no_body_is_named():
+    e = earth(3.0)
+    with pytest.raises(InvalidInput, match=r"bodies\[1\] = None: expected a flybystab Body"):
+        flyby_many([PILE, None], [e, e])
+    with pytest.raises(InvalidInput, match=r"encounters\[0\] = .*a flybystab Encounter"):
+        flyby_many([PILE, PILE], ["earth", e])
+    with pytest.raises(InvalidInput, match=r"bodies = .*a sequence"):
+        flyby_many(PILE, e)
+    with pytest.raises(InvalidInput, match=r"attitudes = .*a sequence"):
+        flyby_many([PILE], [e], 1.0)
+    with pytest.raises(InvalidInput, match="tolerance"):
+        flyby_many([PILE], [e], tolerance=1.0)
+    with pytest.raises(InvalidInput, match="max_axis_ratio"):
+        flyby_many([PILE], [e], max_axis_ratio=1.0)
+
+
+def test_a_rotation_in_single_precision_is_told_why_it_is_none():
+    turn = Rotation.from_euler("zxz", [30, 40, 70], degrees=True).as_matrix().astype(np.float32)
+    with pytest.raises(InvalidInput, match="single precision"):
+        flyby(PILE, earth(3.0), turn)

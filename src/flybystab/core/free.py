@@ -92,6 +92,7 @@ def follow_free(
                     low = mid
             explicit_step(regime, t, y, N_FULL, high * h, par, tide, ws.work, k, ws.scale, ws.y1)
             copy(ws.y1, y, N_FULL)
+            record(t + high * h, regime, y, par, 0.0, 0.0, 0.0, ws, hist, count)
             return reason, t + high * h
         t = t1 if last else t + h
         copy(ws.y1, y, N_FULL)

@@ -24,6 +24,9 @@ summing_kernel = njit(cache=True, nogil=True, error_model="numpy", **_SUMS)
 # Handing over a tuple of arrays costs more than the few sums inside.
 pasted_kernel = njit(cache=True, nogil=True, error_model="numpy", inline="always", **_SUMS)
 
+#: A kernel that becomes part of its callers: those that only pass large ones on would compile them once more.
+inlined = njit(cache=True, nogil=True, error_model="numpy", inline="always")
+
 
 def code(n: int) -> int:
     """An integer constant for kernels: numba compiles anew for each literal int, but not for numpy's."""

@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 
 from flybystab.constants import G
 from flybystab.core import motion, regimes
+from flybystab.core.jit import inlined, kernel
 from flybystab.core.rheology import DRUCKER_PRAGER, EXTENSION_CONE, least_slope
+from flybystab.core.tensors import determinant, multiply, pack, unpack
 from flybystab.core.tide import TidePanels
-from flybystab.core.workspace import N_EVENT, N_HISTORY
+from flybystab.core.workspace import N_EVENT, N_HISTORY, Counts
 
 Array = NDArray[np.float64]
 
@@ -63,6 +65,7 @@ class Passage(NamedTuple):
     rejected: int
 
 
+@kernel
 def parameters(
     axes: Array,
     rho: float,
@@ -74,22 +77,111 @@ def parameters(
     expansion: float = 1.5,
 ) -> Array:
     """Parameter array of the kernels from SI floats (`phi` in rad, `cohesion` in Pa, `viscosity` in Pa s)."""
-    a0 = np.cbrt(np.prod(axes))
+    a0 = np.cbrt(axes[0] * axes[1] * axes[2])
     rate2 = np.pi * G * rho
     par = np.zeros(motion.N_PARAMETERS)
     par[motion.SURFACE] = surface
     par[motion.SIN_PHI] = np.sin(phi)
     par[motion.COS_PHI] = np.cos(phi)
+    par[motion.BETA] = dilatancy * least_slope(surface, np.sin(phi))
     # Associative flow on a slope k(theta) is the true normal; less dilatant flow goes along the stress deviator.
-    normal = dilatancy >= 1.0 and surface not in (DRUCKER_PRAGER, EXTENSION_CONE)
-    par[motion.NORMAL] = normal
-    par[motion.BETA] = 1.0 if normal else dilatancy * least_slope(surface, np.sin(phi))
+    if dilatancy >= 1.0 and surface not in (DRUCKER_PRAGER, EXTENSION_CONE):
+        par[motion.NORMAL] = 1.0
+        par[motion.BETA] = 1.0
     par[motion.COHESION] = 5.0 * cohesion / (rho * a0 * a0 * rate2)
     par[motion.VISCOSITY] = 10.0 * viscosity / (rho * a0 * a0 * np.sqrt(rate2))
     par[motion.EXPANSION] = expansion
-    s = (axes / a0) ** 2
-    motion.set_rigid_shape(s[0], s[1], s[2], par)
+    motion.set_rigid_shape((axes[0] / a0) ** 2, (axes[1] / a0) ** 2, (axes[2] / a0) ** 2, par)
     return par
+
+
+@kernel
+def _set_flowing(axes: Array, omega: Array, deformation: Array, attitude: Array, y: Array) -> None:
+    """State of a body that flows with the velocity gradient ``deformation[3, 3]`` on top of its spin (body axes)."""
+    a, b, back = np.empty((3, 3)), np.zeros((3, 3)), attitude.T.copy()
+    for i in range(3):
+        b[i, i] = axes[i] ** 2
+    multiply(attitude, b, a)
+    multiply(a, back, b)
+    pack(b, y[0:6])
+    a[:] = deformation
+    a[2, 1] += omega[0]
+    a[1, 2] -= omega[0]
+    a[0, 2] += omega[1]
+    a[2, 0] -= omega[1]
+    a[1, 0] += omega[2]
+    a[0, 1] -= omega[2]
+    multiply(attitude, a, b)
+    multiply(b, back, a)
+    motion.set_gradient(a, y)
+
+
+@inlined
+def carry(
+    axes: Array,
+    rho: float,
+    omega: Array,
+    attitude: Array,
+    t_start: float,
+    t_stop: float,
+    t_rest: float,
+    tide: TidePanels,
+    phi: float,
+    cohesion: float,
+    dilatancy: float,
+    surface: int,
+    brittle: bool,
+    expansion: float,
+    unyielding: bool,
+    tolerance: float,
+    max_axis_ratio: float,
+    max_steps: int,
+    shape: Array,
+    gradient: Array,
+    hist: Array,
+    events: Array,
+    count: Counts,
+    mark: Array,
+    deformation: Array,
+) -> tuple[int, float, int]:
+    """Follow a body; the arguments are those of `passage`, with a `deformation` of zero for a rigid start.
+
+    Writes ``S`` (m2) and ``L`` (1/s) at the end, and the history (in the units of the body, but with the stresses
+    in Pa and times in s), event log (s), counts and mark (rad, s) of :func:`flybystab.core.regimes.follow`; returns
+    the reason, time (s) and regime of the end.
+    """
+    t0 = 1.0 / np.sqrt(np.pi * G * rho)
+    a0 = np.cbrt(axes[0] * axes[1] * axes[2])
+    par = parameters(axes, rho, phi, cohesion, dilatancy, surface, 0.0, expansion)
+    y = np.zeros(motion.N_FULL)
+    regimes.quaternion(attitude, y)
+    for i in range(3):
+        y[4 + i] = omega[i] * t0
+    start = motion.RIGID
+    if np.any(deformation != 0.0):
+        start = motion.FLOWING
+        _set_flowing(axes / a0, omega * t0, deformation * t0, attitude, y)
+    scaled = TidePanels(tide.tau / t0, tide.start, tide.width, tide.coefficients * t0**2)
+    reason, t, regime = regimes.follow(
+        t_start / t0, t_stop / t0, t_rest / t0, start, y, par, scaled, tolerance, max_axis_ratio,
+        brittle, unyielding, max_steps, hist, events, count, mark,
+    )  # fmt: skip
+    unpack(y[0:6], shape)
+    motion.gradient(y, gradient)
+    for i in range(3):
+        for j in range(3):
+            shape[i, j] *= a0 * a0
+            gradient[i, j] /= t0
+    for i in range(count[0]):
+        # T = 5 sigma/rho, and the density has changed with the volume
+        stress = rho * a0**2 / t0**2 / 5.0 / np.sqrt(determinant(hist[i, 2:8]))
+        hist[i, 0] *= t0
+        hist[i, 17] *= stress
+        hist[i, 18] *= stress
+    for i in range(min(count[1], events.shape[0])):
+        events[i, 1] *= t0
+    mark[1] *= t0
+    return reason, t * t0, regime
 
 
 def passage(
@@ -143,73 +235,76 @@ def passage(
     deformation : ndarray (3, 3), optional
         Velocity gradient along the body axes, 1/s, on top of the spin: the body starts in flow.
     """
-    t0 = 1.0 / np.sqrt(np.pi * G * rho)
-    a0 = float(np.cbrt(np.prod(axes)))
-    par = parameters(axes, rho, phi, cohesion, dilatancy, surface, expansion=expansion)
-    y = np.zeros(15)
-    regimes.quaternion(np.ascontiguousarray(attitude, dtype=float), y)
-    y[4:7] = omega * t0
-    start = motion.RIGID
-    if deformation is not None:
-        start = motion.FLOWING
-        spin = np.array([[0.0, -y[6], y[5]], [y[6], 0.0, -y[4]], [-y[5], y[4], 0.0]])
-        s = np.diag((axes / a0) ** 2)
-        motion.pack(attitude @ s @ attitude.T, y[0:6])
-        motion.set_gradient(attitude @ (spin + deformation * t0) @ attitude.T, y)
-    scaled = TidePanels(tide.tau / t0, tide.start, tide.width, tide.coefficients * t0**2)
+    shape, gradient = np.empty((3, 3)), np.empty((3, 3))
     hist = np.zeros((max(keep, 1), N_HISTORY))
     events = np.zeros((64, N_EVENT))
     count = np.zeros(4, dtype=np.int64)
     mark = np.zeros(2)
-    reason, t, regime = regimes.follow(
-        t_start / t0,
-        t_stop / t0,
-        (t_stop if t_rest is None else t_rest) / t0,
-        start,
-        y,
-        par,
-        scaled,
+    reason, time, regime = carry.py_func(
+        np.array(axes, dtype=float),
+        rho,
+        np.array(omega, dtype=float),
+        np.array(attitude, dtype=float, order="C"),
+        t_start,
+        t_stop,
+        t_stop if t_rest is None else t_rest,
+        tide,
+        phi,
+        cohesion,
+        dilatancy,
+        surface,
+        brittle,
+        expansion,
+        unyielding,
         tolerance,
         max_axis_ratio,
-        brittle,
-        unyielding,
         max_steps,
+        shape,
+        gradient,
         hist,
         events,
         count,
         mark,
+        np.zeros((3, 3)) if deformation is None else np.array(deformation, dtype=float, order="C"),
     )
-    log = []
-    for code, when, det, _ in events[: count[1]]:
-        lode = np.arcsin(np.clip(-3.0 * np.sqrt(6.0) * det, -1.0, 1.0)) / 3.0 if det != 0.0 else np.nan
-        log.append((EVENTS[int(code)], float(when) * t0, float(lode)))
-    history = None
-    if keep > 1:
-        h = hist[: count[0]]
-        stress = rho * a0**2 / t0**2 / 5.0 / np.sqrt(np.linalg.det(_symmetric(h[:, 2:8])))
-        history = {
-            "time": h[:, 0] * t0,
-            "regime": h[:, 1].astype(int),
-            "shape": _symmetric(h[:, 2:8]) * a0**2,
-            "velocity_gradient": _gradient(h[:, 8:14], h[:, 14:17]) / t0,
-            "pressure": h[:, 17] * stress,
-            "deviator": h[:, 18] * stress,
-            "determinant": h[:, 19].copy(),
-            "quaternion": h[:, 20:24].copy(),
-        }
     return Passage(
         EVENTS[reason],
         REGIMES[regime],
-        float(t) * t0,
-        _symmetric(y[0:6]) * a0**2,
-        _gradient(y[6:12], y[12:15]) / t0,
+        float(time),
+        shape,
+        gradient,
         float(mark[0]),
-        float(mark[1]) * t0,
-        log,
-        history,
+        float(mark[1]),
+        event_log(events, count),
+        unpacked_history(hist[: count[0]], axes, rho) if keep > 1 else None,
         int(count[2]),
         int(count[3]),
     )
+
+
+def event_log(events: Array, count: Counts) -> list[tuple[str, float, float]]:
+    """Name, time (s) and Lode angle (rad; nan where there is none) of the events that `carry` wrote."""
+    log = []
+    for code, when, det, _ in events[: count[1]]:
+        lode = np.arcsin(np.clip(-3.0 * np.sqrt(6.0) * det, -1.0, 1.0)) / 3.0 if det != 0.0 else np.nan
+        log.append((EVENTS[int(code)], float(when), float(lode)))
+    return log
+
+
+def unpacked_history(rows: Array, axes: Array, rho: float) -> dict[str, Array]:
+    """The columns of :class:`Passage` from the rows that `carry` wrote."""
+    t0 = 1.0 / np.sqrt(np.pi * G * rho)
+    a0 = np.cbrt(np.prod(axes))
+    return {
+        "time": rows[:, 0].copy(),
+        "regime": rows[:, 1].astype(int),
+        "shape": _symmetric(rows[:, 2:8]) * a0**2,
+        "velocity_gradient": _gradient(rows[:, 8:14], rows[:, 14:17]) / t0,
+        "pressure": rows[:, 17].copy(),
+        "deviator": rows[:, 18].copy(),
+        "determinant": rows[:, 19].copy(),
+        "quaternion": rows[:, 20:24].copy(),
+    }
 
 
 def _symmetric(c: Array) -> Array:

@@ -194,7 +194,6 @@ def follow_rigid(
             if not unyielding and f[0, j] > 0.0:
                 end = x
                 break
-            record(t + x * h, RIGID, ws.ys, par, p, norm, det, ws, hist, count)
         n = N_SAMPLE if end > 1.0 else int(np.rint(end * N_SAMPLE)) - 1
         # Extrema between the samples: of the yield function near zero, then of the friction mobilised before.
         if not unyielding and end > 1.0:
@@ -210,6 +209,12 @@ def follow_rigid(
                     if value > 0.0:
                         end = x
                         n = int(np.floor(x * N_SAMPLE))
+        if hist.shape[0] > 1:
+            for j in range(1, n + 1):
+                x = j / N_SAMPLE
+                explicit_at(x, y, N_RIGID, ws.dense, ws.ys)
+                excess, p, norm, det = rigid_excess(t + x * h, ws.ys, par, tide, ws.work, ws.stress)
+                record(t + x * h, RIGID, ws.ys, par, p, norm, det, ws, hist, count)
         spread = f[1, : n + 1].max() - f[1, : n + 1].min()
         for j in range(n + 1):
             if (
@@ -241,9 +246,11 @@ def follow_rigid(
             copy(ws.y1, y, N_RIGID)
             _normalise(y)
             ws.mark[2] = h
-            value = _rigid_values(t, y, par, tide, ws, _FRICTION)
+            excess, p, norm, det = rigid_excess(t, y, par, tide, ws.work, ws.stress)
+            value = required_friction(surface, cohesion, norm, p, det)
             if value > ws.mark[0]:
                 ws.mark[0], ws.mark[1] = value, t
+            record(t, RIGID, y, par, p, norm, det, ws, hist, count)
             return ONSET, t
         t = t1 if last else t + h
         copy(ws.y1, y, N_RIGID)

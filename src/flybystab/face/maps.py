@@ -16,8 +16,9 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.aggregate.body import Body
+from flybystab.attitudes import periapsis_axes
 from flybystab.errors import InvalidInput
-from flybystab.flybys import flyby_many, periapsis_axes
+from flybystab.many import flyby_many
 from flybystab.outcome import Verdict
 from flybystab.sky.b_plane import capture_radius
 from flybystab.sky.encounter import Encounter

@@ -15,8 +15,8 @@ from astropy.units import Quantity
 from scipy.spatial.transform import Rotation
 
 from flybystab.aggregate.body import Body, Material
+from flybystab.attitudes import periapsis_axes
 from flybystab.errors import InvalidInput, UnknownName
-from flybystab.flybys import periapsis_axes
 from flybystab.sky.encounter import Encounter
 from flybystab.sky.planets import planet
 from flybystab.survey.asteroid import Asteroid

@@ -14,10 +14,10 @@ import numpy as np
 from astropy.units import Quantity
 from numpy.typing import NDArray
 
+from flybystab.attitudes import periapsis_axes
 from flybystab.errors import InvalidInput
 from flybystab.face.plotting import BLACK, BLUE, ORANGE, RED
 from flybystab.flyby_results import FlybyResult, History
-from flybystab.flybys import periapsis_axes
 
 Array = NDArray[np.float64]
 

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from scipy.stats import rankdata
 
 from flybystab.aggregate.body import Material
+from flybystab.attitudes import periapsis_axes
 from flybystab.errors import FlybystabError
-from flybystab.flybys import LOOSER, flyby_many, periapsis_axes
+from flybystab.flybys import LOOSER
+from flybystab.many import flyby_many
 from flybystab.outcome import Verdict
 from flybystab.survey.draws import Attitudes, Draws
 from flybystab.survey.passages import Passage

@@ -10,5 +10,6 @@ from __future__ import annotations
 #: By name: the module below this package, and what it shows.
 BENCHES = {
     "flyby": "integrators of one flyby",
+    "many": "rate of many encounters by threads",
     "screen": "bound and dynamics of a screening",
 }

@@ -32,8 +32,9 @@ def attitude_words(asteroid: Any) -> str:
 
 def flown(options: argparse.Namespace) -> tuple[Any, Any, Any]:
     """Asteroid, result and sample of attitudes of its encounter at the date, or of its closest one."""
+    from flybystab.attitudes import periapsis_axes
     from flybystab.errors import NoEncounter
-    from flybystab.flybys import flyby, periapsis_axes
+    from flybystab.flybys import flyby
     from flybystab.sky.encounter import Encounter
     from flybystab.sky.finder import find_encounters
     from flybystab.spin import spin_sample

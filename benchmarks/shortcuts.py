@@ -1,0 +1,187 @@
+"""What two simplifications of a flyby could save: no steps on the distant orbit, and motion in its plane only.
+
+python benchmarks/shortcuts.py distant   share of the time on stretches where the tide is below the error asked for
+python benchmarks/shortcuts.py planar    cost of the parts of a step of plastic flow, and what fewer numbers would leave
+
+Times are processor times, least of several runs.
+"""
+
+from __future__ import annotations
+
+import sys
+import time
+from collections.abc import Callable
+
+import astropy.units as u
+import numpy as np
+from astropy.time import Time
+from numba import njit
+
+import flybystab as fs
+from flybystab.core import judgement, motion
+from flybystab.core.passage import parameters
+from flybystab.core.steppers import N_STAGES, factorise, flow_jacobian, implicit_step, solve
+from flybystab.core.tide import TidePanels, components
+from flybystab.rows import MAX_STEPS, buffers, judge_rows, one_row
+
+PILE = fs.Body(semi_axes=[1400, 850, 750] * u.m, density=2000 * u.kg / u.m**3, spin_period=6 * u.h)
+
+
+def least(run: Callable[[], object], repeat: int = 20) -> float:
+    """Least processor time of several runs, s."""
+    times = []
+    for _ in range(repeat):
+        start = time.process_time()
+        run()
+        times.append(time.process_time() - start)
+    return min(times)
+
+
+def scenes() -> list[tuple[str, fs.Body, fs.Encounter]]:
+    """Scripted from 10 radii, rigid and with flow, and the real passages of Apophis and of a fast rotator."""
+
+    def earth(q: float) -> fs.Encounter:
+        return fs.Encounter.hyperbolic(
+            "earth", q * fs.R_earth, 5 * u.km / u.s, start_distance=10 * fs.R_earth
+        )
+
+    apophis = fs.Asteroid.from_catalogue("Apophis")
+    real = fs.Encounter.from_orbit(apophis.orbit, "earth", Time("2029-04-13", scale="tdb"))
+    fast = PILE.with_(
+        semi_axes=[15, 12, 11] * u.m,
+        spin_period=0.2 * u.h,
+        material=fs.Material(cohesion=100 * u.Pa),
+    )
+    return [
+        ("scripted, 3 R_E, rigid", PILE, earth(3.0)),
+        ("scripted, 2.2 R_E, flow", PILE, earth(2.2)),
+        ("Apophis 2029", apophis.body, real),
+        ("30 m, 12 min, as Apophis", fast, real),
+    ]
+
+
+def distant() -> None:
+    """Spin that the tide can add on the outer stretches, ``int |K| dt`` over it, below the tolerance: skipped."""
+    print(
+        f"{'scene':26s} {'tolerance':>9s} {'steps':>6s} {'time (ms)':>10s} {'skipped (h)':>12s} {'saved':>7s}"
+    )
+    for name, body, e in scenes():
+        for tolerance in (1e-3, 1e-6, 1e-8):
+            arguments = one_row(body, e)
+            answer = np.empty((1, judgement.N_ANSWER))
+
+            def run(span: np.ndarray, arguments=arguments, tolerance=tolerance, answer=answer) -> None:
+                row = (*arguments[:7], span, *arguments[8:])
+                judge_rows(*row, tolerance, 6.0, MAX_STEPS, False, *buffers(0), answer)
+
+            span = arguments[7].copy()
+            t = np.linspace(e.t_start, e.t_stop, 20001)
+            size = 2.0 * e.planet.gm / e.radius(t) ** 3
+            added = np.cumsum(size) * (t[1] - t[0])
+            allowed = tolerance * np.linalg.norm(body.omega)
+            first = t[np.searchsorted(added, allowed)]
+            last = t[min(len(t) - 1, np.searchsorted(added, added[-1] - allowed))]
+            full = least(lambda span=span, run=run: run(span))
+            steps = answer[0, judgement.STEPS]
+            inner = span.copy()
+            inner[0, judgement.START] = first
+            inner[0, judgement.REST] = inner[0, judgement.STOP] = last
+            short = least(lambda inner=inner, run=run: run(inner))
+            skipped = (first - e.t_start + e.t_stop - last) / 3600.0
+            print(
+                f"{name:26s} {tolerance:9.0e} {steps:6.0f} {1e3 * full:10.3f} {skipped:12.4f} "
+                f"{max(0.0, 1.0 - short / full):6.1%}"
+            )
+
+
+@njit
+def _rates(n, t, y, dy, par, tide, work):
+    for _ in range(n):
+        motion.rate(motion.FLOWING, t, y, dy, par, tide, work)
+
+
+@njit
+def _cheap_rates(n, y, dy, par, work):
+    for _ in range(n):
+        motion.deformation_rate(motion.FLOWING, y, dy, par, work)
+
+
+@njit
+def _jacobians(n, t, y, dy, par, tide, work, jac, ft, s):
+    for _ in range(n):
+        flow_jacobian(t, y, dy, 1e-6, par, tide, work, jac, ft, s)
+
+
+@njit
+def _factors(n, size, a, b, pivots):
+    for _ in range(n):
+        b[:] = a
+        factorise(b, size, pivots)
+
+
+@njit
+def _solutions(n, size, b, pivots, x):
+    for _ in range(n):
+        x[:] = 1.0
+        solve(b, size, pivots, x)
+
+
+@njit
+def _steps(n, t, y, par, tide, work, jac, ft, lu, pivots, k, scale, y1, dense):
+    for _ in range(n):
+        implicit_step(t, y, 1e-3, par, tide, work, jac, ft, lu, pivots, k, scale, y1, dense)
+
+
+def planar() -> None:
+    """In the plane 15 numbers become 9 (S and D 4 each, w 1): 6 fewer Jacobian columns, a smaller linear system."""
+    n = 2000
+    par = parameters(PILE.axes.copy(), PILE.rho, np.deg2rad(35.0), 0.0, 0.0, 0)
+    e = scenes()[1][2]
+    t0 = PILE.dynamical_time
+    tide = TidePanels(e.tide.tau / t0, e.tide.start, e.tide.width, e.tide.coefficients * t0**2)
+    work = motion.Buffers(np.zeros((motion.N_WORK, 3, 3)), np.zeros((3, 6)))
+    y, dy, s, ft = (np.zeros(15) for _ in range(4))
+    y[:3] = (PILE.axes / np.cbrt(np.prod(PILE.axes))) ** 2
+    y[6:12] = components(0.05 * np.array([[1.0, 0.3, 0.0], [0.3, -0.4, 0.0], [0.0, 0.0, -0.6]]))
+    y[14] = PILE.omega[2] * t0
+    jac, lu = np.zeros((15, 15)), np.zeros((15, 15))
+    pivots = np.zeros(15, dtype=np.int64)
+    k, dense, y1, scale = np.zeros((N_STAGES, 15)), np.zeros((7, 15)), np.zeros(15), np.full(15, 1e-8)
+    motion.rate(motion.FLOWING, 0.0, y, dy, par, tide, work)
+    system = np.eye(15) / 1e-3
+
+    def cost(run: Callable[..., object], *arguments: object) -> float:
+        run(1, *arguments)
+        return 1e6 * least(lambda: run(n, *arguments), 7) / n
+
+    rate = cost(_rates, 0.0, y, dy, par, tide, work)
+    cheap = cost(_cheap_rates, y, dy, par, work)
+    jacobian = cost(_jacobians, 0.0, y, dy, par, tide, work, jac, ft, s)
+    factors = [cost(_factors, m, system, lu, pivots) for m in (15, 9)]
+    system -= jac
+    solutions = [cost(_solutions, m, lu, pivots, s) for m in (15, 9)]
+    step = cost(_steps, 0.0, y, par, tide, work, jac, ft, lu, pivots, k, scale, y1, dense)
+    rows = [
+        ("right-hand side", rate, rate),
+        ("the same without self-gravity and tide", cheap, cheap),
+        ("Jacobian, columns of 7 and 9 kinds", jacobian, jacobian - 2.0 * rate - 4.0 * cheap),
+        ("LU factors", *factors),
+        ("eight solutions", 8.0 * solutions[0], 8.0 * solutions[1]),
+        (
+            "step with given Jacobian",
+            step,
+            step - factors[0] + factors[1] - 8.0 * (solutions[0] - solutions[1]),
+        ),
+    ]
+    print(f"{'part of a step of plastic flow':42s} {'15 numbers (us)':>16s} {'9 numbers (us)':>15s}")
+    for name, full, less in rows:
+        print(f"{name:42s} {full:16.2f} {less:15.2f}")
+    whole = [jacobian + step, rows[2][2] + rows[5][2]]
+    print(f"{'Jacobian and step':42s} {whole[0]:16.2f} {whole[1]:15.2f}   ratio {whole[0] / whole[1]:.2f}")
+
+
+if __name__ == "__main__":
+    commands = {"distant": distant, "planar": planar}
+    if len(sys.argv) != 2 or sys.argv[1] not in commands:
+        raise SystemExit(__doc__)
+    commands[sys.argv[1]]()
