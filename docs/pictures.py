@@ -47,7 +47,11 @@ save("scene.png", figure)
 animation(result, IMAGES / "pile.gif", "2.0 Earth radii at 5 km/s", frames=45, rate=10)
 print(IMAGES / "pile.gif")
 
-with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
-    runpy.run_path(str(DOCS.parent / "examples" / "catalogue_on_the_spin_limit.py"))
-    shutil.copy(Path("out") / "spin_limit.png", IMAGES / "spin_limit.png")
-print(os.fspath(IMAGES / "spin_limit.png"))
+for script, picture in (
+    ("catalogue_on_the_spin_limit.py", "spin_limit.png"),
+    ("survival_of_real_clones.py", "real_clones.png"),
+):
+    with tempfile.TemporaryDirectory() as folder, contextlib.chdir(folder):
+        runpy.run_path(str(DOCS.parent / "examples" / script))
+        shutil.copy(Path("out") / picture, IMAGES / picture)
+    print(os.fspath(IMAGES / picture))

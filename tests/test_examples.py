@@ -80,6 +80,22 @@ def test_survival_from_target_plane(monkeypatch, tmp_path):
     assert names["low"] < names["probability"] < names["high"]
 
 
+def test_survival_of_real_clones(monkeypatch, tmp_path):
+    monkeypatch.chdir(tmp_path)
+    names = ran("survival_of_real_clones.py")
+    # JPL, orbit 220: 3.3 km; 300 clones know a deviation to 4 %
+    assert names["three_sigma"]["Apophis"] == pytest.approx(3.3, rel=0.15)
+    assert (names["probability"], names["most"]) == (1.0, 1.0)
+    assert names["least"] == pytest.approx(0.025 ** (1 / 300), abs=1e-6)  # Clopper-Pearson with all of n
+    spread = {what: np.ptp(values) for what, values in names["ratio"].items()}
+    assert spread["orbit alone"] < 0.01 * spread["orbit and attitude"]
+    # the tide goes as the third power of the distance, and with it about what it does to the spin
+    q = names["clones"].distance
+    change = names["ratio"]["orbit alone"] - 1.0
+    assert 0.3 < np.ptp(change) / abs(np.mean(change)) / (3 * float(np.ptp(q) / np.mean(q))) < 3.0
+    assert (tmp_path / "out" / "real_clones.png").exists()
+
+
 def test_impact_odds_2024_yr4(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     names = ran("impact_odds_2024_yr4.py")
