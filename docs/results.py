@@ -80,7 +80,7 @@ def run(name, data, jobs, keep):
     )
     began = time.monotonic()
     with workers(jobs) as pool:
-        screening.run(path, executor=pool, progress=ProgressBar())
+        screening.run(path, overwrite=True, executor=pool, progress=ProgressBar())
     seconds = time.monotonic() - began
     (OUT / f"{name}.seconds").write_text(f"{seconds:.1f} {jobs}\n")
     return read_results(path), seconds

@@ -11,6 +11,7 @@ from astropy.time import Time
 from flybystab.constants import AU, R_EARTH
 from flybystab.errors import NotConverged
 from flybystab.sky.encounter import Encounter
+from flybystab.survey import table_files
 from flybystab.survey.catalogue import Asteroid
 from flybystab.survey.executors import workers
 from flybystab.survey.passages import Passage
@@ -68,5 +69,6 @@ def screening(n=6, finder=three, **options):
 if __name__ == "__main__":
     # Tests may themselves run in the background, where a shell has interrupts ignored.
     signal.signal(signal.SIGINT, signal.default_int_handler)
+    table_files.ROW_GROUP = int(os.environ.get("ROW_GROUP", table_files.ROW_GROUP))
     with workers(int([*sys.argv, "1"][2])) as pool:
         screening(16, slow, samples=3, seed=4).run(sys.argv[1], executor=pool, chunk=1)

@@ -112,21 +112,25 @@ def test_workers_are_checked():
         pass
 
 
-def test_killed_run_resumes_without_losing_or_repeating_a_row(tmp_path, reference, monkeypatch):
-    out, marks = tmp_path / "k.ecsv", tmp_path / "marks"
+@pytest.mark.parametrize("suffix", ["ecsv", "parquet"])
+def test_killed_run_resumes_without_losing_or_repeating_a_row(tmp_path, reference, monkeypatch, suffix):
+    if suffix == "parquet":
+        pytest.importorskip("pyarrow")
+    out, marks = tmp_path / f"k.{suffix}", tmp_path / "marks"
     marks.mkdir()
-    environment = os.environ | {"MARKS": str(marks), "HOLD": str(tmp_path / "never")}
-    journal = tmp_path / "k.ecsv.journal"
+    environment = os.environ | {"MARKS": str(marks), "HOLD": str(tmp_path / "never"), "ROW_GROUP": "4"}
+    journal = tmp_path / f"k.{suffix}.journal"
     run = subprocess.Popen([sys.executable, HERE / "scripted.py", out], env=environment)
     wait_for(lambda: lines(journal) > 5)
     run.send_signal(signal.SIGKILL)
     run.wait()
     assert not out.exists()
+    assert (tmp_path / f"k.{suffix}.part").stat().st_size > 0  # row groups, or rows, without an end
     assert 5 <= lines(journal) - 1 <= 10
     monkeypatch.setenv("MARKS", str(marks))
     screening(16, slow, samples=3, seed=4).run(out)
     same(read_results(out), reference)
-    assert not journal.exists()
+    assert [f.name for f in tmp_path.iterdir() if f.is_file()] == [out.name]
     computed = Counter(line for f in marks.iterdir() for line in f.read_text().split("\n") if line)
     assert len(computed) == 16
     # Only the asteroid in work when the run was killed may have been begun twice.

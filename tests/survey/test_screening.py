@@ -16,6 +16,7 @@ from flybystab.constants import AU, R_EARTH
 from flybystab.errors import InvalidInput, OutOfSpan, OutputFailed, UnknownName
 from flybystab.sky.encounter import Encounter, usual_start
 from flybystab.sky.planets import planet
+from flybystab.survey import table_files
 from flybystab.survey.catalogue import Asteroid
 from flybystab.survey.columns import COLUMNS, VERDICTS, share_of
 from flybystab.survey.draws import Attitudes, draws
@@ -231,16 +232,76 @@ def test_output_is_checked_before_anything_is_computed(tmp_path):
         run.run(tmp_path / "x.ecsv", samples_output=tmp_path / "y.ecsv")
 
 
-@pytest.mark.parametrize("limit", [2_000, 9_000])
-def test_a_disk_that_fills_up_in_the_middle_keeps_what_is_done(tmp_path, limit):
-    """A limit on the size of files stands for the disk; the second also hits the table at the end."""
+def test_finished_tables_are_not_overwritten_unasked(tmp_path):
+    out, more = tmp_path / "x.ecsv", tmp_path / "y.ecsv"
+    run = screening(3, samples=2, keep_samples=True)
+    run.run(out)
+    before = out.read_bytes()
+    blind = Screening(run.asteroids, run.settings, lambda a, s: pytest.fail("computed"))
+    with pytest.raises(InvalidInput, match=r"x\.ecsv: expected a file that is not there yet; --overwrite"):
+        blind.run(out)
+    more.write_text("mine")
+    with pytest.raises(InvalidInput, match=r"y\.ecsv: expected a file that is not there yet"):
+        blind.run(tmp_path / "z.ecsv", samples_output=more)
+    assert (out.read_bytes(), more.read_text()) == (before, "mine")
+    assert sorted(f.name for f in tmp_path.iterdir()) == ["x.ecsv", "y.ecsv"]
+    other = screening(3, samples=2, seed=9)
+    other.run(out, overwrite=True)
+    assert read_results(out).meta["settings"]["seed"] == 9
+    # A run that was stopped goes on over its own table, and only over its own.
+    with pytest.raises(KeyboardInterrupt):
+        other.run(
+            out, overwrite=True, progress=lambda s: signal.raise_signal(signal.SIGINT) if s.done else None
+        )
+    with pytest.raises(InvalidInput, match="another run is unfinished there"):
+        run.run(out, overwrite=True)
+    assert not read_results(out).meta["complete"]
+    other.run(out)
+    assert read_results(out).meta["complete"]
+
+
+def test_row_groups_are_appended_while_tasks_end(tmp_path, monkeypatch):
+    """In the order of the tasks, though they end in another one; what is unfinished has another name."""
+    parquet = pytest.importorskip("pyarrow.parquet")
+    monkeypatch.setattr(table_files, "ROW_GROUP", 4)
+    out = tmp_path / "x.parquet"
+    sizes = []
+
+    class Backwards(Screening):
+        """Pairs of asteroids in the wrong order."""
+
+        def results(self, *given, **more):
+            found = list(super().results(*given, **more))
+            for k in range(0, len(found), 2):
+                yield from found[k : k + 2][::-1]
+
+    def look(state):
+        assert not out.exists()
+        sizes.append((tmp_path / "x.parquet.part").stat().st_size)
+
+    run = screening(16, samples=2)
+    Backwards(run.asteroids, run.settings, three).run(out, progress=look)
+    assert len(set(sizes)) > 5  # grown several times before the end
+    assert sizes == sorted(sizes)
+    assert parquet.ParquetFile(out).num_row_groups == 12  # 46 rows
+    run.run(tmp_path / "y.parquet")
+    same(read_results(out), read_results(tmp_path / "y.parquet"))
+
+
+@pytest.mark.parametrize("suffix", ["ecsv", "parquet"])
+@pytest.mark.parametrize("limit", [2_000, 9_000, 12_500])
+def test_a_disk_that_fills_up_in_the_middle_keeps_what_is_done(tmp_path, limit, suffix, monkeypatch):
+    """A limit on the size of files stands for the disk; it hits the journal, or the table."""
     resource = pytest.importorskip("resource")
-    run, out = screening(samples=4), tmp_path / "x.ecsv"
+    if suffix == "parquet":
+        pytest.importorskip("pyarrow")
+        monkeypatch.setattr(table_files, "ROW_GROUP", 2)
+    run, out = screening(samples=4), tmp_path / f"x.{suffix}"
     before = resource.getrlimit(resource.RLIMIT_FSIZE)
     old = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     try:
         resource.setrlimit(resource.RLIMIT_FSIZE, (limit, before[1]))
-        with pytest.raises(OutputFailed, match=r"asteroids are safe in .*x.ecsv.journal") as caught:
+        with pytest.raises(OutputFailed, match=rf"asteroids are safe in .*x.{suffix}.journal") as caught:
             run.run(out)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)
@@ -251,8 +312,8 @@ def test_a_disk_that_fills_up_in_the_middle_keeps_what_is_done(tmp_path, limit):
     again = Screening(run.asteroids, run.settings, lambda a, s: called.append(a.name) or three(a, s))
     again.run(out)
     assert called == NAMES[saved:]
-    run.run(tmp_path / "whole.ecsv")
-    same(read_results(out), read_results(tmp_path / "whole.ecsv"))
+    run.run(tmp_path / f"whole.{suffix}")
+    same(read_results(out), read_results(tmp_path / f"whole.{suffix}"))
 
 
 def test_wilson_interval_and_contributors():

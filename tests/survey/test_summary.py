@@ -7,8 +7,9 @@ from astropy.table import QTable
 from flybystab.errors import InvalidInput
 from flybystab.face.plotting_survey import results_figure
 from flybystab.survey.columns import COLUMNS, VERDICTS, share_of
-from flybystab.survey.results import table_of, write_rows
+from flybystab.survey.results import table_of
 from flybystab.survey.summary import summary
+from flybystab.survey.table_files import write_rows
 
 ROWS = [
     {"asteroid": "calm", "verdict": "INTACT", "margin": 12.0, "p_yield": 0.0, "samples": 10},

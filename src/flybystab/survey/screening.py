@@ -13,8 +13,9 @@ import hashlib
 import json
 import time as clock
 from collections import Counter
-from collections.abc import Callable, Container, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -31,12 +32,16 @@ from flybystab.survey.catalogue import Asteroid, catalogue
 from flybystab.survey.columns import COLUMNS, SAMPLE_COLUMNS
 from flybystab.survey.draws import identity
 from flybystab.survey.formats import foreign, with_physical_data
+from flybystab.survey.journal import Journal
+from flybystab.survey.outputs import Outputs
 from flybystab.survey.passages import Finder, passages
 from flybystab.survey.population import Population
 from flybystab.survey.progress import Progress
-from flybystab.survey.results import Journal, check_output, table_of, write_rows
+from flybystab.survey.results import Column, table_of
+from flybystab.survey.rows import Row
 from flybystab.survey.scheduling import scheduled, window_of
 from flybystab.survey.settings import Settings, settings
+from flybystab.survey.table_files import check_output
 from flybystab.survey.tasks import Rows, begin, block_of, joined
 
 
@@ -130,6 +135,7 @@ class Screening:
         output: str | Path,
         *,
         samples_output: str | Path | None = None,
+        overwrite: bool = False,
         executor: Executor | None = None,
         chunk: int = 1,
         progress: Callable[[Progress], None] | None = None,
@@ -142,11 +148,15 @@ class Screening:
             Table of encounters, ``.ecsv`` or ``.parquet``. Its journal stands next to it meanwhile.
         samples_output : str or Path, optional
             Table of samples; needs ``keep_samples`` in the settings.
+        overwrite : bool
+            Replace tables of these names that are there already. Those of a run that this one takes up again are
+            replaced in any case.
 
         Raises
         ------
         InvalidInput, MissingExtra
-            The output cannot be written, or another run's journal is in the way: before anything is computed.
+            The output cannot be written, is there already, or another run's journal is in the way: before anything
+            is computed.
         WorkersLost
             Processes of the executor died; the rows so far are in the file and the same call goes on.
         OutputFailed
@@ -155,63 +165,73 @@ class Screening:
             After the rows so far have been written into a valid file; the same call goes on later.
         """
         out = check_output(output)
-        extra = None if samples_output is None else check_output(samples_output)
-        if extra is not None and not self.settings.keep_samples:
-            raise InvalidInput("samples_output", str(extra), "keep_samples in the settings")
-        journal = Journal(out.with_name(out.name + ".journal"), self.fingerprint())
+        tables: dict[str, tuple[Path, Mapping[str, Column]]] = {"rows": (out, COLUMNS)}
+        if samples_output is not None:
+            if not self.settings.keep_samples:
+                raise InvalidInput("samples_output", str(samples_output), "keep_samples in the settings")
+            tables["samples"] = check_output(samples_output), SAMPLE_COLUMNS
+        journal_file = out.with_name(out.name + ".journal")
+        if not overwrite and not journal_file.exists():
+            for path, _ in tables.values():
+                if path.exists():
+                    raise InvalidInput(
+                        "output",
+                        str(path),
+                        "a file that is not there yet; --overwrite (overwrite=True) replaces it",
+                    )
+        journal = Journal(journal_file, self.fingerprint())
         began = clock.monotonic()
-        resumed = len(journal.where)
+        resumed = journal.count
         counts: Counter[str] = Counter()
-        rows = 0
-        complete = False
+
+        def count(rows: Iterable[Row]) -> None:
+            counts.update(r.get("verdict") or "error" for r in rows)
 
         def state() -> Progress:
-            return Progress(
-                len(journal.where),
-                len(self.asteroids),
-                resumed,
-                rows,
-                dict(counts),
-                clock.monotonic() - began,
-            )
+            total, seconds = len(self.asteroids), clock.monotonic() - began
+            return Progress(journal.count, total, resumed, counts.total(), dict(counts), seconds)
 
         def tell() -> None:
             if progress is not None:
                 progress(state())
 
         for task in journal.tasks():
-            rows += len(task["rows"])
-            counts.update(r.get("verdict") or "error" for r in task["rows"])
-        unwritten: OSError | None = None
-        try:
-            tell()
-            for i, result in self.results(executor, skip=journal.where, chunk=chunk):
-                try:
-                    journal.add(i, result)
-                except OSError as error:
-                    unwritten = error
-                    break
-                rows += len(result["rows"])
-                counts.update(r.get("verdict") or "error" for r in result["rows"])
-                tell()
-            complete = unwritten is None
-        finally:
-            meta = self.meta(complete=complete)
+            count(task["rows"])
+
+        @contextmanager
+        def writing() -> Iterator[None]:
             try:
-                write_rows((r for t in journal.tasks() for r in t["rows"]), out, COLUMNS, meta)
-                if extra is not None:
-                    write_rows(
-                        (r for t in journal.tasks() for r in t["samples"]), extra, SAMPLE_COLUMNS, meta
-                    )
+                yield
             except OSError as error:
-                unwritten = error
-            journal.close(remove=complete and unwritten is None)
-            if unwritten is not None:
                 raise OutputFailed(
-                    f"{out.parent} cannot be written any more ({unwritten.strerror}). {len(journal.where)} of "
+                    f"{out.parent} cannot be written any more ({error.strerror or error}). {journal.count} of "
                     f"{len(self.asteroids)} asteroids are safe in {journal.path}: make room and start the same "
                     "run again"
-                )
+                ) from None
+
+        outputs: Outputs | None = None
+        try:
+            with writing():
+                outputs = Outputs(journal, tables, self.meta())
+                outputs.follow()
+            tell()
+            for i, result in self.results(executor, skip=journal, chunk=chunk):
+                with writing():
+                    journal.add(i, result)
+                    outputs.follow(i, result)
+                count(result["rows"])
+                tell()
+            with writing():
+                outputs.finish()
+        except BaseException:
+            try:
+                if outputs is not None:
+                    with writing():
+                        outputs.so_far(self.meta(complete=False))
+            finally:
+                journal.close()
+            raise
+        journal.close(remove=True)
         return state()
 
 

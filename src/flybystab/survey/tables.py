@@ -10,7 +10,8 @@ from astropy.table import QTable
 from astropy.time import Time
 from astropy.units import Quantity
 
-from flybystab.survey.results import Column, check_output, write_rows
+from flybystab.survey.results import Column
+from flybystab.survey.table_files import check_output, write_rows
 
 
 def write_table(table: QTable, path: str | Path) -> None:

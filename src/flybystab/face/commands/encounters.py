@@ -31,7 +31,7 @@ def run(options: argparse.Namespace) -> None:
     from flybystab.errors import InvalidInput
     from flybystab.face.document import table_document
     from flybystab.sky.finder import find_encounters
-    from flybystab.survey.results import check_output
+    from flybystab.survey.table_files import check_output
     from flybystab.survey.tables import write_table
 
     if options.output:

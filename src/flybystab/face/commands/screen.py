@@ -32,6 +32,9 @@ def arguments(sub: argparse.ArgumentParser) -> None:
     sub.add_argument("--jobs", type=int, default=1, metavar="N", help="processes (1)")
     sub.add_argument("--dask", metavar="ADDRESS", help="a dask scheduler instead of processes")
     sub.add_argument("--output", default="screening.ecsv", metavar="FILE", help="table, .ecsv or .parquet")
+    sub.add_argument(
+        "--overwrite", action="store_true", help="replace finished tables (an unfinished run goes on without)"
+    )
     sub.add_argument("--samples-output", metavar="FILE", help="table of all samples, .ecsv or .parquet")
 
 
@@ -45,10 +48,11 @@ def run(options: argparse.Namespace) -> None:
     from flybystab.survey.executors import workers
     from flybystab.survey.population import Population
     from flybystab.survey.progress import ProgressBar
-    from flybystab.survey.results import check_output, read_results
+    from flybystab.survey.results import read_results
     from flybystab.survey.screening import Screening, listed
     from flybystab.survey.settings import settings
     from flybystab.survey.summary import summary
+    from flybystab.survey.table_files import check_output
 
     if options.population_default:
         print(Population().toml(), end="")
@@ -72,7 +76,13 @@ def run(options: argparse.Namespace) -> None:
     bar = ProgressBar()
     try:
         with workers(options.jobs, options.dask) as executor:
-            screening.run(output, samples_output=options.samples_output, executor=executor, progress=bar)
+            screening.run(
+                output,
+                samples_output=options.samples_output,
+                overwrite=options.overwrite,
+                executor=executor,
+                progress=bar,
+            )
     except KeyboardInterrupt:
         bar.end()
         print(

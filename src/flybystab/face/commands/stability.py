@@ -44,7 +44,7 @@ def _catalogue(options: argparse.Namespace) -> None:
 
     from flybystab.face.document import table_document
     from flybystab.survey.classification import COLUMNS, classification, counts
-    from flybystab.survey.results import check_output, write_rows
+    from flybystab.survey.table_files import check_output, write_rows
 
     output = None if options.output is None else check_output(options.output)
     table = classification(
