@@ -249,10 +249,13 @@ def test_finished_tables_are_not_overwritten_unasked(tmp_path):
     other.run(out, overwrite=True)
     assert read_results(out).meta["settings"]["seed"] == 9
     # A run that was stopped goes on over its own table, and only over its own.
+
+    def interrupt(state):
+        if state.done:
+            raise KeyboardInterrupt
+
     with pytest.raises(KeyboardInterrupt):
-        other.run(
-            out, overwrite=True, progress=lambda s: signal.raise_signal(signal.SIGINT) if s.done else None
-        )
+        other.run(out, overwrite=True, progress=interrupt)
     with pytest.raises(InvalidInput, match="another run is unfinished there"):
         run.run(out, overwrite=True)
     assert not read_results(out).meta["complete"]
