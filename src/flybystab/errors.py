@@ -66,6 +66,10 @@ class OutOfSpan(FlybystabError, ValueError):
         )
 
 
+class WrongUsage(FlybystabError, ValueError):
+    """A command line that is wrong on its own: exit status 2."""
+
+
 class NoEncounter(FlybystabError, LookupError):
     """The orbit has no close approach to the planet near the requested time."""
 

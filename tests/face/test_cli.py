@@ -123,16 +123,35 @@ def test_cite(capsys):
     ("arguments", "status", "text"),
     [
         (["flyby", "Apofis"], 1, "did you mean Apophis"),
-        (["flyby", "Apophis", "--date", "yesterday"], 1, "a date such as"),
+        (["flyby", "Apophis", "--date", "yesterday"], 2, "a date such as"),
         (["flyby", "Apophis", "--date", "2700-01-01"], 1, "span"),
-        (["flyby", "Apophis", "--friction", "95"], 1, "friction_angle"),
-        (["flyby", "Apophis", "--surface", "mohr"], 1, "did you mean mohr-coulomb"),
+        (["flyby", "Apophis", "--friction", "95"], 2, "friction_angle"),
+        (["flyby", "Apophis", "--surface", "mohr"], 2, "did you mean mohr-coulomb"),
         (["flyby", "Apophis", "--output", "/nowhere/x.png"], 1, "a folder that exists"),
-        (["flyby", "Apophis", "--output", "x.doc"], 1, "ends in .png"),
-        (["flyby", "Apophis", "--planet", "vulcan"], 1, "unknown"),
+        (["flyby", "Apophis", "--output", "x.doc"], 2, "ends in .png"),
+        (["flyby", "Apophis", "--planet", "vulcan"], 2, "unknown"),
         (["flyby"], 2, "name"),
         (["flibby", "Apophis"], 2, "did you mean flyby"),
         (["flyby", "Apophis", "--colour", "red"], 2, "unrecognized"),
+        (["flyby", "Apophis", "--attitudes", "0"], 2, "--attitudes = 0: expected a whole number, 1 or more"),
+        (["flyby", "Apophis", "--seed", "-1"], 2, "--seed"),
+        (["flyby", "Apophis", "--cohesion", "-1"], 2, "cohesion"),
+        (["screen", "--samples", "0"], 2, "--samples = 0"),
+        (["screen", "--jobs", "0"], 2, "--jobs = 0"),
+        (["screen", "--within", "nan"], 2, "--within = nan"),
+        (["screen", "--from", "2030-01-01", "--to", "2029-01-01"], 2, "a date after --from"),
+        (["screen", "--planet", "earth", "--planet", "erth"], 2, "did you mean earth"),
+        (["screen", "--output", "x.csv"], 2, "ends in .ecsv"),
+        (["screen", "--output", "/nowhere/x.ecsv"], 1, "can be written"),
+        (["screen", "--samples-output", "x.csv"], 2, "ends in .ecsv"),
+        (["screen", "no-such-file.csv"], 1, "no-such-file"),
+        (["encounters", "Apophis", "--clones", "-1"], 2, "--clones = -1"),
+        (["encounters", "Apophis", "--from", "soon"], 2, "a date such as"),
+        (["encounters", "Apophis", "--from", "1500-01-01"], 1, "span"),
+        (["infer", "Toutatis", "--surface", "mohr"], 2, "did you mean mohr-coulomb"),
+        (["stability"], 2, "--all"),
+        (["stability", "Anteros", "--output", "x.ecsv"], 2, "--all"),
+        (["figure", "spin", "Anteros"], 2, "no asteroid"),
         (["scenario", "no-such-file.toml"], 1, "a readable file"),
         (["show", "no-such-file.ecsv"], 1, "no-such-file"),
     ],
@@ -320,6 +339,6 @@ def test_stability_of_a_whole_catalogue(tmp_path, capsys):
     assert main(["stability", "--all", str(file)]) == 0
     text = capsys.readouterr().out
     assert "40 deg: 1 inadmissible" in text
-    assert main(["stability"]) == 1
+    assert main(["stability"]) == 2
     assert "--all" in capsys.readouterr().err
-    assert main(["stability", "Apophis", "--output", str(out)]) == 1
+    assert main(["stability", "Apophis", "--output", str(out)]) == 2

@@ -80,7 +80,7 @@ def test_orbits_from_files(capsys, tmp_path):
     assert status == 0
     assert "2 asteroids): 1 encounters" in out
     status, _, err = run(capsys, "Toro", *YEAR, "--clones", -1)
-    assert status == 1
+    assert status == 2
     assert "--clones" in err
     single = tmp_path / "one.csv"
     single.write_text("\n".join(many.read_text().splitlines()[:2]) + "\n")

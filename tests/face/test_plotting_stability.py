@@ -121,5 +121,5 @@ def test_one_command_for_each(tmp_path, capsys):
     assert "barrier" in capsys.readouterr().out
     assert file.stat().st_size > 1000
     assert main(["figure", "failure", "--output", str(tmp_path / "no" / "x.png")]) == 1
-    assert main(["figure", "spin", "Apophis", "--output", str(file)]) == 1
+    assert main(["figure", "spin", "Apophis", "--output", str(file)]) == 2
     assert main(["figure", "orbit"]) == 2

@@ -1,6 +1,7 @@
 """The command line: ``flybystab COMMAND --help`` says what each one does, with examples.
 
-Exit status: 0 done, 1 cannot be computed (why, on stderr), 2 wrong usage. With ``--json`` one document goes to
+Exit status: 0 done, 1 cannot be computed (why, on stderr), 2 wrong usage: words, or values that are wrong whatever
+asteroids and files there are. With ``--json`` one document goes to
 stdout and nothing else. Heavy modules are imported by the command that needs them.
 """
 
@@ -14,7 +15,8 @@ from collections.abc import Sequence
 from difflib import get_close_matches
 
 from flybystab import __version__
-from flybystab.errors import FlybystabError
+from flybystab.errors import FlybystabError, WrongUsage
+from flybystab.face.arguments import check_arguments
 from flybystab.face.commands import COMMANDS
 
 
@@ -40,8 +42,12 @@ def main(argv: Sequence[str] | None = None) -> int:
     # Dates beyond the table of leap seconds are read as TDB; UTC would be "dubious" there.
     warnings.filterwarnings("ignore", message=".*dubious year.*")
     try:
+        check_arguments(options)
         COMMANDS[options.command].run(options)
         sys.stdout.flush()
+    except WrongUsage as reason:
+        print(f"flybystab {options.command}: {reason} (--help says more)", file=sys.stderr)
+        return 2
     except FlybystabError as reason:
         print(f"flybystab: {reason}", file=sys.stderr)
         return 1

@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 from flybystab.aggregate.body import Body, Material
 from flybystab.attitudes import periapsis_axes
 from flybystab.errors import InvalidInput, UnknownName
+from flybystab.face.commands.common import FIGURES, FILMS
 from flybystab.sky.encounter import Encounter
 from flybystab.sky.planets import planet
 from flybystab.survey.asteroid import Asteroid
@@ -85,6 +86,8 @@ def scenario(path: str | Path) -> Scenario:
     attitude = _attitude(content["attitude"], content["body"], asteroid, encounter)
     title = _typed(content, "", "title", str, path.stem)
     figure = _typed(content["output"], "output", "figure", str, None)
+    if figure is not None and Path(figure).suffix.lower() not in FIGURES + FILMS:
+        raise InvalidInput("output.figure", figure, f"a file that ends in {' or '.join(FIGURES + FILMS)}")
     return Scenario(title, body, encounter, attitude, figure)
 
 

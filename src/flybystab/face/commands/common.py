@@ -9,7 +9,7 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from flybystab.errors import InvalidInput
+from flybystab.errors import InvalidInput, WrongUsage
 
 #: Other yield surfaces that a verdict is checked on.
 OTHER_SURFACES = ("drucker-prager-extension", "mohr-coulomb", "matsuoka-nakai")
@@ -107,9 +107,21 @@ def check_picture(path: str | None, endings: tuple[str, ...] = FIGURES) -> None:
 
     target = Path(path)
     if target.suffix.lower() not in endings:
-        raise InvalidInput("--output", path, f"a file that ends in {' or '.join(endings)}")
+        raise WrongUsage(f"--output = {path}: expected a file that ends in {' or '.join(endings)}")
     if not target.parent.is_dir() or not os.access(target.parent, os.W_OK):
         raise InvalidInput("--output", path, "a folder that exists and can be written")
+
+
+def check_table(path: str | None) -> None:
+    """Find out that a table cannot be written before computing it."""
+    if path is None:
+        return
+    from flybystab.survey.results import FORMATS
+    from flybystab.survey.table_files import check_output
+
+    if not path.endswith(FORMATS):
+        raise WrongUsage(f"--output = {path}: expected a file that ends in {' or '.join(FORMATS)}")
+    check_output(path)
 
 
 def write_picture(result: Any, title: str, path: str) -> None:

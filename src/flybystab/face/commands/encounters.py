@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from flybystab.face.commands.common import show, span_arguments, tdb
+from flybystab.face.commands.common import check_table, show, span_arguments, tdb
 
 HELP = "close approaches of an asteroid"
 EXAMPLE = "flybystab encounters Apophis --to 2030-01-01 --clones 1000"
@@ -28,16 +28,11 @@ def run(options: argparse.Namespace) -> None:
     """Answer the command."""
     import astropy.units as u
 
-    from flybystab.errors import InvalidInput
     from flybystab.face.document import table_document
     from flybystab.sky.finder import find_encounters
-    from flybystab.survey.table_files import check_output
     from flybystab.survey.tables import write_table
 
-    if options.output:
-        check_output(options.output)
-    if options.clones < 0:
-        raise InvalidInput("--clones", options.clones, "a number of clones, 0 for none")
+    check_table(options.output)
     asteroids = _asteroids(options.name)
     table = find_encounters(
         asteroids,

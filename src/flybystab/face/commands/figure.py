@@ -35,7 +35,7 @@ def run(options: argparse.Namespace) -> None:
     import astropy.units as u
 
     from flybystab.aggregate.body import Body
-    from flybystab.errors import InvalidInput
+    from flybystab.errors import WrongUsage
     from flybystab.face.figures import (
         barrier_figure,
         catalogue_bodies,
@@ -47,7 +47,7 @@ def run(options: argparse.Namespace) -> None:
     output = options.output or f"{options.what}.png"
     check_picture(output)
     if options.name is not None and options.what != "barrier":
-        raise InvalidInput("NAME", options.name, "no asteroid: only the barrier is of one body")
+        raise WrongUsage(f"NAME = {options.name}: expected no asteroid, only the barrier is of one body")
     material = material_of(options)
     if options.what == "barrier":
         pile = Body([1400, 850, 750] * u.m, 2000 * u.kg / u.m**3, 6 * u.h, material=material)

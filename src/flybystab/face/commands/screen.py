@@ -5,7 +5,14 @@ from __future__ import annotations
 import argparse
 import sys
 
-from flybystab.face.commands.common import material_arguments, material_of, show, span_arguments, tdb
+from flybystab.face.commands.common import (
+    check_table,
+    material_arguments,
+    material_of,
+    show,
+    span_arguments,
+    tdb,
+)
 
 HELP = "a whole catalogue through its encounters"
 EXAMPLE = "flybystab screen --from 2026-01-01 --to 2036-01-01 --samples 100 --jobs 2"
@@ -52,12 +59,13 @@ def run(options: argparse.Namespace) -> None:
     from flybystab.survey.screening import Screening, listed
     from flybystab.survey.settings import settings
     from flybystab.survey.summary import summary
-    from flybystab.survey.table_files import check_output
 
     if options.population_default:
         print(Population().toml(), end="")
         return
-    output = check_output(options.output)
+    check_table(options.output)
+    check_table(options.samples_output)
+    output = Path(options.output)
     names = [Path(a) if _is_file(a) else a for a in options.asteroids]
     screening = Screening(
         listed(names or None),

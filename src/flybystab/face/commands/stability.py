@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 
 from flybystab import __version__
-from flybystab.errors import InvalidInput
-from flybystab.face.commands.common import asteroid_of, material_arguments, material_of, show
+from flybystab.errors import WrongUsage
+from flybystab.face.commands.common import asteroid_of, check_table, material_arguments, material_of, show
 
 HELP = "equilibrium and stability of an asteroid on its own, or of a whole catalogue"
 EXAMPLE = "flybystab stability Anteros --friction 30"
@@ -29,9 +29,9 @@ def run(options: argparse.Namespace) -> None:
     if options.all:
         _catalogue(options)
     elif options.name is None:
-        raise InvalidInput("NAME", "(none)", "an asteroid, or --all for the whole catalogue")
+        raise WrongUsage("NAME: expected an asteroid, or --all for the whole catalogue")
     elif options.output:
-        raise InvalidInput("--output", options.output, "--all with it: one asteroid is printed")
+        raise WrongUsage("--output: expected --all with it; one asteroid is printed")
     else:
         _asteroid(options)
 
@@ -44,19 +44,19 @@ def _catalogue(options: argparse.Namespace) -> None:
 
     from flybystab.face.document import table_document
     from flybystab.survey.classification import COLUMNS, classification, counts
-    from flybystab.survey.table_files import check_output, write_rows
+    from flybystab.survey.table_files import write_rows
 
-    output = None if options.output is None else check_output(options.output)
+    check_table(options.output)
     table = classification(
         None if options.name is None else Path(options.name), material=material_of(options)
     )
-    if output is not None:
+    if options.output:
         bare = {n: table[n].value if isinstance(table[n], u.Quantity) else table[n] for n in table.colnames}
         rows = (
             {n: v[i].item() if hasattr(v[i], "item") else v[i] for n, v in bare.items()}
             for i in range(len(table))
         )
-        write_rows(rows, output, COLUMNS, table.meta)
+        write_rows(rows, Path(options.output), COLUMNS, table.meta)
 
     def lines() -> list[str]:
         head = f"{'asteroid':>24} {'friction':>8}  30 35 40 {'strain':>7} {'cohesion':>9}  not measured"
@@ -76,7 +76,7 @@ def _catalogue(options: argparse.Namespace) -> None:
         held = (
             " (0 inadmissible, 1 admissible, 2 stable to infinitesimal, 3 to finite pushes at second order)"
         )
-        return [*out, "levels" + held, *([f"table      {output}"] if output else [])]
+        return [*out, "levels" + held, *([f"table      {options.output}"] if options.output else [])]
 
     show(options, lambda: table_document(table), lines)
 
