@@ -59,13 +59,12 @@ def spin_figure(bodies: Mapping[str, Body], surface: str = "drucker-prager") -> 
     """Spin limits against the axis ratio, oblate and prolate, with bodies by ``a3/a1`` and ``omega^2/(pi G rho)``."""
     figure = Figure(figsize=(9.6, 4.8), layout="constrained")
     flat, long = figure.subplots(1, 2, sharey=True)
+    for axes in (flat, long):
+        axes.set(xlim=(0.1, 1.02), ylim=(0.0, 1.3))
     oblate = {n: b for n, b in bodies.items() if b.axes[1] ** 2 >= b.axes[0] * b.axes[2]}
     spin_plot(flat, ANGLES, yield_surface=surface, bodies=oblate, named=KNOWN)
     others = {n: b for n, b in bodies.items() if n not in oblate}
     spin_plot(long, ANGLES, prolate=True, yield_surface=surface, bodies=others, named=KNOWN)
-    for axes in (flat, long):
-        axes.set_xlim(0.1, 1.02)
-        axes.set_ylim(0.0, 1.3)
     return figure
 
 

@@ -15,6 +15,7 @@ from flybystab.aggregate.fluids import jacobi, maclaurin
 from flybystab.aggregate.regions import stability_map
 from flybystab.aggregate.stability import push, stability
 from flybystab.constants import G
+from flybystab.face.labels import label_points
 
 BLACK, ORANGE, SKY, GREEN, BLUE, RED = "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00"
 STYLES = ("-", "--", ":", "-.")
@@ -22,23 +23,12 @@ ANGLES = (1, 5, 10, 20, 30, 40)
 
 
 def _mark(axes: Any, points: Mapping[str, tuple[float, float]], named: Sequence[str] | None) -> None:
-    """Dots; with names at those of `named`, or at all of them."""
-    count = 0
+    """Dots; with names at those of `named`, or at all of them. The axes must be finished otherwise."""
+    shown = [name for name in points if named is None or name in named]
     for name, (x, y) in points.items():
-        shown = named is None or name in named
-        axes.plot(x, y, "o", ms=4 if shown else 2, color=BLACK, mec="white", mew=0.4, zorder=5)
-        if shown:
-            left = x > 0.8
-            count += 1
-            axes.annotate(
-                name,
-                (x, y),
-                xytext=(-4 if left else 4, 3 if count % 2 else -8),
-                textcoords="offset points",
-                ha="right" if left else "left",
-                fontsize=7,
-                zorder=6,
-            )
+        axes.plot(x, y, "o", ms=4 if name in shown else 2, color=BLACK, mec="white", mew=0.4, zorder=5)
+    everywhere = np.array(list(points.values())).reshape(-1, 2)
+    label_points(axes, [(*points[name], name) for name in shown], everywhere, fontsize=7)
 
 
 def axis_ratios(bodies: Mapping[str, Body]) -> dict[str, tuple[float, float]]:
@@ -88,12 +78,12 @@ def regions_plot(
         )
         axes.clabel(lines, fmt="%g°", fontsize=7)
     axes.plot([0, 1], [0, 1], color=BLACK, lw=0.8)
-    _mark(axes, axis_ratios(bodies or {}), named)
     axes.set_xlim(0, 1)
     axes.set_ylim(0, 1)
     axes.set_xlabel("axis ratio $a_2/a_1$")
     axes.set_ylabel("axis ratio $a_3/a_1$")
     axes.set_title(rf"friction angle required, $\omega^2/\pi G\rho = {w2:g}$", fontsize=9)
+    _mark(axes, axis_ratios(bodies or {}), named)
     return axes
 
 
@@ -147,10 +137,10 @@ def spin_plot(
         name: (float(b.axes[2] / b.axes[0]), float(b.omega @ b.omega / (np.pi * G * b.rho)))
         for name, b in (bodies or {}).items()
     }
-    _mark(axes, marks, named)
     axes.set_xlabel("axis ratio $a_3/a_1$" + (" (prolate)" if prolate else " (oblate)"))
     axes.set_ylabel(r"$\omega^2/\pi G\rho$")
     axes.legend(frameon=False, fontsize=7)
+    _mark(axes, marks, named)
     return axes
 
 

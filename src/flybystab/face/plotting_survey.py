@@ -9,21 +9,21 @@ import astropy.units as u
 import numpy as np
 from astropy.table import QTable
 
+from flybystab.face.labels import label_points
+from flybystab.face.maps import MARKERS, SCALE
 from flybystab.outcome import Verdict
 from flybystab.survey.columns import VERDICTS
 from flybystab.survey.inference import strongest_passage
 from flybystab.survey.results import read_results
 from flybystab.survey.summary import summary
 
-#: Colour of each verdict, mild to fatal.
-COLOURS = dict(
-    zip(VERDICTS, ("#4477aa", "#228833", "#ccbb44", "#ee6677", "#aa3377", "#66ccee", "#bbbbbb"), strict=True)
-)
 PANELS = {
     "friction_equilibrium": "shape and spin",
     "friction_any_attitude": "and passages, whatever the attitude",
     "friction_every_attitude": "enough at every attitude",
 }
+#: Friction angle, deg, below which a passage adds nothing on a figure.
+NOTHING = 1e-5
 #: Isolines of the least friction angle, deg.
 _LEVELS = (0, 5, 10, 15, 20, 25, 30, 35, 40, 45, 60)
 
@@ -103,40 +103,49 @@ def results_figure(results: QTable | str | Path, path: str | Path, names: int = 
     summary(table)
     verdict = np.asarray(table["verdict"], dtype=str)
     distance = table["distance"].to_value(u.au)
-    rise = np.maximum(table["friction_rise"].to_value(u.deg), 1e-5)
+    rise = np.maximum(table["friction_rise"].to_value(u.deg), NOTHING)
     margin = table["margin"].to_value(u.deg)
     figure = _figure(10, 4.2)
     left, right = figure.subplots(1, 2)
     stands = np.isfinite(rise) & np.isfinite(margin) & (verdict != Verdict.NOT_IN_EQUILIBRIUM)
     bound = np.asarray(table["decided_by"], dtype=str) == "bound"
     for v in VERDICTS:
-        for chosen, mark, how in (
-            (stands & (verdict == v) & ~bound, "o", "by the dynamics"),
-            (stands & (verdict == v) & bound, "v", "upper limit"),
+        known = {"mfc": SCALE[v][1], "marker": MARKERS[list(SCALE).index(v)], "ms": 5}
+        for chosen, how, style in (
+            (
+                stands & (verdict == v) & bound,
+                "upper limit",
+                {"mfc": "none", "mec": "0.5", "marker": "v", "ms": 4},
+            ),
+            (stands & (verdict == v) & ~bound, "by the dynamics", {"mec": "black", **known}),
         ):
             if chosen.any():
-                style = {"ls": "", "marker": mark, "ms": 3, "color": COLOURS[v], "alpha": 0.8}
+                style = {"ls": "", "mew": 0.5, **style}
                 left.plot(distance[chosen], rise[chosen], **style, label=f"{v}, {how} ({chosen.sum()})")
                 right.plot(rise[chosen], margin[chosen], **style)
-    exact = stands & ~bound
-    for k in np.flatnonzero(exact)[np.argsort(-rise[exact], kind="stable")][:names]:
-        label = f"{table['asteroid'][k]} {str(table['time_tdb'][k])[:4]}"
-        left.annotate(label, (distance[k], rise[k]), fontsize=6, xytext=(3, 2), textcoords="offset points")
-    for k in np.flatnonzero(stands)[np.argsort(margin[stands], kind="stable")][:names]:
-        label = f"{table['asteroid'][k]} {str(table['time_tdb'][k])[:4]}"
-        right.annotate(label, (rise[k], margin[k]), fontsize=6, xytext=(3, 2), textcoords="offset points")
     left.set(xscale="log", yscale="log", xlabel="distance at closest approach (au)")
-    left.set_ylabel("friction angle that the passage adds (deg)")
-    right.set(xscale="log", xlabel="friction angle that the passage adds (deg)")
+    adds = "friction angle that the passage adds (deg)"
+    left.set_ylabel(adds)
+    right.set(xscale="log", xlabel=adds)
     right.set_ylabel("margin (deg of friction angle)")
     right.axhline(0.0, color="0.6", lw=0.8)
     if left.get_legend_handles_labels()[0]:
         left.legend(fontsize=7)
     out = int((verdict == Verdict.NOT_IN_EQUILIBRIUM).sum())
+    least = f"; {NOTHING:g} deg stands for that or less" if np.any(rise[stands] == NOTHING) else ""
     figure.suptitle(
         f"{len(table)} passages, ephemeris {table.meta.get('ephemeris', '-')}; not shown: {out} of bodies that "
-        "are not in equilibrium by themselves",
+        "are not in equilibrium by themselves" + least,
         fontsize=9,
     )
+    exact = stands & ~bound
+    for axes, x, y, rows in (
+        (left, distance, rise, np.flatnonzero(exact)[np.argsort(-rise[exact], kind="stable")]),
+        (right, rise, margin, np.flatnonzero(stands)[np.argsort(margin[stands], kind="stable")]),
+    ):
+        named = [
+            (x[k], y[k], f"{table['asteroid'][k]} {str(table['time_tdb'][k])[:4]}") for k in rows[:names]
+        ]
+        label_points(axes, named, np.column_stack([x[stands], y[stands]]), fontsize=7)
     figure.savefig(path, dpi=150)
     return Path(path)
