@@ -1,13 +1,18 @@
 """The command line: readable text, one JSON document, honest exit statuses, errors that teach."""
 
+import io
 import json
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from numba import njit
+from numba.core import event
 
+from flybystab.face import compiling
 from flybystab.face.cli import COMMANDS, main
+from flybystab.survey.population import Population
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
@@ -342,3 +347,60 @@ def test_stability_of_a_whole_catalogue(tmp_path, capsys):
     assert main(["stability"]) == 2
     assert "--all" in capsys.readouterr().err
     assert main(["stability", "Apophis", "--output", str(out)]) == 2
+
+
+def test_files_saved_by_excel_or_notepad_are_read(capsys, tmp_path):
+    """They begin with a byte-order mark."""
+    mark = "\ufeff"
+    scene, table, population = (tmp_path / n for n in ("s.toml", "a.csv", "p.toml"))
+    scene.write_text(mark + GOOD, encoding="utf-8")
+    assert run(capsys, "scenario", scene)[0] == 0
+    text = "name,semi_axis_a_m,semi_axis_b_m,semi_axis_c_m,density_kg_m3,spin_period_h\r\nA,300,200,150,2000,6\r\n"
+    table.write_bytes((mark + text).encode())
+    status, out, err = run(capsys, "stability", "--all", table, "--json")
+    assert status == 0, err
+    assert json.loads(out)["rows"][0]["asteroid"] == "A"
+    population.write_text(mark + "cohesion_Pa = { kind = 'fixed', value = 3 }\n", encoding="utf-8")
+    assert Population.from_file(population).cohesion_Pa.value == 3
+    document = tmp_path / "d.json"
+    document.write_text(mark + run(capsys, "scenario", scene, "--json")[1], encoding="utf-8")
+    assert run(capsys, "cite", document)[0] == 0
+
+
+class Terminal(io.StringIO):
+    """A stream that says it is a terminal."""
+
+    def isatty(self):
+        return True
+
+
+@pytest.mark.parametrize(
+    ("stream", "json_too", "said"), [(Terminal, False, 1), (Terminal, True, 0), (io.StringIO, False, 0)]
+)
+def test_compiling_is_said_once_on_a_terminal_only(capsys, monkeypatch, stream, json_too, said):
+    errors = stream()
+    monkeypatch.setattr(sys, "stderr", errors)
+    heard = []
+    monkeypatch.setattr(compiling, "announce", heard.append)
+    assert main(["stability", "Anteros", *(["--json"] if json_too else [])]) == 0
+    assert heard == [errors] * said
+
+
+def test_numba_tells_what_it_compiles():
+    """The event that the announcement waits for: at the first call, not at later ones."""
+    stream = io.StringIO()
+    listener = compiling.announce(stream)
+    try:
+
+        @njit
+        def twice(x):
+            return 2 * x
+
+        assert stream.getvalue() == ""
+        assert twice(3) + twice(4) == 14
+        assert (
+            stream.getvalue()
+            == "flybystab: compiling its kernels, once on this machine (about a minute) ...\n"
+        )
+    finally:
+        event.unregister("numba:compile", listener)

@@ -5,7 +5,7 @@ divisor gives inf or nan, which the callers test for, instead of an exception in
 ``fastmath`` stays off: compensated sums and sign tests rely on the order of operations. ``summing_kernel`` is for
 the few inner loops that are plain sums: there the compiler may reorder additions and fuse products, which lets it
 use vector instructions; infinities and nan keep their meaning. ``pasted_kernel`` is one that is pasted into its
-caller.
+caller. Where the cache cannot be written anywhere (read-only package and home) each process compiles for itself.
 """
 
 from __future__ import annotations
@@ -18,14 +18,26 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
 
-kernel = njit(cache=True, nogil=True, error_model="numpy")
+
+def _cacheable() -> bool:
+    """Whether numba finds a place for its cache; it refuses to define a cached kernel where it does not."""
+    try:
+        njit(cache=True)(lambda: 0)
+    except RuntimeError:
+        return False
+    return True
+
+
+#: Whether compiled kernels are kept on disk.
+CACHE = _cacheable()
+kernel = njit(cache=CACHE, nogil=True, error_model="numpy")
 _SUMS: Any = {"fastmath": {"reassoc", "contract", "nsz"}}
-summing_kernel = njit(cache=True, nogil=True, error_model="numpy", **_SUMS)
+summing_kernel = njit(cache=CACHE, nogil=True, error_model="numpy", **_SUMS)
 # Handing over a tuple of arrays costs more than the few sums inside.
-pasted_kernel = njit(cache=True, nogil=True, error_model="numpy", inline="always", **_SUMS)
+pasted_kernel = njit(cache=CACHE, nogil=True, error_model="numpy", inline="always", **_SUMS)
 
 #: A kernel that becomes part of its callers: those that only pass large ones on would compile them once more.
-inlined = njit(cache=True, nogil=True, error_model="numpy", inline="always")
+inlined = njit(cache=CACHE, nogil=True, error_model="numpy", inline="always")
 
 
 def code(n: int) -> int:

@@ -43,6 +43,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     warnings.filterwarnings("ignore", message=".*dubious year.*")
     try:
         check_arguments(options)
+        if sys.stderr.isatty() and not options.json and options.command not in ("cite", "completion"):
+            from flybystab.face.compiling import announce
+
+            announce(sys.stderr)
         COMMANDS[options.command].run(options)
         sys.stdout.flush()
     except WrongUsage as reason:

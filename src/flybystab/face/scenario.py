@@ -69,7 +69,7 @@ def scenario(path: str | Path) -> Scenario:
     """
     path = Path(path)
     try:
-        content = tomllib.loads(path.read_text(encoding="utf-8"))
+        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except (OSError, UnicodeDecodeError) as reason:
         raise InvalidInput("scenario file", path, f"a readable file ({reason})") from None
     except tomllib.TOMLDecodeError as reason:

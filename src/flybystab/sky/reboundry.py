@@ -17,6 +17,7 @@ from numba.core import cgutils
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
+from flybystab.core.jit import CACHE
 from flybystab.errors import NotConverged
 from flybystab.sky.forces import LOG_ADDRESS, LOG_COUNT, LOG_ROWS, acceleration
 
@@ -64,7 +65,7 @@ def _compile(at_t: int, at_p: int, at_model: int, x: int, v: int, a: int) -> tup
     # The offsets are closure variables: they are part of the key of numba's cache on disk.
     words = max(x, v, a) + 3
 
-    @cfunc(types.void(types.voidptr), cache=True)
+    @cfunc(types.void(types.voidptr), cache=CACHE)
     def force(sim: Any) -> None:
         base: int = _address(sim)  # type: ignore[call-arg]
         t = carray(_pointer(base + at_t), 1, np.float64)[0]
@@ -77,7 +78,7 @@ def _compile(at_t: int, at_p: int, at_model: int, x: int, v: int, a: int) -> tup
         for j in range(3):
             particle[a + j] += out[j]
 
-    @cfunc(types.void(types.voidptr), cache=True)
+    @cfunc(types.void(types.voidptr), cache=CACHE)
     def log(sim: Any) -> None:
         base: int = _address(sim)  # type: ignore[call-arg]
         t = carray(_pointer(base + at_t), 1, np.float64)[0]

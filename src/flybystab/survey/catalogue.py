@@ -86,7 +86,7 @@ def catalogue(path: str | Path | None = None) -> tuple[Asteroid, ...]:
         return _embedded()
     try:
         raw = Path(path).read_bytes()
-        text = (gzip.decompress(raw) if raw[:2] == b"\x1f\x8b" else raw).decode("utf-8")
+        text = (gzip.decompress(raw) if raw[:2] == b"\x1f\x8b" else raw).decode("utf-8-sig")
     except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
         raise InvalidInput("catalogue file", path, f"a readable CSV file ({error})") from None
     one = {".ke1": from_neocc, ".json": from_sbdb_answer}.get(Path(path).suffix)

@@ -130,7 +130,7 @@ class Population:
     def from_file(cls, path: str | Path) -> Population:
         """From a TOML file, as :meth:`toml` writes it; what it leaves out keeps its default."""
         try:
-            data = tomllib.loads(Path(path).read_text(encoding="utf-8"))
+            data = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
         except (OSError, UnicodeDecodeError) as error:
             raise InvalidInput("population file", path, f"a readable file ({error})") from None
         except tomllib.TOMLDecodeError as error:

@@ -40,6 +40,6 @@ def _result(path: str | None) -> Any:
     from flybystab.errors import InvalidInput
 
     try:
-        return json.loads(Path(path).read_text(encoding="utf-8"))
+        return json.loads(Path(path).read_text(encoding="utf-8-sig"))
     except ValueError as reason:
         raise InvalidInput("file", path, f"a JSON document ({reason})") from None
