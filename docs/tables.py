@@ -11,6 +11,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 TABLES = {
     "apophis": "python benchmarks/sky.py apophis",
+    "completeness": "python benchmarks/completeness.py out/whole.ecsv",
     "flyby": "flybystab bench flyby",
     "grains": "python benchmarks/piles.py grains",
     "honesty": "python benchmarks/honesty.py scripted --encounters 300",
@@ -23,6 +24,7 @@ TABLES = {
     "margin": "python benchmarks/margin.py",
     "minima": "python benchmarks/stability.py minima",
     "push": "python benchmarks/stability.py push",
+    "sky": "flybystab bench sky",
     "stability": "python benchmarks/stability.py",
     "throughput": "python benchmarks/screen.py throughput",
     "tracks": "python benchmarks/encounters.py tracks",

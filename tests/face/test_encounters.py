@@ -87,3 +87,36 @@ def test_orbits_from_files(capsys, tmp_path):
     status, _, err = run(capsys, single, *YEAR, "--clones", 5)
     assert status == 1
     assert "covariance" in err
+
+
+def test_a_whole_catalogue(capsys, tmp_path):
+    path = tmp_path / "found.ecsv"
+    status, out, err = run(capsys, "--all", "--from", "2028-01-01", "--to", "2031-01-01", "--output", path)
+    assert status == 0
+    table = read_results(path)
+    assert "embedded catalogue" in out
+    assert f"): {len(table)} encounters" in out
+    assert "determined" not in out  # neighbours are not followed
+    assert f"{len(table)} encounters" in err  # the last line of progress
+    (apophis,) = table[table["asteroid"] == "Apophis"]
+    assert apophis["distance"].to_value(u.km) == pytest.approx(38011.4, abs=1)
+    assert "growth" not in table.colnames
+
+
+def test_what_was_not_asked_for(capsys):
+    for words, says in (
+        ((), "--all"),
+        (("Eros", "--error", 0), "--error"),
+        (("Eros", "--all", "--clones", 3), "--clones"),
+    ):
+        status, out, err = run(capsys, *words)
+        assert (status, out) == (2, "")
+        assert says in err
+
+
+def test_many_encounters_are_cut_to_the_closest(capsys):
+    status, out, _ = run(capsys, "--all", "--from", "2020-01-01", "--to", "2040-01-01", "--within", 0.2)
+    assert status == 0
+    lines = out.splitlines()
+    assert lines[-1].startswith("the closest 100 of ")
+    assert len(lines) == 103

@@ -139,5 +139,7 @@ def test_bad_arguments_are_named(apophis):
         Encounter.from_orbit(apophis, "sun", DAY)
     with pytest.raises(InvalidInput, match="stop"):
         find_encounters(apophis, DAY, DAY)
+    with pytest.raises(InvalidInput, match=r"objects = Apophis.*from_catalogue\('Apophis'\)"):
+        find_encounters("Apophis", DAY, later(DAY, 1e6))
     with pytest.raises(InvalidInput, match=r"objects\[1\]"):
         find_encounters([apophis, 3], DAY, later(DAY, 1e6))

@@ -38,6 +38,8 @@ def check_arguments(options: argparse.Namespace) -> None:
                 raise InvalidInput(f"--{name}", given[name], f"a whole number, {least} or more")
         if not 0.0 < given.get("within", 1.0) < math.inf:
             raise InvalidInput("--within", given["within"], "a distance above 0, in au")
+        if not 0.0 < given.get("error", 1.0) < math.inf:
+            raise InvalidInput("--error", given["error"], "an error above 0, in km")
         if "friction" in given:
             material_of(options)
         elif "surface" in given:

@@ -7,8 +7,7 @@ the work.
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Callable, Sequence
 from typing import Any
 
 import astropy.units as u
@@ -30,6 +29,7 @@ from flybystab.sky.need import N_SHARES, NAMES, reduced
 from flybystab.sky.orbit import Orbit, _ephemeris, default_forces, later, seconds
 from flybystab.sky.planets import PLANETS, planet
 from flybystab.sky.predictability import neighbour
+from flybystab.sky.threads import in_order
 from flybystab.sky.track import STALLED, search
 from flybystab.units import to_si
 
@@ -53,6 +53,7 @@ def find_encounters(
     forces: tuple[str, ...] | None = None,
     growth: bool = False,
     threads: int | None = None,
+    progress: Callable[[int, int, int], None] | None = None,
 ) -> QTable:
     """Every closest approach of every asteroid to every planet below a threshold.
 
@@ -83,6 +84,8 @@ def find_encounters(
         (:mod:`flybystab.sky.predictability`). Up to twice the time.
     threads : int, optional
         Number of threads; the processors by default.
+    progress : callable, optional
+        Called with the asteroids searched, all of them, and the encounters found so far.
 
     Returns
     -------
@@ -176,12 +179,11 @@ def find_encounters(
     # Parts small enough that threads end together, large enough that Python does not count.
     size = max(1, min(64, -(-len(rows) // (4 * workers)))) if workers > 1 else max(len(rows), 1)
     tasks = [slice(i, min(i + size, len(rows))) for i in range(0, len(rows), size)]
-    if workers > 1 and len(tasks) > 1:
-        with ThreadPoolExecutor(workers) as pool:
-            results = list(pool.map(run, tasks))
-    else:
-        results = [run(task) for task in tasks]
-    flat = [part for parts in results for part in parts]
+    flat: list[Array] = []
+    for task, parts in zip(tasks, in_order(run, tasks, workers), strict=True):
+        flat += parts
+        if progress is not None:
+            progress(task.stop, len(rows), sum(map(len, flat)))
     raw = np.concatenate(flat) if flat else np.empty((0, WIDTH))
     raw = raw[np.lexsort((raw[:, 1], raw[:, 11]))]
     asked = np.isin(raw[:, 0], [BODIES.index(b.name) for b in found])
@@ -266,6 +268,8 @@ def _table(
 
 def _objects(objects: Any) -> list[tuple[str, Orbit]]:
     """Names and orbits of one object or of many."""
+    if isinstance(objects, str):
+        raise InvalidInput("objects", objects, f"an orbit, as in fs.Asteroid.from_catalogue({objects!r})")
     single = isinstance(objects, Orbit) or hasattr(objects, "orbit")
     many = [objects] if single else objects
     try:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from concurrent.futures import ThreadPoolExecutor
 
 import astropy.units as u
 import numpy as np
@@ -18,6 +17,7 @@ from flybystab.sky.field import Field, borrowed_field, rate
 from flybystab.sky.orbit import seconds
 from flybystab.sky.planets import planet
 from flybystab.sky.predictability import Neighbour, predictability
+from flybystab.sky.threads import in_order
 
 Array = NDArray[np.float64]
 
@@ -103,12 +103,8 @@ def add_growth(
                     shift[row] = np.linalg.norm(away - table["position"][row].to_value(u.m))
 
     wanted = np.unique(index).tolist()
-    if threads > 1 and len(wanted) > 1:
-        with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(one, wanted))
-    else:
-        for i in wanted:
-            one(i)
+    for _ in in_order(one, wanted, threads):
+        pass
     shift[np.isnan(shift)] = np.inf  # the neighbour was lost
     scale = np.array([planet(name).impact_distance for name in table["planet"]])
     size = np.maximum(table["distance"].to_value(u.m), np.where(table["impact"], scale, 0.0))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -23,6 +24,7 @@ from flybystab.units import to_si
 Array = NDArray[np.float64]
 
 _AU_D2 = u.au / u.d**2
+_SPEED = u.m / u.s
 _ZERO = 0.0 * _AU_D2
 
 
@@ -98,22 +100,30 @@ class Orbit:
         """
         axis = to_si(a, u.m, "a")
         ecc = to_si(e, u.dimensionless_unscaled, "e", low=0.0)
-        if axis == 0.0 or ecc == 1.0 or (axis > 0.0) != (ecc < 1.0):
-            raise InvalidInput("e", e, f"below 1 for a > 0, above 1 for a < 0 (a = {a})")
         angles = [
             to_si(v, u.rad, n)
             for v, n in ((_angle(i), "i"), (_angle(node), "node"), (_angle(peri), "peri"), (_angle(M), "M"))
         ]
-        since = angles[3] * np.sqrt(abs(axis) ** 3 / GM_SUN)
-        state = state_from_elements(axis * (1.0 - ecc), ecc, angles[0], angles[1], angles[2], since)
-        return cls(
-            epoch=_epoch(epoch),
-            position=state[:3] * u.m,
-            velocity=state[3:] * u.m / u.s,
-            nongrav=_nongrav(A1, A2, A3, law),
-            name=name,
-            covariance=covariance,
-        )
+        push = _nongrav(A1, A2, A3, law)
+        return cls._from_si_elements(_epoch(epoch), (axis, ecc, *angles), push, name, covariance)
+
+    @classmethod
+    def _from_si_elements(
+        cls,
+        epoch: Time,
+        elements: Sequence[float],
+        nongrav: NonGravitational,
+        name: str,
+        covariance: Covariance | None,
+    ) -> Orbit:
+        """Orbit from a, e, i, node, peri, M in m and rad: units on a whole catalogue would cost a minute."""
+        a, e, i, node, peri, mean = elements
+        if a == 0.0 or e < 0.0 or e == 1.0 or (a > 0.0) != (e < 1.0):
+            raise InvalidInput("e", e, f"below 1 for a > 0, above 1 for a < 0 (a = {a:g} m)")
+        since = mean * np.sqrt(abs(a) ** 3 / GM_SUN)
+        state = state_from_elements(a * (1.0 - e), e, i, node, peri, since)
+        r, v = Quantity(state[:3], u.m, copy=False), Quantity(state[3:], _SPEED, copy=False)
+        return cls(epoch, r, v, nongrav=nongrav, name=name, covariance=covariance)
 
     @classmethod
     def from_state(

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
@@ -85,6 +85,13 @@ _SHAPE = ("semi_axis_a_m", "semi_axis_b_m", "semi_axis_c_m")
 def key_of(name: object) -> str:
     """A name as it is compared: no case, no spaces, no brackets."""
     return "".join(c for c in str(name).casefold() if not c.isspace() and c not in "()_")
+
+
+@lru_cache(maxsize=64)
+def _day(jd: float) -> Time:
+    """A Julian date, TDB; most rows of a catalogue share theirs."""
+    whole = np.floor(jd)
+    return Time(whole, jd - whole, format="jd", scale="tdb")
 
 
 @dataclass(frozen=True, eq=False)
@@ -244,9 +251,7 @@ class Asteroid:
     @property
     def epoch(self) -> Time:
         """Epoch of the elements, TDB."""
-        day = self._number("epoch_jd_tdb")
-        whole = np.floor(day)
-        return Time(whole, day - whole, format="jd", scale="tdb")
+        return _day(self._number("epoch_jd_tdb"))
 
     @cached_property
     def orbit(self) -> Orbit:
@@ -255,28 +260,17 @@ class Asteroid:
         Its covariance is the asteroid's own; else the one embedded for it; else the diagonal of the row's
         1-sigmas, marked as uncorrelated; else None.
         """
-        epoch = self.epoch
-        a, e, i, node, peri, mean = (self.quantity(c) for c in _ORBIT[1:])
-        a1, a2, a3 = (
-            self.quantity(c) if self.row.get(c) else 0.0 * u.au / u.d**2
-            for c in ("A1_au_d2", "A2_au_d2", "A3_au_d2")
-        )
+        from flybystab.sky.forces import NonGravitational, au_per_day2
         from flybystab.sky.orbit import Orbit
 
-        return Orbit.from_elements(
-            epoch=epoch,
-            a=a,
-            e=float(e),
-            i=i,
-            node=node,
-            peri=peri,
-            M=mean,
-            A1=a1,
-            A2=a2,
-            A3=a3,
-            name=self.name,
-            covariance=self._covariance(epoch),
+        epoch = self.epoch
+        elements = [self._number(c) * unit for c, unit in zip(_ORBIT[1:], _ORBIT_SI.tolist(), strict=True)]
+        a1, a2, a3 = (
+            au_per_day2(self._number(c)) if self.row.get(c) else 0.0
+            for c in ("A1_au_d2", "A2_au_d2", "A3_au_d2")
         )
+        push = NonGravitational((a1, a2, a3))
+        return Orbit._from_si_elements(epoch, elements, push, self.name, self._covariance(epoch))
 
     def _covariance(self, epoch: Time) -> Covariance | None:
         if self.covariance is not None:

@@ -12,4 +12,5 @@ BENCHES = {
     "flyby": "integrators of one flyby",
     "many": "rate of many encounters by threads",
     "screen": "bound and dynamics of a screening",
+    "sky": "close approaches against JPL, search against ASSIST",
 }

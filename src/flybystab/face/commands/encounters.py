@@ -3,20 +3,34 @@
 from __future__ import annotations
 
 import argparse
+import time
 from typing import Any
 
+from flybystab.errors import WrongUsage
 from flybystab.face.commands.common import check_table, show, span_arguments, tdb
 
 HELP = "close approaches of an asteroid"
+#: Most encounters that are printed; of more, the closest.
+SHOWN = 100
 EXAMPLE = "flybystab encounters Apophis --to 2030-01-01 --clones 1000"
 
 
 def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     sub.add_argument(
-        "name", help="number, name or designation, or a file with one orbit (.ke1, .json) or more (.csv)"
+        "name",
+        nargs="?",
+        help="number, name or designation, or a file with one orbit (.ke1, .json) or more (.csv)",
+    )
+    sub.add_argument(
+        "--all",
+        action="store_true",
+        help="the embedded catalogue, or the file given (own CSV, JPL SBDB, MPC), without following neighbours",
     )
     span_arguments(sub, "2020-01-01", "2050-01-01")
+    sub.add_argument(
+        "--error", type=float, default=0.1, metavar="KM", help="error of the distances to aim at (0.1 km)"
+    )
     sub.add_argument(
         "--clones", type=int, default=0, metavar="N", help="orbits drawn from the covariance (0: none)"
     )
@@ -30,17 +44,31 @@ def run(options: argparse.Namespace) -> None:
 
     from flybystab.face.document import table_document
     from flybystab.sky.finder import find_encounters
+    from flybystab.survey.catalogue import catalogue
+    from flybystab.survey.progress import Progress, ProgressBar
     from flybystab.survey.tables import write_table
 
+    if options.name is None and not options.all:
+        raise WrongUsage("NAME: expected an asteroid, or --all for the whole catalogue")
+    if options.clones and options.all:
+        raise WrongUsage("--clones: expected one asteroid or a file of a few, not --all")
     check_table(options.output)
-    asteroids = _asteroids(options.name)
+    asteroids = list(catalogue()) if options.name is None else _asteroids(options.name)
+    bar = ProgressBar()
+    begin = time.monotonic()
+
+    def progress(done: int, total: int, found: int) -> None:
+        bar(Progress(done, total, 0, found, {}, time.monotonic() - begin))
+
     table = find_encounters(
         asteroids,
         tdb(options.start, "--from"),
         tdb(options.stop, "--to"),
         planets=options.planet or ["earth"],
         within=options.within * u.au,
-        growth=True,
+        error=options.error * u.km,
+        growth=not options.all,
+        progress=progress if len(asteroids) > SHOWN else None,
     )
     if options.clones:
         table = _with_clones(table, asteroids, options.clones, options.seed)
@@ -54,7 +82,7 @@ def run(options: argparse.Namespace) -> None:
         lambda: [
             f"{asteroids[0].label}: {head}"
             if not many
-            else f"{options.name} ({len(asteroids)} asteroids): {head}",
+            else f"{options.name or 'embedded catalogue'} ({len(asteroids)} asteroids): {head}",
             *_lines(table, many),
             *([f"table      {options.output}"] if options.output else []),
         ],
@@ -94,12 +122,16 @@ def _with_clones(table: Any, asteroids: list[Any], clones: int, seed: int) -> An
 def _lines(table: Any, many: bool) -> list[str]:
     """The table for people: distances, and behind them what is known of them."""
     import astropy.units as u
+    import numpy as np
 
     if not len(table):
         return []
-    clones = "clones" in table.colnames
+    clones, known = "clones" in table.colnames, "growth" in table.colnames
+    count = len(table)
+    if count > SHOWN:
+        table = table[np.sort(np.argsort(table["distance"])[:SHOWN])]
     head = f"{'planet':8s} {'time (TDB)':19s} {'distance (km)':>16s} {'(au)':>9s} {'v_inf (km/s)':>12s} "
-    head += f"{'B.T (km)':>13s} {'B.R (km)':>13s} {'moves (km)':>11s}  known"
+    head += f"{'B.T (km)':>13s} {'B.R (km)':>13s}" + (f" {'moves (km)':>11s}  known" if known else "")
     if clones:
         head = head.replace("  known", f" {'sigma (km)':>11s} {'P(impact), 95 %':>24s} {'linear':>9s}  known")
     out = [(f"{'asteroid':16s} " if many else "") + head]
@@ -108,13 +140,20 @@ def _lines(table: Any, many: bool) -> list[str]:
         line += (
             f"{row['planet']:8s} {row['time'].tdb.iso[:19]} {row['distance'].to_value(u.km):16,.1f} "
             f"{row['distance'].to_value(u.au):9.6f} {row['v_inf'].to_value(u.km / u.s):12.4f} "
-            f"{row['b_t'].to_value(u.km):13,.0f} {row['b_r'].to_value(u.km):13,.0f} "
-            f"{row['displacement'].to_value(u.km):11.4g}"
+            f"{row['b_t'].to_value(u.km):13,.0f} {row['b_r'].to_value(u.km):13,.0f}"
         )
+        if known:
+            line += f" {row['displacement'].to_value(u.km):11.4g}"
         if clones:
             odds = f"{row['p_impact']:.3g} ({row['p_impact_low']:.2g}-{row['p_impact_high']:.2g})"
             line += f" {row['distance_sigma'].to_value(u.km):11.4g} {odds:>24s} {row['p_impact_linear']:9.2g}"
-        out.append(f"{line}  {row['predictability']}" + (", impact" if row["impact"] else ""))
+        said = [row["predictability"]] if known else []
+        said += ["impact"] if row["impact"] else []
+        out.append(f"{line}  {', '.join(said)}".rstrip())
+    if count > SHOWN:
+        out.append(f"the closest {SHOWN} of {count}; --output FILE keeps all")
+    if not known:
+        return out
     neighbours = "; ".join(table.meta["neighbours"])
     out.append(f"moves: how far the asteroid is displaced there by {neighbours}")
     if clones:
