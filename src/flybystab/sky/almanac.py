@@ -9,6 +9,7 @@ ephemeris, the asteroids as good as their table. Barycentric ICRF, m, s.
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import NamedTuple
 
 import numpy as np
@@ -60,8 +61,9 @@ class Places(NamedTuple):
     belt: Array
 
 
+@lru_cache(maxsize=4)
 def almanac(window: Window, belt: bool) -> Almanac:
-    """The almanac of a window, with the massive asteroids or without."""
+    """The almanac of a window, with the massive asteroids or without; the last ones are kept."""
     grids = [
         _grid(window, 4, 4.0 * DAY, 12, FAST, N_FAST, 16),
         _grid(window, 0, 16.0 * DAY, 7, SLOW, N_SLOW, 24),

@@ -98,7 +98,7 @@ _KNOWN: dict[str, tuple[str, str, str, tuple[float, ...]]] = {
 }
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Window:
     """The Chebyshev records of a time span.
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Sequence
+from functools import lru_cache
 from typing import Any
 
 import astropy.units as u
@@ -38,6 +39,12 @@ Array = NDArray[np.float64]
 #: Tolerance over the error (m) that it leaves the median asteroid with after ten years; the error grows with the
 #: square of time (``flybystab bench sky``).
 _AT_10_YEARS, _TOLERANCES = 1e-12 / 100.0, (1e-15, 1e-8)
+
+
+@lru_cache(maxsize=4)
+def _window(eph: Ephemeris, day: float, fraction: float, start: float, stop: float) -> Window:
+    """The ephemeris around a search; kept, with its almanac, for the next asteroid of the same epoch."""
+    return eph.window(Time(day, fraction, format="jd", scale="tdb"), start, stop)
 
 
 def find_encounters(
@@ -127,7 +134,7 @@ def find_encounters(
     epochs = _epochs(rows, middle)
     beside = [neighbour(orbit, middle, eph) for _, orbit in rows] if growth else []
     every = [t_start, t_stop, *epochs, *(seconds(n.orbit.epoch, middle) for n in beside)]
-    window = eph.window(middle, min(every), max(every))
+    window = _window(eph, middle.tdb.jd1, middle.tdb.jd2, min(every), max(every))
     chosen = forces
     if chosen is None:
         used = {name for _, orbit in rows for name in default_forces(orbit, *(b.name for b in found))}
