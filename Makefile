@@ -34,7 +34,7 @@ check: .venv/.test
 	touch $@
 
 docs: .venv/.docs
-	$(PY) -m sphinx -W --keep-going -b html -q docs out/docs
+	$(PY) -m sphinx -E -W --keep-going -b html -q docs out/docs
 
 # Wheel and sdist, installed in clean environments and tried outside the repository.
 dist: .venv/.test

@@ -48,8 +48,23 @@ def test_what_a_page_names_is_there(page):
 
 def test_the_gallery_lists_every_example():
     text = (ROOT / "docs/gallery.md").read_text()
+    shown = (ROOT / "docs/scripts.md").read_text()
     for script in (ROOT / "examples").glob("*.py"):
         assert f"`{script.name}`" in text, script.name
+        assert f"../examples/{script.name}\n" in shown, script.name
+
+
+def test_every_public_name_is_documented():
+    text = (ROOT / "docs/api.md").read_text()
+    assert "automodule:: flybystab.errors" in text
+    for name in set(flybystab.__all__) - {"__version__", "R_earth", "FlybystabError"}:
+        assert re.search(rf"auto(function|class):: flybystab\.{name}\b", text), name
+
+
+def test_modules_that_the_theory_links_are_on_the_page():
+    named = set(re.findall(r"\{mod\}`([\w.]+)`", (ROOT / "docs/theory.md").read_text()))
+    assert len(named) > 15
+    assert named <= set(re.findall(r"automodule:: ([\w.]+)", (ROOT / "docs/api.md").read_text()))
 
 
 def test_the_example_of_the_package():

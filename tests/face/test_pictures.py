@@ -89,7 +89,7 @@ def test_outcome_map_agrees_with_single_flybys():
     assert found.share_yielding[0, 0] == 1.0
     a = axes()
     assert maps.outcome_plot(a, found) is a
-    assert "radii of earth" in a.get_xlabel()
+    assert "radii of Earth" in a.get_xlabel()
     assert "(km/s)" in a.get_ylabel()
 
 

@@ -144,7 +144,7 @@ def outcome_plot(axes: Any, outcomes: OutcomeMap) -> Any:
     if share.min() < 0.5 <= share.max() and min(share.shape) > 1:
         lines = axes.contour(q, v, share.T, levels=[0.1, 0.9], colors="black", linestyles=["--", "-"])
         axes.clabel(lines, fmt=lambda x: f"{x:.0%} of phases yield", fontsize=7)
-    axes.set_xlabel(f"periapsis (radii of {outcomes.planet.name})")
+    axes.set_xlabel(f"periapsis (radii of {outcomes.planet.name.capitalize()})")
     axes.set_ylabel("speed far away $v_\\infty$ (km/s)")
     _legend(axes, worst)
     return axes
@@ -257,7 +257,7 @@ def target_plot(axes: Any, target: TargetMap) -> Any:
     disc = target.capture_radius.to_value(u.km)
     axes.add_patch(Circle((0, 0), disc, color=SCALE[Verdict.IMPACT][1], zorder=3))
     axes.text(
-        0, 0, f"hits the {target.planet.name}", color="white", ha="center", va="center", fontsize=7, zorder=4
+        0, 0, f"hits {target.planet.name.capitalize()}", color="white", ha="center", va="center", fontsize=7, zorder=4
     )
     axes.set_aspect("equal")
     axes.set_xlabel("B.T (km)")

@@ -39,7 +39,7 @@ def distance_plot(axes: Any, history: History, encounter: Encounter) -> Any:
     """Distance from the planet's centre against time, with the planet's radius."""
     axes.semilogy(_hours(history), history.distance.to_value(u.km), color=BLACK)
     radius = encounter.planet.radius / 1e3
-    axes.axhline(radius, color=BLUE, ls="--", label=f"radius of {encounter.planet.name}")
+    axes.axhline(radius, color=BLUE, ls="--", label=f"radius of {encounter.planet.name.capitalize()}")
     axes.set_ylabel("distance (km)")
     axes.legend(frameon=False, fontsize=8)
     _shade(axes, history)

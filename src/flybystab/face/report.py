@@ -166,7 +166,7 @@ def _encounter_rows(r: FlybyResult, when: str) -> list[tuple[str, str]]:
     e = r.encounter
     q = e.distance.to_value(u.km)
     rows = [
-        ("planet", _e(e.planet.name)),
+        ("planet", _e(e.planet.name.capitalize())),
         ("closest approach", _e(when or "scripted")),
         ("distance between the centres", f"{q:,.1f} km ({q * 1e3 / e.planet.radius:.3f} planet radii)"),
         ("speed there", f"{e.v_periapsis.to_value(u.km / u.s):.4f} km/s"),

@@ -84,7 +84,7 @@ def scene_plot(
     axes.set_ylabel("y (1000 km)", labelpad=16)
     axes.set_zticks([])
     axes.set_title(
-        f"{encounter.planet.name} to scale, body {magnification:,.0f} times larger; grey rigid, orange flowing",
+        f"{encounter.planet.name.capitalize()} to scale, body {magnification:,.0f} times larger; grey rigid, orange flowing",
         fontsize=9,
     )
     limits = np.array([getattr(axes, f"get_{n}lim")() for n in "xyz"])

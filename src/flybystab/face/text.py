@@ -32,7 +32,7 @@ def encounter_lines(e: Encounter) -> list[str]:
     when = f"{e.time.tdb.iso[:19]} TDB" if e.time is not None else "scripted"
     radii = e.distance.to_value(u.m) / e.planet.radius
     out = [
-        f"encounter  {e.planet.name}, {when}",
+        f"encounter  {e.planet.name.capitalize()}, {when}",
         f"           {e.distance.to_value(u.km):,.1f} km from the centre ({radii:.3f} radii), "
         f"v_inf {e.v_inf.to_value(u.km / u.s):.4f} km/s",
     ]
