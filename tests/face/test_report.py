@@ -56,7 +56,7 @@ def test_everything_is_in_it(page):
         "assumed",
         "8 of 8 sampled attitudes",
         "95 % interval",
-        "earth J2",
+        "Earth J2",
         "not in it",
         "flybystab report Apophis --date 2029-04-13",
         "rebound ",
@@ -98,5 +98,5 @@ def test_in_a_browser(page, tmp_path):
 
 
 def test_the_place_is_checked_first(capsys):
-    assert main(["report", "Apophis", "--output", "report.doc"]) == 1
+    assert main(["report", "Apophis", "--output", "report.doc"]) == 2
     assert "ends in .html" in capsys.readouterr().err

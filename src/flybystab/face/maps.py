@@ -257,7 +257,14 @@ def target_plot(axes: Any, target: TargetMap) -> Any:
     disc = target.capture_radius.to_value(u.km)
     axes.add_patch(Circle((0, 0), disc, color=SCALE[Verdict.IMPACT][1], zorder=3))
     axes.text(
-        0, 0, f"hits {target.planet.name.capitalize()}", color="white", ha="center", va="center", fontsize=7, zorder=4
+        0,
+        0,
+        f"hits {target.planet.name.capitalize()}",
+        color="white",
+        ha="center",
+        va="center",
+        fontsize=7,
+        zorder=4,
     )
     axes.set_aspect("equal")
     axes.set_xlabel("B.T (km)")

@@ -21,7 +21,7 @@ from astropy.table import Row
 from flybystab import __version__
 from flybystab.face.plotting import BLUE, flyby_panels
 from flybystab.face.scene import scene_plot
-from flybystab.face.text import MEANING, angle, known
+from flybystab.face.text import MEANING, angle, known, left_out, modelled
 from flybystab.flyby_results import FlybyResult
 from flybystab.sky.ephemeris import ephemeris
 from flybystab.spin import SpinSample
@@ -256,7 +256,10 @@ def _body_rows(a: Asteroid) -> list[tuple[str, str]]:
         if a.knows(column):
             value = a.quantity(column)
             mark = ' <span class="assumed">assumed</span>' if column in assumed else ""
-            rows.append((name, f"{value.value:g} {_e(value.unit)}{mark}"))
+            unit = _e(value.unit).replace(" / ", "/")
+            rows.append(
+                (name, f"{value.value:{'.4g' if column.startswith('semi_axis') else 'g'}} {unit}{mark}")
+            )
     rows += [(f"source of {k.replace('_', ' ')}", _e(v)) for k, v in a.sources.items() if k in _SHOWN]
     if a.assumptions:
         rows.append(("not measured", _e("; ".join(a.assumptions))))
@@ -267,16 +270,8 @@ _SHOWN = ("semi_axes", "spin", "pole", "tumbling", "density", "orbit")
 
 
 def _model_rows(r: FlybyResult) -> list[tuple[str, str]]:
-    orbit = [x.removeprefix("orbit: ") for x in r.modelled if x.startswith("orbit: ")]
-    tide = [x.removeprefix("tide: ") for x in r.modelled if x.startswith("tide: ")]
-    rest = [x for x in r.modelled if not x.startswith(("orbit: ", "tide: "))]
-    rows = [("orbit", orbit), ("tide", tide), ("body", rest)]
-    out = [(name, _e("; ".join(found))) for name, found in rows if found]
-    left = sorted(r.left_out, key=lambda x: -x[1])
-    out.append(
-        ("left out, with the largest share", _e("; ".join(f"{n} ({s:.0e})" for n, s in left)) or "nothing")
-    )
-    return out
+    rows = [(name, _e(what)) for name, what in modelled(r).items()]
+    return [*rows, ("left out, with the largest share", _e(left_out(r, 6)) or "nothing")]
 
 
 def _provenance_rows(a: Asteroid, s: SpinSample, command: str) -> list[tuple[str, str]]:

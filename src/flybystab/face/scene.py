@@ -83,9 +83,9 @@ def scene_plot(
     axes.set_xlabel("x (1000 km)", labelpad=2)
     axes.set_ylabel("y (1000 km)", labelpad=16)
     axes.set_zticks([])
+    name = encounter.planet.name.capitalize()
     axes.set_title(
-        f"{encounter.planet.name.capitalize()} to scale, body {magnification:,.0f} times larger; grey rigid, orange flowing",
-        fontsize=9,
+        f"{name} to scale, body {magnification:,.0f} times larger; grey rigid, orange flowing", fontsize=9
     )
     limits = np.array([getattr(axes, f"get_{n}lim")() for n in "xyz"])
     axes.set_box_aspect(np.ptp(limits, axis=1), zoom=1.05)

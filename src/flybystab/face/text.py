@@ -8,6 +8,7 @@ import numpy as np
 from flybystab.aggregate.equilibrium import Equilibrium
 from flybystab.flyby_results import FlybyResult
 from flybystab.sky.encounter import Encounter
+from flybystab.sky.ephemeris import BELT, BODIES
 from flybystab.spin import SpinSample
 
 MEANING = {
@@ -101,17 +102,48 @@ def sample_lines(s: SpinSample) -> list[str]:
     ]
 
 
-def model_lines(r: FlybyResult, assumed: tuple[str, ...] = ()) -> list[str]:
-    """What was modelled, left out and assumed."""
+def modelled(r: FlybyResult) -> dict[str, str]:
+    """What was modelled, in words, by ``orbit``, ``tide`` and ``body``; the small pullers are counted."""
     groups: dict[str, list[str]] = {}
     for entry in r.modelled:
         head, _, rest = entry.partition(": ")
         groups.setdefault(head if rest else "body", []).append(rest or entry)
-    rows = [f"{head}: {', '.join(entries).replace(' point mass', '')}" for head, entries in groups.items()]
+    out = {}
+    for head, entries in groups.items():
+        names = [e.removesuffix(" point mass") for e in entries]
+        small = [n for n in names if n in BELT]
+        if len(small) > 2:
+            at = names.index(small[0])
+            names = [n for n in names if n not in small]
+            names.insert(at, f"{len(small)} massive asteroids")
+        out[head] = ", ".join(names if head == "body" else map(capital, names))
+    return out
+
+
+def capital(name: str) -> str:
+    """A force or its source with the proper name in capitals: ``earth J2`` is Earth J2."""
+    first, space, rest = name.partition(" ")
+    return (first.capitalize() if first in (*BODIES, *BELT) else first) + space + rest
+
+
+def left_out(r: FlybyResult, most: int = 4) -> str:
+    """The largest of what was left out, with its share; how many more there are."""
+    largest = sorted(r.left_out, key=lambda x: -x[1])
+    words = []
+    for name, share in largest[:most]:
+        head, colon, rest = name.rpartition(": ")
+        words.append(f"{head}{colon}{capital(rest).removesuffix(' point mass')} ({share:.0e})")
+    if len(largest) > most:
+        words.append(f"{len(largest) - most} smaller ones")
+    return "; ".join(words)
+
+
+def model_lines(r: FlybyResult, assumed: tuple[str, ...] = ()) -> list[str]:
+    """What was modelled, left out and assumed."""
+    rows = [f"{head}: {what}" for head, what in modelled(r).items()]
     out = [("modelled   " if i == 0 else "           ") + row for i, row in enumerate(rows)]
     if r.left_out:
-        largest = sorted(r.left_out, key=lambda x: -x[1])[:4]
-        out.append("left out   " + "; ".join(f"{name} ({share:.0e})" for name, share in largest))
+        out.append("left out   " + left_out(r))
     if assumed:
         out.append("assumed    " + "; ".join(assumed))
     return out
