@@ -25,6 +25,7 @@ TABLES = {
     "minima": "python benchmarks/stability.py minima",
     "push": "python benchmarks/stability.py push",
     "sky": "flybystab bench sky",
+    "stages": "python benchmarks/completeness.py stages",
     "stability": "python benchmarks/stability.py",
     "throughput": "python benchmarks/screen.py throughput",
     "tracks": "python benchmarks/encounters.py tracks",
