@@ -6,6 +6,9 @@ takes finished tables as they are and only writes the page again.
 """
 
 import argparse
+import csv
+import gzip
+import sys
 import time
 from pathlib import Path
 
@@ -15,9 +18,10 @@ from astropy.time import Time
 
 from flybystab.face.plotting_survey import inference_figure, results_figure
 from flybystab.survey.asteroid import Asteroid
-from flybystab.survey.catalogue import catalogue
+from flybystab.survey.catalogue import catalogue, find
 from flybystab.survey.columns import YIELDED
 from flybystab.survey.executors import workers
+from flybystab.survey.formats import with_physical_data
 from flybystab.survey.inference import infer, strongest_passage, survived
 from flybystab.survey.population import Population
 from flybystab.survey.progress import ProgressBar
@@ -29,6 +33,7 @@ from flybystab.survey.summary import summary
 ROOT = Path(__file__).resolve().parents[1]
 OUT = ROOT / "out" / "results"
 NEW, OLD = "nea_sbdb_fullprec_2026-07.csv.gz", "nea_sbdb_fullprec_2020-09.csv.gz"
+MPC = "nea_mpc_2026-02.csv.gz"
 SAMPLES = 100
 #: A pile without strength that turns slowly: what the tide could do at most.
 WEAK = {"cohesion_Pa": 0, "spin_period_h": {"kind": "uniform", "low": 4, "high": 12}, "replace_assumed": True}
@@ -38,9 +43,12 @@ RUNS = {
     "full": (NEW, "2026-01-01", "2050-01-01", 0.05, {}),
     "past": (None, "1950-01-01", "2026-01-01", 0.05, {}),
     "deep": (OLD, "2000-01-01", "2021-01-01", 0.001, {}),
+    "others": (None, "2002-01-01", "2020-01-01", 0.05, {}),
     "weak": (OLD, "2000-01-01", "2021-01-01", 0.001, WEAK),
 }
-#: Passages that a reader may look for.
+#: Asteroids of passages to know that the other screenings do not have, by table.
+OTHERS = {MPC: ("2002 MN", "2008 TC3", "2019 OK"), NEW: ("2014 HQ124",)}
+#: Passages that a reader may look for: name, month, and the name in the table where that is another one.
 FAMOUS = [
     ("Apophis", "2029-04"),
     ("Toutatis", "2004-09"),
@@ -53,7 +61,7 @@ FAMOUS = [
     ("2019 OK", "2019-07"),
     ("Florence", "2017-09"),
     ("2014 HQ124", "2014-06"),
-    ("1999 AN10", "2027-08"),
+    ("1999 AN10", "2027-08", "137108"),
     ("1997 XF11", "2028-10"),
     ("2001 WN5", "2028-06"),
 ]
@@ -65,9 +73,13 @@ def run(name, data, jobs, keep):
     path = OUT / f"{name}.ecsv"
     if keep and path.exists():
         return read_results(path), np.nan
-    chosen = listed(None if file is None else data / file)
-    if name == "weak":  # no period of the LCDB: all turn slowly
+    if name == "others":
+        chosen = [find(catalogue(data / f), n, f) for f, names in OTHERS.items() for n in names]
+        chosen = with_physical_data(chosen)
+    elif name == "weak":  # no period of the LCDB: all turn slowly
         chosen = catalogue(data / file)
+    else:
+        chosen = listed(None if file is None else data / file)
     screening = Screening(
         chosen,
         settings(
@@ -147,19 +159,46 @@ def reshaped(table):
 
 
 def famous(*tables):
+    """The passages to know, each from the first table that has it."""
     text = ""
-    for name, month in FAMOUS:
+    for name, month, *other in FAMOUS:
+        known = other[0] if other else name
         for table in tables:
             same = [
                 k
                 for k in range(len(table))
-                if table["asteroid"][k] == name and table["time_tdb"][k].startswith(month)
+                if table["asteroid"][k] == known and table["time_tdb"][k].startswith(month)
             ]
             if same:
-                body = passages(table, same).split("\n")
+                body = passages(table, same).replace(f"| {known} |", f"| {name} |").split("\n")
                 text += "\n".join(body[:3] if not text else body[2:3]) + "\n"
                 break
+        else:
+            sys.exit(f"no passage of {name} in {month}")
     return text
+
+
+def against_cneos(table, data):
+    """Distances on the elements of the MPC beside those that CNEOS gave with its own solutions."""
+    known = {}
+    for file, column, unit in (
+        ("cneos_earth_1950_2040_lt0.05au.csv.gz", "dist_au", "au"),
+        ("cneos_earth_even_years_lt10LD_km.csv.gz", "dist_km", "km"),
+    ):
+        with gzip.open(data / file, "rt", encoding="utf-8") as stream:
+            known |= {(r["des"], r["cd_tdb"][:4]): f"{r[column]} {unit}" for r in csv.DictReader(stream)}
+    months = {name: month for name, month, *_ in FAMOUS}
+    words = []
+    for row in table:
+        name = str(row["asteroid"])
+        if name not in OTHERS[MPC] or not row["time_tdb"].startswith(months[name]):
+            continue
+        if row["p_impact"] > 0.0:
+            words.append(f"{name} hits the Earth, as it did, in every sample that can exist")
+        else:
+            theirs = known[name, row["time_tdb"][:4]]
+            words.append(f"{name} at {row['distance'].to_value(u.km):.0f} km (CNEOS: {theirs})")
+    return "; ".join(words)
 
 
 def bounds():
@@ -208,7 +247,7 @@ def main():
     tables = {name: run(name, args.data, args.jobs, args.keep)[0] for name in RUNS}
     for name in ("full", "weak"):
         results_figure(tables[name], ROOT / "docs" / "images" / f"results_{name}.png")
-    embedded, full, past, deep, weak = (tables[n] for n in RUNS)
+    embedded, full, past, deep, others, weak = (tables[n] for n in RUNS)
     touched = reshaped(full)
     spun = [k for k in range(len(full)) if full["verdict"][k] == "NOT IN EQUILIBRIUM"]
     hit = reshaped(weak)
@@ -248,7 +287,10 @@ Not in equilibrium without cohesion, whatever passes by: {len(spun)} passages of
 
 ## Passages to know
 
-{famous(embedded, past, full, deep)}
+{famous(embedded, past, full, deep, others)}
+2002 MN, 2008 TC3 and 2019 OK are in no table of full precision; they are followed on the seven digits of the MPC
+({MPC}): {against_cneos(others, args.data)}.
+
 Of the embedded catalogue since 1950 ({counts(past)[:-1].lower()}), these added most:
 
 {passages(past, [k for k in loaded(past) if past["friction_rise"][k] > 0.01 * u.deg])}
