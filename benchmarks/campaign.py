@@ -1,11 +1,14 @@
-"""Random flybys over the whole domain: does any hang, fail, lose its numbers, gain energy or change its verdict?
+"""Random flybys over the whole domain: does any hang, fail, gain energy, change its verdict, or miss its own error?
 
-python benchmarks/campaign.py [N [SEED]]     default 2000 flybys, seed 1
+python benchmarks/campaign.py stress [N [SEED]]       two tolerances, energy, verdicts; 1000 flybys, seed 1
+python benchmarks/campaign.py integrators [N [SEED]]  against the integrator that knows no events; 300, seed 2
+python benchmarks/campaign.py coverage [N [SEED]]     the error estimate against a run at 1e-11; 100 with flow of each
+                                                      yield surface at dilatancy 0 and 1, seed 3
 
-Semi-axes to 1 : 0.1 : 0.1, 1 m to 1000 km, 1000 to 4000 kg/m3, any spin up to 1.2 times the cohesionless limit of a
-sphere, any attitude; friction 0.1 to 60 deg, the four surfaces, dilatancy 0 to 1, cohesion or none, brittle or not;
-Earth at 1.01 to 5 radii with 0 to 20 km/s. Each is run at a tolerance of 1e-7 and of 1e-9. Energy is checked where it
-can only fall: the plastic power along the flow, and the kinetic energy across every impulse and arrest.
+`stress` and `integrators` draw semi-axes to 1 : 0.1 : 0.1, 1 m to 1000 km, 1000 to 4000 kg/m3, any spin up to 1.2 times
+the cohesionless limit of a sphere, any attitude; friction 0.1 to 60 deg, the four surfaces, dilatancy 0 to 1, cohesion
+or none, brittle or not; Earth at 1.01 to 5 radii with 0 to 20 km/s. Energy is checked where it can only fall: the
+plastic power along the flow, and the kinetic energy across every impulse and arrest.
 """
 
 from __future__ import annotations
@@ -13,6 +16,7 @@ from __future__ import annotations
 import sys
 import time
 from collections import Counter
+from typing import Any
 
 import astropy.units as u
 import numpy as np
@@ -21,11 +25,17 @@ from scipy.spatial.transform import Rotation
 import flybystab as fs
 from flybystab.aggregate.body import YIELD_SURFACES
 from flybystab.constants import G
-from flybystab.errors import NotConverged
+from flybystab.core.passage import parameters, passage
+from flybystab.core.stepping import follow_steps
+from flybystab.core.tide import TidePanels, components, tensor
+from flybystab.outcome import bound_fraction, classed
+from flybystab.rows import Judged, judged
 
 TOLERANCES = (1e-7, 1e-9)
 #: Axis ratio where the model is left: above that of the longest bodies drawn.
 LIMIT = 12.0
+#: Steps of the event-free integrator a dynamical time, of the coarser of two runs.
+STEPS = 250
 
 
 def draw(rng: np.random.Generator) -> tuple[fs.Body, fs.Encounter, np.ndarray]:
@@ -65,74 +75,267 @@ def draw(rng: np.random.Generator) -> tuple[fs.Body, fs.Encounter, np.ndarray]:
     return body, encounter, Rotation.random(random_state=int(rng.integers(1 << 31))).as_matrix()
 
 
-def energy_gains(r: fs.FlybyResult, body: fs.Body) -> float:
-    """Largest share of the kinetic energy gained where it can only fall."""
-    h = r.history
-    shape, gradient = h.shape.to_value(u.m**2), h.velocity_gradient.to_value(1 / u.s)
-    kinetic = 0.5 * np.einsum("nij,njk,nik->n", gradient, shape, gradient)
-    t = h.time.to_value(u.s)
+def said(body: fs.Body, encounter: fs.Encounter) -> str:
+    """A scene in two lines."""
+    m = body.material
+    axes, spin = (" ".join(f"{x:.4g}" for x in v) for v in (body.axes, body.omega))
+    return (
+        f"   {axes} m, {body.rho:.0f} kg/m3, spin {spin} rad/s, q {encounter.distance / fs.R_earth:.3f} R_E, "
+        f"v_inf {encounter.v_inf:.2f},\n   {m.yield_surface}, friction {np.rad2deg(m.phi):.2f} deg, "
+        f"cohesion {m.c_pa:.3g} Pa{' (brittle)' if m.brittle else ''}, dilatancy {m.dilatancy:.3g}"
+    )
+
+
+def energy_gain(found: Judged, body: fs.Body) -> float:
+    """Largest share of the kinetic energy gained at an instant, where it can only fall."""
+    h = found.history
+    assert h is not None
+    gradient = h["velocity_gradient"]
+    kinetic = 0.5 * np.einsum("nij,njk,nik->n", gradient, h["shape"], gradient)
     gain = 0.0
-    for i in np.flatnonzero((np.diff(t) == 0.0) & (h.regime[1:] != h.regime[:-1])):
-        own = 4.0 * np.pi * G * body.rho / 3.0 * np.trace(shape[i])  # of the order of the self-gravity
+    for i in np.flatnonzero((np.diff(h["time"]) == 0.0) & (np.diff(h["regime"]) != 0)):
+        own = 4.0 * np.pi * G * body.rho / 3.0 * np.trace(h["shape"][i])  # of the order of the self-gravity
         gain = max(gain, (kinetic[i + 1] - kinetic[i]) / max(kinetic[i], 1e-12 * own))
     return gain
 
 
-def main(n: int, seed: int) -> None:
+def plastic_gain(found: Judged) -> float:
+    """Largest negative plastic power over the largest sum of its parts; the flow rule forbids any."""
+    h = found.history
+    assert h is not None
+    flow = h["regime"] == 1
+    if not np.any(flow):
+        return 0.0
+    d = 0.5 * (h["velocity_gradient"] + np.swapaxes(h["velocity_gradient"], 1, 2))[flow]
+    trace = np.trace(d, axis1=1, axis2=2)
+    d -= trace[:, None, None] / 3.0 * np.eye(3)
+    size = np.sqrt(np.einsum("nij,nij->n", d, d))
+
+    def lode(det: Any) -> Any:
+        return np.arcsin(np.clip(-3.0 * np.sqrt(6.0) * det, -1.0, 1.0)) / 3.0
+
+    turn = lode(np.linalg.det(d / size[:, None, None])) - lode(h["determinant"][flow])
+    friction, dilation = h["deviator"][flow] * size * np.cos(turn), h["pressure"][flow] * trace
+    return float(np.max(dilation - friction) / np.max(np.abs(friction) + np.abs(dilation)))
+
+
+def stress(n: int, seed: int) -> Counter[str]:
+    """Two tolerances of the default integrator."""
     rng = np.random.default_rng(seed)
     count: Counter[str] = Counter()
     verdicts: Counter[str] = Counter()
     cpu = dict.fromkeys(TOLERANCES, 0.0)
-    worst = 0.0
+    worst, power, longest = 0.0, 0.0, 0.0
     for i in range(n):
         body, encounter, attitude = draw(rng)
+        while i % 10 > 0 and not fs.equilibrium(body).admissible:  # one in ten may be no body at all
+            body, encounter, attitude = draw(rng)
+        turn = fs.periapsis_axes(encounter).T @ attitude
         found = []
         for tol in TOLERANCES:
             start = time.process_time()
-            try:
-                r = fs.flyby(
-                    body, encounter, attitude, tolerance=tol, error=False, history=tol == TOLERANCES[0],
-                    max_axis_ratio=LIMIT,
-                )  # fmt: skip
-            except NotConverged as reason:
-                count["not converged"] += 1
-                print(f"{i}: {reason}\n   {body}\n   {encounter.distance:.1f} {encounter.v_inf}")
-                break
-            cpu[tol] += time.process_time() - start
-            found.append(r)
-            numbers = [*r.semi_axes.value, *r.spin_vector.value, r.bound_fraction, r.end_time.value]
-            if not np.all(np.isfinite(numbers)):
-                count["not finite"] += 1
-                print(f"{i}: not finite\n   {body}")
-        if len(found) < len(TOLERANCES):
+            found.append(
+                judged(body, encounter, turn, tol, LIMIT, 20_000 if tol == TOLERANCES[0] else 0, needs=True)
+            )
+            took = time.process_time() - start
+            cpu[tol] += took
+            longest = max(longest, took)
+        failed = [r.failure for r in found if r.failure]
+        if failed:
+            count["not converged"] += 1
+            print(f"{i}: {failed[0]}\n{said(body, encounter)}")
             continue
+        first, second = found
+        if not all(np.all(np.isfinite([*r.axes, *r.spin, r.bound, r.time])) for r in found):
+            count["not finite"] += 1
+            print(f"{i}: not finite\n{said(body, encounter)}")
+        names = [[name for name, _, _ in r.events] for r in found]
         count["ran"] += 1
-        verdicts[str(found[0].verdict)] += 1
-        count["with flow"] += found[0].onset_time is not None
-        count["loss of contact"] += any(name == "loss of contact" for name, _ in found[0].events)
-        count["jam"] += any(name == "jam" for name, _ in found[0].events)
-        gain = energy_gains(found[0], body)
-        worst = max(worst, gain)
-        if gain > 1e-6:
-            count["energy gained"] += 1
-            print(f"{i}: energy gained {gain:.1e}\n   {body}\n   {encounter.distance:.1f} {encounter.v_inf}")
-        if found[0].verdict != found[1].verdict:
+        verdicts[str(first.verdict)] += 1
+        for name in ("onset", "loss of contact", "jam"):
+            count[name] += name in names[0]
+        if first.verdict != "NOT IN EQUILIBRIUM":
+            gain, plastic = energy_gain(first, body), plastic_gain(first)
+            worst, power = max(worst, gain), max(power, plastic)
+            if max(gain, plastic) > 100.0 * TOLERANCES[0]:
+                count["energy gained"] += 1
+                print(f"{i}: energy gained {gain:.1e}, plastic power {-plastic:.1e}\n{said(body, encounter)}")
+        if first.verdict != second.verdict:
             count["verdicts differ"] += 1
-            print(f"{i}: {found[0].verdict} at {TOLERANCES[0]:g}, {found[1].verdict} at {TOLERANCES[1]:g}")
-            print(f"   {[str(e[0]) for e in found[0].events]} {[str(e[0]) for e in found[1].events]}")
-            print(f"   {body}\n   {encounter.distance:.1f} {encounter.v_inf}")
+            print(f"{i}: {first.verdict} at {TOLERANCES[0]:g}, {second.verdict} at {TOLERANCES[1]:g}")
+            print(f"   {names[0]} {names[1]}\n{said(body, encounter)}")
     print(f"{n} flybys, seed {seed}; tolerances {TOLERANCES[0]:g} and {TOLERANCES[1]:g}")
-    for name in ("ran", "with flow", "loss of contact", "jam"):
+    for name in ("ran", "onset", "loss of contact", "jam"):
         print(f"{name:18s} {count[name]:6d}")
     for name in ("not converged", "not finite", "energy gained", "verdicts differ"):
         print(f"{name:18s} {count[name]:6d}  {count[name] / n:.2%}")
-    print(f"largest gain of energy across an impulse or arrest: {worst:.1e} of the kinetic energy")
+    print(f"largest gain of kinetic energy across an impulse or arrest: {worst:.1e} of it")
+    print(f"largest plastic power of the wrong sign: {power:.1e} of its parts")
+    print(f"longest run: {longest:.2f} s of processor time")
     print("verdicts: " + ", ".join(f"{v} {k}" for k, v in verdicts.most_common()))
     for tol in TOLERANCES:
-        print(f"tolerance {tol:g}: {count['ran'] / cpu[tol]:.0f} a second of processor time")
+        print(f"tolerance {tol:g}: {n / cpu[tol]:.0f} a second of processor time")
+    return count
 
+
+def stepped(
+    body: fs.Body, encounter: fs.Encounter, turn: np.ndarray, n: int
+) -> tuple[np.ndarray, np.ndarray, bool] | None:
+    """Shape (m2), velocity gradient (1/s) and whether it flowed, by the event-free integrator; None if it fails."""
+    m, t0, a0 = body.material, body.dynamical_time, float(np.cbrt(np.prod(body.axes)))
+    par = parameters(body.axes, body.rho, m.phi, m.c_pa, m.dilatancy, m.surface_code)
+    y = np.zeros(15)
+    y[:6] = components(turn @ np.diag((body.axes / a0) ** 2) @ turn.T)
+    y[12:15] = turn @ body.omega * t0
+    e = encounter.tide
+    tide = TidePanels(e.tau / t0, e.start, e.width, e.coefficients * t0**2)
+    summary = np.zeros(4)
+    span = encounter.t_start / t0, encounter.t_stop / t0
+    if not follow_steps(*span, n, y, par, tide, m.brittle, summary):
+        return None
+    w = y[12:15]
+    spin = np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
+    return tensor(y[:6]) * a0**2, (tensor(y[6:12]) + spin) / t0, summary[2] + summary[3] > 0.0
+
+
+def verdict_of(body: fs.Body, shape: np.ndarray, gradient: np.ndarray, yielded: bool) -> str:
+    """Verdict of either integrator by one rule."""
+    values = np.linalg.eigvalsh(shape)
+    if values[2] > LIMIT**2 * values[0]:
+        return "BEYOND MODEL"
+    if not yielded:
+        return "INTACT"
+    density = body.mass.value / (4.0 / 3.0 * np.pi * np.sqrt(np.prod(values)))
+    return str(classed(bound_fraction(shape, gradient, density))[0])
+
+
+def integrators(n: int, seed: int) -> Counter[str]:
+    """The default at 1e-9 against the event-free integrator with halved steps, extrapolated."""
+    rng = np.random.default_rng(seed)
+    count: Counter[str] = Counter()
+    while count["bodies"] < n:
+        body, encounter, attitude = draw(rng)
+        turn = fs.periapsis_axes(encounter).T @ attitude
+        m = body.material
+        if not fs.equilibrium(body).admissible:
+            continue
+        count["bodies"] += 1
+        run = passage(
+            body.axes, body.rho, body.omega, turn, encounter.t_start, encounter.t_stop, encounter.tide, phi=m.phi,
+            cohesion=m.c_pa, dilatancy=m.dilatancy, surface=m.surface_code, brittle=m.brittle, tolerance=1e-9,
+            max_axis_ratio=LIMIT,
+        )  # fmt: skip
+        steps = int(STEPS * (encounter.t_stop - encounter.t_start) / body.dynamical_time)
+        coarse, fine = (stepped(body, encounter, turn, k * steps) for k in (1, 2))
+        if run.reason == "stuck":
+            count["default not converged"] += 1
+            print(f"{count['bodies']}: not converged\n{said(body, encounter)}")
+            continue
+        yielded = any(name == "onset" for name, _, _ in run.events)
+        names = [name for name, _, _ in run.events]
+        count["with flow"] += yielded
+        count["beyond the model"] += run.reason == "beyond model"
+        if coarse is None or fine is None:
+            count["event-free not converged"] += 1
+            print(f"{count['bodies']}: no impulse found; {names}\n{said(body, encounter)}")
+            continue
+        if run.reason == "beyond model":  # where the other goes on
+            continue
+        verdicts = [verdict_of(body, *x) for x in ((run.shape, run.velocity_gradient, yielded), coarse, fine)]
+        if verdicts[0] != verdicts[2]:
+            settled = verdicts[1] == verdicts[2]
+            count["verdicts differ"] += 1
+            count["of these, its own two differ"] += not settled
+            print(f"{count['bodies']}: {verdicts}; {names}\n{said(body, encounter)}")
+            continue
+        size = float(np.trace(fine[0]))
+        claimed = np.abs(fine[0] - coarse[0]).max() / size
+        apart = np.abs(2.0 * fine[0] - coarse[0] - run.shape).max() / size
+        if yielded:
+            count["flowed in both"] += 1
+            count["apart by less than claimed"] += apart <= max(claimed, 1e-7)
+            if apart > max(3.0 * claimed, 1e-6):
+                count["apart by more than 3 times"] += 1
+                print(
+                    f"{count['bodies']}: apart {apart:.1e}, claimed {claimed:.1e}; {names}\n{said(body, encounter)}"
+                )
+    print(f"{n} flybys of bodies in equilibrium, seed {seed}; {STEPS} and {2 * STEPS} steps a dynamical time")
+    for name in (
+        "with flow", "beyond the model", "default not converged", "event-free not converged", "verdicts differ",
+        "of these, its own two differ", "flowed in both", "apart by less than claimed", "apart by more than 3 times",
+    ):  # fmt: skip
+        print(f"{name:30s} {count[name]:5d}")
+    return count
+
+
+def pile(
+    rng: np.random.Generator, surface: str, dilatancy: float
+) -> tuple[fs.Body, fs.Encounter, np.ndarray]:
+    """A pile of ordinary shape, friction and spin on a passage that makes about half of them flow."""
+    body = fs.Body(
+        semi_axes=np.sort(rng.uniform(0.45, 1.0, 3))[::-1] * u.km,
+        density=rng.uniform(1500, 2500) * u.kg / u.m**3,
+        spin_period=rng.choice([-1, 1]) * rng.uniform(5, 12) * u.h,
+        material=fs.Material(
+            friction_angle=rng.uniform(30, 40) * u.deg, dilatancy=dilatancy, yield_surface=surface
+        ),
+    )
+    encounter = fs.Encounter.hyperbolic(
+        "earth", rng.uniform(1.3, 2.4) * fs.R_earth, rng.uniform(1, 12) * u.km / u.s, 10 * fs.R_earth
+    )
+    return body, encounter, Rotation.random(random_state=int(rng.integers(1 << 31))).as_matrix()
+
+
+QUANTITIES = ("semi-axes", "spin", "bound share", "event times")
+
+
+def coverage(n: int, seed: int, tolerance: float = 1e-8, tight: float = 1e-11) -> dict[str, float]:
+    """Share of bodies with flow whose true error, against a run at `tight`, is below the measured one."""
+    rng = np.random.default_rng(seed)
+    floor = 1e-12
+    total: Counter[str] = Counter()
+    print(f"tolerance {tolerance:g}, true error against {tight:g}; {n} with flow of each, seed {seed}")
+    print(f"{'yield surface':26s} {'dilatancy':>9s} " + " ".join(f"{q:>12s}" for q in QUANTITIES))
+    for surface in YIELD_SURFACES:
+        for dilatancy in (0.0, 1.0):
+            covered: Counter[str] = Counter()
+            flowed = 0
+            while flowed < n:
+                body, encounter, attitude = pile(rng, surface, dilatancy)
+                truth = fs.flyby(body, encounter, attitude, history=False, error=False, tolerance=tight)
+                if truth.onset_time is None:
+                    continue
+                flowed += 1
+                r = fs.flyby(body, encounter, attitude, history=False, tolerance=tolerance)
+                total["verdicts differ"] += truth.verdict != r.verdict
+                axes = np.abs(r.semi_axes / truth.semi_axes - 1.0).max()
+                spin = np.linalg.norm(r.spin_vector - truth.spin_vector) / truth.spin
+                same = [x[0] for x in r.events] == [x[0] for x in truth.events]
+                late = max(abs(x[1] - y[1]).value for x, y in zip(r.events, truth.events, strict=False))
+                covered["semi-axes"] += axes <= max(r.error.semi_axes, floor)
+                covered["spin"] += spin <= max(r.error.spin, floor)
+                covered["bound share"] += abs(r.bound_fraction - truth.bound_fraction) <= max(
+                    r.error.bound_fraction, floor
+                )
+                covered["event times"] += not same or late <= max(r.error.event_times.value, 1e-6)
+            print(
+                f"{surface:26s} {dilatancy:9g} "
+                + " ".join(f"{covered[q]:>7d}/{flowed:<4d}" for q in QUANTITIES)
+            )
+            total.update(covered)
+            total["flowed"] += flowed
+    shares = {q: total[q] / total["flowed"] for q in QUANTITIES}
+    print(f"{'all':26s} {'':9s} " + " ".join(f"{shares[q]:12.1%}" for q in QUANTITIES))
+    print(f"verdicts differ from the tight run: {total['verdicts differ']}")
+    return shares
+
+
+COMMANDS = {"stress": (stress, 1000, 1), "integrators": (integrators, 300, 2), "coverage": (coverage, 100, 3)}
 
 if __name__ == "__main__":
-    if len(sys.argv) > 3:
+    words = sys.argv[1:]
+    if not words or words[0] not in COMMANDS or len(words) > 3:
         raise SystemExit(__doc__)
-    main(*(int(x) for x in (sys.argv[1:] + ["2000", "1"][len(sys.argv) - 1 :])))
+    run, *usual = COMMANDS[words[0]]
+    given = [int(x) for x in words[1:]]
+    run(*given, *usual[len(given) :])

@@ -178,17 +178,21 @@ def friction_impulse(
     for part in range(3 if hexagon else 1):
         if part > 0:
             par[PART] = par[PART] % 3.0 + 1.0
-        for guess in range(2 if start > 0.0 else 1):
-            if guess == 0:
+        for guess in range(4):
+            if guess % 2 == 0:
                 _along_rest(that, p, norm, det, excess, par, x, work)
-            else:
+            elif start > 0.0:
                 for i in range(6):
                     x[i] = d_star[i] + (mean if i < 3 else 0.0)
                 x[6] = max(0.0, 3.0 * mean / trace_sinv)
                 x[7] = 0.5
-            found = _newton(x, beta, cos_c, scale, par, work, d_star, jac, pivots) and (
-                not hexagon or _belongs(x, par, work)
-            )
+            else:
+                continue
+            if guess < 2:
+                found = _newton(x, beta, cos_c, scale, par, work, d_star, jac, pivots)
+            else:
+                found = _by_weaker_friction(x, beta, cos_c, scale, par, work, d_star, jac, pivots)
+            found = found and (not hexagon or _belongs(x, par, work))
             if found:
                 break
         if found:
@@ -226,6 +230,30 @@ def _along_rest(
         x[i] *= excess
     x[6] = p
     x[7] = 0.5
+
+
+@kernel
+def _by_weaker_friction(
+    x: Array,
+    beta: float,
+    cos_c: float,
+    scale: float,
+    par: Array,
+    work: Buffers,
+    d_star: Array,
+    jac: Array,
+    pivots: NDArray[np.int64],
+) -> bool:
+    """`_newton` by way of the solutions for less friction, where the section is rounder and a first is found."""
+    full = par[SIN_PHI]
+    found = False
+    for step in range(1, 9):
+        par[SIN_PHI] = full * (1.0 - 0.5**step) if step < 8 else full
+        found = _newton(x, beta, cos_c, scale, par, work, d_star, jac, pivots)
+        if not found:
+            break
+    par[SIN_PHI] = full
+    return found
 
 
 @kernel

@@ -107,7 +107,7 @@ def follow_steps(
     last = np.zeros((3, 3))
     gradient(y, last)
     h = (t1 - t0) / n
-    contact = np.sqrt(determinant(y[0:6]))  # V/V0 at which the grains touch
+    contact = 1.0  # V/V0 at which the grains touch
     summary[0] = summary[1] = -1.0
     summary[2] = summary[3] = 0.0
     touching = True
@@ -123,6 +123,8 @@ def follow_steps(
                 big_l[i, j] += h * work.m[W_K, i, j]
         set_gradient(big_l, y)
         volume = np.sqrt(determinant(y[0:6]))
+        if step == 0:  # volumes are compared at the kicks: the drift of a spinning body opens it a little
+            contact = volume
         beta, _ = dilatancy(contact, par)
         did = FREE
         for turn in range(1 if touching else 4):
@@ -141,7 +143,9 @@ def follow_steps(
                 copy(kicked, y, N_FULL)
             for i in range(3):
                 offset[i] += gap / 3.0
-            if y[6] + y[7] + y[8] - offset[0] - offset[1] - offset[2] >= _dilation(
+            # Only grains that cohere bear a tension: whether it is too much, the impulse says.
+            free = not (touching and par[COHESION] > 0.0)
+            if free and y[6] + y[7] + y[8] - offset[0] - offset[1] - offset[2] >= _dilation(
                 y, offset, beta, par, less
             ):
                 did = FREE
