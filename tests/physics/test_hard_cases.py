@@ -325,6 +325,26 @@ def test_bodies_from_a_metre_to_a_thousand_kilometres(metres):
     )
 
 
+def test_associative_flow_comes_to_rest_on_a_sharp_section():
+    """Matsuoka-Nakai at 60 to 80 deg: the stress runs along its side while D turns by a tenth of a degree."""
+    rng = np.random.default_rng(8)
+    bodies, encounters, attitudes = [], [], []
+    for _ in range(40):
+        bodies.append(
+            Body(
+                semi_axes=np.sort(rng.uniform(0.45, 1.0, 3))[::-1] * u.km,
+                density=rng.uniform(1500, 2500) * u.kg / u.m**3,
+                spin_period=rng.choice([-1, 1]) * rng.uniform(5, 12) * u.h,
+                material=material(rng.uniform(60, 80), dilatancy=1.0, yield_surface="matsuoka-nakai"),
+            )
+        )
+        encounters.append(earth(rng.uniform(1.3, 1.6), rng.uniform(1, 12)))
+        attitudes.append(Rotation.random(random_state=int(rng.integers(1 << 31))))
+    table = flyby_many(bodies, encounters, attitudes, tolerance=1e-6)
+    assert np.all(table.failure == "")
+    assert np.sum(table.verdict == "RESHAPED") > 10
+
+
 def test_many_is_the_same_as_one_by_one():
     near = earth(2.2)
     bodies = [

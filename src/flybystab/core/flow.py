@@ -47,6 +47,9 @@ Array = NDArray[np.float64]
 #: is located no better, and it is far below any other error.
 _SLACK = 1e-9
 
+#: Time to rest at which flow ends, dynamical times over the tolerance of a step.
+_BRIEF = 0.1
+
 
 @kernel
 def axis_ratio2(y: Array, ws: Workspace) -> float:
@@ -163,6 +166,7 @@ def follow_flow(
     h = 1e-4
     limit2 = limit * limit
     near = 1e-6 + 10.0 * tol  # the direction of D is known no better
+    fastest = 0.0
     choose_part(t, y, par, tide, near, ws)
     if _health(t, y, f0, par, tide, limit2, ws) < 0.0:
         return int(ws.mark[3]), t
@@ -172,11 +176,16 @@ def follow_flow(
         _, d, _ = deviator(y[6:12], ws.stress)
         det = ws.work.m[W_SCRATCH, 2, 0]
         record(t, FLOWING, y, par, p, strength, det, ws, hist, count)
-        flow_jacobian(t, y, f0, 1e-6, par, tide, ws.work, ws.jac, ws.ft, ws.ys)
         # d|D'|/dt = Dhat : Ddot
         trend = 0.0
         for i in range(3):
             trend += ws.stress[i] * f0[6 + i] + 2.0 * ws.stress[3 + i] * f0[9 + i]
+        fastest = max(fastest, d)
+        if d < 1e-2 * fastest and d < _BRIEF * tol * -trend:
+            # Rest is nearer than the tolerance can tell: the direction of so small a D is noise, and on a sharp corner
+            # of the yield section, which turns the stress with it, D would never come to rest.
+            return ARREST, t
+        flow_jacobian(t, y, f0, 1e-6, par, tide, ws.work, ws.jac, ws.ft, ws.ys)
         if trend < 0.0:
             # |D| falls linearly to arrest, its direction relaxes as 1/|D|: approach it geometrically.
             h = min(h, 0.8 * d / -trend)
