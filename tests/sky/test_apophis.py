@@ -1,5 +1,8 @@
 """Apophis, 13 April 2029, from the elements of JPL 220, against JPL."""
 
+import subprocess
+import sys
+
 import astropy.units as u
 import numpy as np
 import pytest
@@ -143,3 +146,22 @@ def test_bad_arguments_are_named(apophis):
         find_encounters("Apophis", DAY, later(DAY, 1e6))
     with pytest.raises(InvalidInput, match=r"objects\[1\]"):
         find_encounters([apophis, 3], DAY, later(DAY, 1e6))
+
+
+def test_each_force_has_its_share(apophis):
+    """A share holds what the force does (1PN: 261 km at the perigee); below a tenth of the error it is left out."""
+    found = find_encounters(apophis, DAY - 10 * u.d, DAY + 10 * u.d, within=0.05 * u.au)
+    share, left_out = found.meta["share_km"], found.meta["left_out_km"]
+    assert 261.0 < share["sun 1PN"] < 50 * 261.0
+    assert share["sun point mass"] > share["jupiter point mass"] > share["sun 1PN"]
+    assert set(share) <= set(found.meta["forces"])
+    assert not set(left_out) & set(found.meta["forces"])
+    assert max(left_out.values()) < 0.01
+
+
+def test_the_file_of_an_ephemeris_is_closed():
+    code = "from flybystab.sky.ephemeris import ephemeris; import gc; ephemeris('de421'); gc.collect()"
+    done = subprocess.run(
+        [sys.executable, "-W", "error::ResourceWarning", "-c", code], capture_output=True, text=True
+    )
+    assert (done.returncode, done.stderr) == (0, "")

@@ -11,6 +11,7 @@ from conftest import need_ephemeris
 import flybystab as fs
 from flybystab.errors import NoEncounter, OutOfSpan
 from flybystab.sky.elements import GM_SUN
+from flybystab.sky.forces import FORCES
 from flybystab.sky.kepler import two_body
 from flybystab.sky.orbit import heliocentric, seconds
 from flybystab.sky.predictability import Predictability, neighbour, predictability
@@ -87,6 +88,26 @@ def test_growth_after_a_deep_encounter(exact):
     first, second = table["displacement"][:2].to_value(u.km)
     years = (table["time"][1] - table["time"][0]).to_value(u.yr)
     assert second / (first * 1e3) / years == pytest.approx(5.0, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("day", "returns"), [("2028-09-12", False), ("2036-03-27", True), ("2051-04-20", True)]
+)
+def test_the_error_of_a_return_holds_another_ephemeris(exact, day, returns):
+    """Two ephemerides differ by metres at the Earth: past 2029 that is hundreds of kilometres."""
+    need_ephemeris("de440")
+    ours, other = (
+        fs.Encounter.from_orbit(
+            exact, "earth", Time(day, scale="tdb"), within=0.6 * u.au, ephemeris=name, forces=FORCES[:27]
+        )
+        for name in ("de440", "de421")
+    )
+    gap = abs(ours.distance - other.distance).to_value(u.km)
+    error = ours.distance_error.to_value(u.km)
+    assert (error > 100.0) == returns
+    if returns:
+        assert 0.5 * gap < error < 10.0 * gap
+    assert ours.time_error.to_value(u.s) > 0.0
 
 
 def test_centuries_end_in_a_statement(known):

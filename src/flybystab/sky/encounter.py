@@ -124,7 +124,8 @@ class Encounter:
     distance_error, time_error : Quantity or None
         For a real orbit: change of distance and time of closest approach when the integration is made 100
         times tighter plus the change when every known force is on; infinite if the encounter vanishes then.
-        The orbit's own uncertainty is not in it.
+        Behind an earlier encounter also 0.1 km, which ephemerides and masses leave, grown as a neighbour of the
+        orbit grew past it. The orbit's own uncertainty is not in it.
     ephemeris : str or None
         Where the planets of a real orbit are from; None for a scripted encounter.
     displacement : Quantity or None

@@ -216,6 +216,7 @@ def _series(path: Path) -> dict[tuple[int, int], tuple[Any, float, float]]:
         first, length, size, count = segment.daf.read_array(segment.end_i - 3, segment.end_i)
         table = segment.daf.map_array(segment.start_i, segment.end_i - 4).reshape(int(count), int(size))
         out[pair] = (table[:, 2:].reshape(int(count), 3, -1), float(first), float(length))
+    kernel_file.close()  # the map stays
     return out
 
 

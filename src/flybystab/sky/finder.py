@@ -102,8 +102,9 @@ def find_encounters(
         target plane, north +z of ICRF, :mod:`flybystab.sky.b_plane`; nan for a bound passage), ``impact``,
         ``index`` (of the asteroid), ``position`` and ``velocity`` (ICRF, relative to the planet). On
         an impact, distance and time are those of the two-body orbit without a surface, position and velocity
-        are from the step before, and the search ends for that asteroid. Metadata: ephemeris, forces, frame, time scale,
-        tolerance.
+        are from the step before, and the search ends for that asteroid. Metadata: ephemeris, forces and
+        the largest estimated share of each (``share_km``, point masses and 1PN), shares of the forces left out
+        (``left_out_km``), frame, time scale, tolerance.
 
     Raises
     ------
@@ -199,10 +200,11 @@ def find_encounters(
         for r in raw[~asked]
     ]
     raw = raw[asked]
-    kept, left_out = _forces_used(chosen, shares, least)
+    kept, share, left_out = _forces_used(chosen, shares, least)
     meta = {
         "ephemeris": window.name,
         "forces": list(kept),
+        "share_km": share,
         "left_out_km": left_out,
         "impacts_elsewhere": elsewhere,
         "frame": "ICRF",
@@ -242,11 +244,13 @@ def _states(rows: list[tuple[str, Orbit]], window: Window, epochs: Array) -> Arr
 
 def _forces_used(
     chosen: tuple[str, ...], shares: Array, least: float
-) -> tuple[tuple[str, ...], dict[str, float]]:
-    """Forces that at least one asteroid was given, and of each other one its largest share, km."""
+) -> tuple[tuple[str, ...], dict[str, float], dict[str, float]]:
+    """Forces that at least one asteroid was given, their largest shares where known, and those of the others, km."""
     largest = {name: float(v) for name, v in zip(NAMES, shares.max(axis=0, initial=0.0), strict=True) if name}
     out = {name for name, value in largest.items() if value < least and name in chosen and len(shares)}
-    return tuple(n for n in chosen if n not in out), {n: largest[n] / 1e3 for n in chosen if n in out}
+    kept = tuple(n for n in chosen if n not in out)
+    share, left_out = ({n: largest[n] / 1e3 for n in some if n in largest} for some in (kept, sorted(out)))
+    return kept, share, left_out
 
 
 def _table(

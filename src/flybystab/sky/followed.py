@@ -27,7 +27,7 @@ from flybystab.sky.forces import FORCES, model, shares
 from flybystab.sky.kepler import time_at_distance
 from flybystab.sky.orbit import Orbit, _ephemeris, later, seconds
 from flybystab.sky.planets import Planet
-from flybystab.sky.predictability import Neighbour, Predictability, neighbour, predictability
+from flybystab.sky.predictability import Neighbour, Predictability, common_error, neighbour, predictability
 from flybystab.sky.reboundry import LOG_WIDTH, Flight
 from flybystab.sky.surroundings import chosen_sources, tide_of
 
@@ -143,10 +143,12 @@ def followed(
     ]
     place = chosen.state[:3] + window.states(index, np.array([chosen.t]))[0, :3]
     there = beside.orbit.flight(window, forces).to(chosen.t)[:3]
+    displacement = float(np.linalg.norm(there - place))
+    common = common_error(orbit, beside, window, forces, chosen.t, displacement, ephemeris)
     growth = _Growth(
-        distance=gaps[0][0] + gaps[1][0],
-        time=gaps[0][1] + gaps[1][1],
-        displacement=float(np.linalg.norm(there - place)),
+        distance=gaps[0][0] + gaps[1][0] + common,
+        time=gaps[0][1] + gaps[1][1] + common / float(np.linalg.norm(chosen.state[3:])),
+        displacement=displacement,
         beside=beside,
     )
     return _around(cls, orbit, body, window, chosen, accuracy, start, wait, reach, size, growth)

@@ -19,11 +19,14 @@ from numpy.typing import NDArray
 from flybystab.constants import AU
 from flybystab.sky.covariance import Covariance
 from flybystab.sky.elements import GM_SUN
-from flybystab.sky.ephemeris import Ephemeris
+from flybystab.sky.ephemeris import Ephemeris, Window
 from flybystab.sky.kepler import two_body
 from flybystab.sky.orbit import Orbit, deviated, heliocentric, seconds
 
 Array = NDArray[np.float64]
+
+#: Error of the model before any encounter, m: the median against JPL's approaches of 2020 (``flybystab bench sky``).
+MODEL_ERROR = 100.0
 
 
 class Predictability(StrEnum):
@@ -92,6 +95,47 @@ def neighbour(orbit: Orbit, time: Time, ephemeris: str | Ephemeris | None = None
         "" if covariance.correlated else ", without correlations"
     )
     return Neighbour(beside, float(np.linalg.norm(states[0, :3])), label)
+
+
+def quiet_growth(orbit: Orbit, beside: Neighbour, times: Array, ephemeris: str | Ephemeris | None) -> Array:
+    """Growth of the displacement of a neighbour if no planet pulled, at least 1; `times` are s from its epoch."""
+    epoch = beside.orbit.epoch
+    if orbit.epoch != epoch:
+        orbit = deviated(orbit, epoch, np.zeros((1, 6)), np.zeros((1, 3)), "there", ephemeris)[0]
+    pair = (orbit, beside.orbit)
+    states, pushes = (
+        np.array([heliocentric(o, ephemeris) for o in pair]),
+        np.array([o.nongrav.a for o in pair]),
+    )
+    gaps = [np.linalg.norm(np.subtract(*_later(states, pushes, float(t)))) for t in times]
+    return np.maximum(np.array(gaps) / beside.shift, 1.0)
+
+
+def common_error(
+    orbit: Orbit,
+    beside: Neighbour,
+    window: Window,
+    forces: tuple[str, ...],
+    t: float,
+    displacement: float,
+    ephemeris: str | Ephemeris | None,
+) -> float:
+    """What all runs have in common (ephemeris, masses) at `t` (s), grown past earlier encounters, m.
+
+    The growth is that of the neighbour from where planets begin to part it from the orbit (by more than twice
+    what the Sun alone does) to `t`. Zero where they do not.
+    """
+    start = seconds(beside.orbit.epoch, window.epoch)
+    times = np.linspace(start, t, 65)[1:]
+    quiet = quiet_growth(orbit, beside, times - start, ephemeris)
+    if displacement < 2.0 * beside.shift * quiet[-1]:
+        return 0.0
+    flights = [o.flight(window, forces) for o in (orbit, beside.orbit)]
+    gaps = np.array(
+        [np.linalg.norm(np.subtract(*(f.to(float(time))[:3] for f in flights))) for time in times]
+    )
+    parted = int(np.argmax(gaps > 2.0 * beside.shift * quiet))
+    return MODEL_ERROR * displacement / beside.shift / float(quiet[parted])
 
 
 def _later(states: Array, pushes: Array, t: float) -> Array:

@@ -230,6 +230,7 @@ def lines(rows: list[dict[str, Any]]) -> list[str]:
 def _plot(rows: list[dict[str, Any]], path: str | Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     figure = Figure(figsize=(6.0, 4.2), layout="constrained")
     FigureCanvasAgg(figure)
@@ -249,5 +250,8 @@ def _plot(rows: list[dict[str, Any]], path: str | Path) -> None:
         ylabel="median distance error (km)",
         title="Search for passages",
     )
+    panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    panel.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
+    panel.xaxis.set_minor_formatter(NullFormatter())
     panel.legend(frameon=False)
     figure.savefig(path, dpi=150)
