@@ -22,6 +22,7 @@ from flybystab.core.tide import TidePanels, tide_at
 from flybystab.errors import InvalidInput, NotConverged
 from flybystab.rows import span_of
 from flybystab.sky.encounter import Encounter
+from flybystab.units import brief
 
 Array = NDArray[np.float64]
 
@@ -62,6 +63,9 @@ class Course:
 
     def __len__(self) -> int:
         return len(self.time)
+
+    def __repr__(self) -> str:
+        return f"<Course {len(self)} rows: mobilises {brief(self.max_required_friction_angle)} at most>"
 
 
 def rigid_course(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from flybystab.aggregate.body import Body
 from flybystab.outcome import Verdict
 from flybystab.sky.encounter import Encounter
+from flybystab.units import brief, counted
 
 Array = NDArray[np.float64]
 
@@ -55,6 +57,15 @@ class History:
     def __len__(self) -> int:
         return len(self.time)
 
+    def __repr__(self) -> str:
+        rows = len(self)
+        if not rows:
+            return "<History, no rows>"
+        return (
+            f"<History {rows} rows over {brief(self.time[-1] - self.time[0], u.h)}, "
+            f"{', '.join(dict.fromkeys(map(str, self.regime)))}>"
+        )
+
 
 @dataclass(frozen=True)
 class FlybyError:
@@ -80,6 +91,13 @@ class FlybyError:
     event_times: Quantity
     verdict_agrees: bool
     tide: float
+
+    def __repr__(self) -> str:
+        other = "" if self.verdict_agrees else ", the verdict differs"
+        return (
+            f"<FlybyError semi-axes {self.semi_axes:.1e}, spin {self.spin:.1e} (relative), friction angle "
+            f"{self.required_friction_angle.value:.1e} deg{other}>"
+        )
 
 
 @dataclass(frozen=True, eq=False)
@@ -158,6 +176,17 @@ class FlybyResult:
     left_out: tuple[tuple[str, float], ...] = field(repr=False)
     encounter: Encounter = field(repr=False)
 
+    def __repr__(self) -> str:
+        letter = f" ({self.verdict_class})" if self.verdict_class else ""
+        phi = self.max_required_friction_angle
+        need = f"mobilises {brief(phi)}" if np.isfinite(phi) else "no friction would keep it rigid"
+        robust = {None: "", True: ", robust", False: ", depends on the yield surface"}[self.robust]
+        return (
+            f"<FlybyResult {self.verdict}{letter}{robust}: {need} of {brief(self.body.material.friction_angle)}, "
+            f"bound {self.bound_fraction:.4g}, afterwards {brief(self.semi_axes, u.m)}, "
+            f"spin rate x {self.spin_ratio:.4g}>"
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class FlybyTable:
@@ -178,3 +207,6 @@ class FlybyTable:
 
     def __len__(self) -> int:
         return len(self.verdict)
+
+    def __repr__(self) -> str:
+        return f"<FlybyTable {len(self)} rows: {counted(self.verdict)}>"

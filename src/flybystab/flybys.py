@@ -35,7 +35,7 @@ def flyby(
     tolerance: float = TOLERANCE,
     error: bool = True,
     history: bool = True,
-    surfaces: Sequence[str] = (),
+    surfaces: str | Sequence[str] = (),
     max_axis_ratio: float = 6.0,
 ) -> FlybyResult:
     """Carry a body through an encounter.
@@ -54,7 +54,7 @@ def flyby(
         Measure the error with a second, looser run.
     history : bool
         Keep the history.
-    surfaces : sequence of str
+    surfaces : str or sequence of str
         Other yield surfaces to run; the verdict is robust if they all agree.
     max_axis_ratio : float
         Axis ratio beyond which the homogeneous model is left.
@@ -85,7 +85,7 @@ def flyby(
 
     main = carried(body, tolerance, 20_000 if history else 0)
     verdicts = {body.material.yield_surface: main.verdict}
-    for other in surfaces:
+    for other in (surfaces,) if isinstance(surfaces, str) else surfaces:
         if other not in YIELD_SURFACES:
             raise InvalidInput("surfaces", other, f"names out of {YIELD_SURFACES}")
         if other not in verdicts:

@@ -25,7 +25,7 @@ from flybystab.core.slide import driving_stress, slide
 from flybystab.core.tide import tensor
 from flybystab.course import Course, rigid_course
 from flybystab.sky.encounter import Encounter
-from flybystab.units import to_si
+from flybystab.units import brief, to_si
 
 Array = NDArray[np.float64]
 
@@ -84,6 +84,12 @@ class FlybyMargin:
     stands_after: bool
     required_friction_angle: Quantity
     course: Course
+
+    def __repr__(self) -> str:
+        return (
+            f"<FlybyMargin {self.expected}: margin {self.margin:.3g}, energy {brief(self.energy)} of "
+            f"{brief(self.barrier)}>"
+        )
 
 
 def flyby_margin(

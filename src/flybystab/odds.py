@@ -18,6 +18,7 @@ from flybystab.outcome import Verdict
 from flybystab.sky.distribution import EncounterDistribution
 from flybystab.sky.encounter import Encounter
 from flybystab.spin import SpinStates, spin_states
+from flybystab.units import counted
 
 #: Verdicts after which there still is one body, all of it.
 SURVIVES = (Verdict.INTACT, Verdict.RESHAPED)
@@ -65,6 +66,11 @@ class Survival:
         """Each verdict that occurs, most frequent first, with its probability and 95 % interval."""
         names, counts = np.unique(self.verdict, return_counts=True)
         return {str(names[k]): self.probability(str(names[k])) for k in np.argsort(-counts)}
+
+    def __repr__(self) -> str:
+        p, low, high = self.probability()
+        odds = f"survives with {p:.4g} ({low:.3g} to {high:.3g})"
+        return f"<Survival {len(self)} clones: {counted(self.verdict)}; {odds}>"
 
 
 def survival(

@@ -15,7 +15,7 @@ from flybystab.attitudes import periapsis_axes
 from flybystab.many import flyby_many
 from flybystab.rows import TOLERANCE
 from flybystab.sky.encounter import Encounter
-from flybystab.units import whole
+from flybystab.units import counted, whole
 
 Array = NDArray[np.float64]
 
@@ -61,6 +61,12 @@ class SpinSample:
 
     def __len__(self) -> int:
         return len(self.spin_ratio)
+
+    def __repr__(self) -> str:
+        low, high = np.nanmin(self.spin_ratio), np.nanmax(self.spin_ratio)
+        pole = "known pole" if self.pole_known else "isotropic poles"
+        rate = f"spin rate x {low:.3g} to {high:.3g}"
+        return f"<SpinSample {len(self)} attitudes, {pole}: {counted(self.verdict)}; {rate}>"
 
 
 def spin_sample(

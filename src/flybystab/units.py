@@ -89,6 +89,19 @@ def whole(value: Any, name: str, least: int) -> int:
     return int(value)
 
 
+def brief(value: Any, unit: u.UnitBase | None = None) -> str:
+    """A quantity in few characters, for the one line that an object says of itself: ``14030 km``, ``1 x 2 m``."""
+    quantity = value if unit is None else value.to(unit)
+    numbers = " x ".join(f"{x:.0f}" if 1e4 <= abs(x) < 1e7 else f"{x:.4g}" for x in np.ravel(quantity.value))
+    return f"{numbers} {quantity.unit.to_string()}".replace(" / ", "/").rstrip()
+
+
+def counted(names: Any) -> str:
+    """How often each name occurs, most frequent first: ``12 INTACT, 3 RESHAPED``."""
+    kinds, counts = np.unique(np.asarray(names), return_counts=True)
+    return ", ".join(f"{counts[k]} {kinds[k]}" for k in np.argsort(-counts, kind="stable"))
+
+
 def frozen(value: Quantity) -> Quantity:
     """A read-only copy in the same unit, for objects that must not change."""
     copy = Quantity(value, copy=True)

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from flybystab.constants import G
 from flybystab.errors import InvalidInput, UnitMismatch, UnknownName
-from flybystab.units import frozen, to_si
+from flybystab.units import brief, frozen, to_si
 
 #: Yield surfaces, in the order of their integer codes in :mod:`flybystab.core.rheology`.
 YIELD_SURFACES = ("drucker-prager", "drucker-prager-extension", "mohr-coulomb", "matsuoka-nakai")
@@ -76,6 +76,13 @@ class Material:
     def with_(self, **changes: Any) -> Material:
         """A copy with some parameters changed."""
         return replace(self, **changes)
+
+    def __repr__(self) -> str:
+        more = [f"dilatancy {self.dilatancy:g}"] if self.dilatancy else []
+        more += ["brittle"] if self.brittle else []
+        more += [] if self.bulk_modulus is None else [f"bulk modulus {brief(self.bulk_modulus)}"]
+        said = [self.yield_surface, brief(self.friction_angle), brief(self.cohesion), *more]
+        return f"<Material {', '.join(said)}>"
 
 
 @dataclass(frozen=True, eq=False)
@@ -180,3 +187,11 @@ class Body:
         elif "spin_period" in changes and "spin" not in changes:
             changes["spin"] = None
         return replace(self, **changes)
+
+    def __repr__(self) -> str:
+        spin = "no spin"
+        if self.spin_period is not None:
+            spin = f"turns in {brief(self.spin_period)}"
+        elif self.spin is not None and np.any(self.omega != 0.0):
+            spin = f"spin {brief(self.spin)}"
+        return f"<Body {brief(self.semi_axes)}, {brief(self.density)}, {spin}, {repr(self.material)[10:-1]}>"

@@ -15,7 +15,7 @@ from flybystab.constants import G
 from flybystab.core.jit import kernel
 from flybystab.core.statics import demand, overload, rigid_stress, spin_interval
 from flybystab.errors import InvalidInput
-from flybystab.units import to_si
+from flybystab.units import brief, to_si
 
 Array = NDArray[np.float64]
 
@@ -55,6 +55,14 @@ class Requirements:
     def probability_of_tension(self) -> float:
         """Share of the samples that are in mean tension, which no friction can bear."""
         return float(np.mean(self.in_tension.value > 0.0))
+
+    def __repr__(self) -> str:
+        tension = self.probability_of_tension()
+        phi, cohesion = self.quantiles("friction_angle")[1], self.quantiles("cohesion")[1]
+        return (
+            f"<Requirements {len(self.cohesion)} samples: friction {brief(phi)}, cohesion {brief(cohesion)} "
+            f"(medians), in tension with probability {tension:.2g}>"
+        )
 
 
 def density_intervals(body: Body, tide: Quantity | None = None) -> Quantity:

@@ -24,7 +24,7 @@ from flybystab.core.rheology import lode_angle
 from flybystab.core.statics import demand, invariants, load_interval, overload, rigid_stress
 from flybystab.core.tide import components, tensor
 from flybystab.errors import InvalidInput
-from flybystab.units import to_si
+from flybystab.units import brief, to_si
 
 Array = NDArray[np.float64]
 
@@ -65,6 +65,15 @@ class Equilibrium:
     admissible: bool
     margin: Quantity
     in_tension: bool
+
+    def __repr__(self) -> str:
+        phi = self.required_friction_angle
+        need = f"needs {brief(phi)}" if np.isfinite(phi) else "no friction suffices"
+        state = "tension" if self.in_tension else "compression"
+        return (
+            f"<Equilibrium {'' if self.admissible else 'not '}admissible: {need}, required cohesion "
+            f"{brief(self.required_cohesion)}, mean {state} {brief(abs(self.mean_pressure))}>"
+        )
 
 
 def point_tide(mass_parameter: Quantity, distance: Quantity, direction: Any = (1.0, 0.0, 0.0)) -> Quantity:

@@ -162,6 +162,13 @@ class Stability:
         """The level in words."""
         return LEVELS[self.level]
 
+    def __repr__(self) -> str:
+        energies = [f"{float(e / self.binding_energy):.3g}" for e in self.critical_energy]
+        return (
+            f"<Stability {self.verdict}; critical energy over binding energy {', '.join(energies)} "
+            "(second order, third order, barrier)>"
+        )
+
 
 def stability(body: Body, *, dilatancy: float | None = 1.0) -> Stability:
     """Three levels of stability of a body, with the energy and strain of the weakest push.

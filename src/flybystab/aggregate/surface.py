@@ -19,7 +19,7 @@ from flybystab.aggregate.equilibrium import tide_components
 from flybystab.constants import G
 from flybystab.core.surface import effective_field, slopes, slopes_through
 from flybystab.errors import InvalidInput
-from flybystab.units import to_si
+from flybystab.units import brief, to_si
 
 Array = NDArray[np.float64]
 
@@ -67,6 +67,9 @@ class SlopeChange:
     before: Quantity
     least: Quantity
     greatest: Quantity
+
+    def __repr__(self) -> str:
+        return f"<SlopeChange {len(self.before)} points: {brief(self.largest_change)} at most>"
 
     @property
     def largest_change(self) -> Quantity:

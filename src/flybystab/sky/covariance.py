@@ -222,3 +222,8 @@ class Covariance:
     def deviations(self, parameters: Array) -> tuple[Array, Array]:
         """States and A1, A2, A3 less those of the mean, shapes (m, 6) and (m, 3)."""
         return self.states(parameters) - self.states(self.values[None, :]), self.pushes(parameters)
+
+    def __repr__(self) -> str:
+        kind = "" if self.correlated else ", without correlations"
+        when = f"{self.epoch.tdb.iso[:10]} TDB"
+        return f"<Covariance of {', '.join(self.names)} at {when}, {self.source or 'no source'}{kind}>"

@@ -26,7 +26,7 @@ from flybystab.sky.finder import find_encounters
 from flybystab.sky.linear_plane import LinearPlane, ellipse, linear_plane
 from flybystab.sky.orbit import Orbit, later
 from flybystab.sky.planets import Planet, planet
-from flybystab.units import to_si
+from flybystab.units import brief, to_si
 
 Array = NDArray[np.float64]
 
@@ -114,6 +114,15 @@ class EncounterDistribution:
         points = self.b.to_value(u.km)
         points = points[np.isfinite(points).all(axis=1)]
         return (np.cov(points.T) if len(points) > 1 else np.full((2, 2), np.nan)) * u.km**2
+
+    def __repr__(self) -> str:
+        near = int(self.found.sum())
+        sigma = f", {brief(np.median(self.distance[self.found]), u.km)}" if near else ""
+        sigma += f" +- {brief(self.distance_sigma, u.km)}" if near > 1 else ""
+        return (
+            f"<EncounterDistribution {self.planet.name}, {self.time.tdb.iso[:10]}: {len(self)} clones{sigma}, "
+            f"impact probability {self.impact_probability:.3g}>"
+        )
 
 
 def encounter_distribution(

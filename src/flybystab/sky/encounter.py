@@ -23,7 +23,7 @@ from flybystab.sky.kepler import states_at_times, time_at_distance
 from flybystab.sky.orbit import Orbit
 from flybystab.sky.planets import PLANETS, Planet, planet
 from flybystab.sky.predictability import Predictability
-from flybystab.units import to_si
+from flybystab.units import brief, to_si
 
 Array = NDArray[np.float64]
 
@@ -360,6 +360,15 @@ class Encounter:
         from flybystab.sky.followed import followed
 
         return followed(cls, path, body, time.tdb, accuracy, start, wait, reach, largest, ephemeris, forces)
+
+    def __repr__(self) -> str:
+        when = "scripted" if self.time is None else f"{self.time.tdb.iso[:16]} TDB"
+        hit = f", reaches the {self.impact_level}" if self.impact_level else ""
+        radii = self.distance.to_value(u.m) / self.planet.radius
+        return (
+            f"<Encounter {self.planet.name}, {when}: {brief(self.distance, u.km)} ({radii:.4g} radii), "
+            f"v_inf {brief(self.v_inf, u.km / u.s)}{hit}>"
+        )
 
 
 def _planet(name: str | Planet) -> Planet:

@@ -19,7 +19,7 @@ from flybystab.sky.elements import GM_SUN, ecliptic_to_icrf, state_from_elements
 from flybystab.sky.ephemeris import BODIES, Ephemeris, Window, ephemeris
 from flybystab.sky.forces import FORCES, NonGravitational, model
 from flybystab.sky.reboundry import Flight
-from flybystab.units import to_si
+from flybystab.units import brief, to_si
 
 Array = NDArray[np.float64]
 
@@ -254,6 +254,14 @@ class Orbit:
         if not isinstance(self.covariance, Covariance):
             raise InvalidInput("covariance", self.covariance, f"a Covariance: {what} are drawn from it")
         return self.covariance
+
+    def __repr__(self) -> str:
+        known = "" if self.covariance is None else ", with covariance"
+        named = f"{self.name}, " if self.name else ""
+        return (
+            f"<Orbit {named}{brief(np.linalg.norm(self.position), u.au)} from {self.centre} on "
+            f"{self.epoch.tdb.iso[:10]} TDB{known}>"
+        )
 
 
 def deviated(

@@ -73,6 +73,9 @@ class Planet:
             return "surface"
         return "atmosphere" if distance < self.impact_distance else None
 
+    def __repr__(self) -> str:
+        return f"<Planet {self.name}, radius {self.radius / 1e3:.0f} km>"
+
 
 def _direction(ra: float, dec: float) -> tuple[float, float, float]:
     """Unit vector of right ascension and declination in degrees."""
