@@ -13,14 +13,16 @@ import argparse
 import csv
 import gzip
 import io
+import os
 import resource
 import sys
 import tempfile
 import time
+from collections import Counter
 from collections.abc import Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Executor, Future, ProcessPoolExecutor
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import astropy.units as u
 from astropy.time import Time
@@ -73,24 +75,56 @@ CASES = (
 FINDERS = dict(zip(DISTANCES, (far, ten, four, two), strict=True))
 
 
-def measured(run: Screening, executor: Executor | None) -> tuple[float, int, int]:
-    """Seconds, samples, samples by dynamics."""
-    began = time.perf_counter()
+class Measured(NamedTuple):
+    """What a run took: wall time, processor time of its busiest process, s; samples, and those by dynamics."""
+
+    wall: float
+    processor: float
+    samples: int
+    dynamic: int
+
+
+class Metered(Executor):
+    """An executor that adds up the processor time of each of its processes."""
+
+    def __init__(self, pool: Executor, workers: int) -> None:
+        self.pool, self._max_workers = pool, workers
+        self.spent: Counter[int] = Counter()
+
+    def submit(self, work: Any, /, *given: Any, **more: Any) -> Future[Any]:
+        """Submit a call."""
+        outer: Future[Any] = Future()
+
+        def done(inner: Future[Any]) -> None:
+            process, seconds, answer = inner.result()
+            self.spent[process] += seconds
+            outer.set_result(answer)
+
+        self.pool.submit(metered, work, *given, **more).add_done_callback(done)
+        return outer
+
+
+def metered(work: Any, *given: Any, **more: Any) -> tuple[int, float, Any]:
+    """Process, processor time and answer of a call."""
+    began = time.process_time()
+    answer = work(*given, **more)
+    return os.getpid(), time.process_time() - began, answer
+
+
+def measured(run: Screening, pool: Executor | None, workers: int = 2) -> Measured:
+    """A run here, or on the processes of a pool."""
+    executor = None if pool is None else Metered(pool, workers)
+    began, processor = time.perf_counter(), time.process_time()
     rows = [r for _, result in run.results(executor) for r in result["rows"]]
-    spent = time.perf_counter() - began
-    return spent, sum(r["samples"] for r in rows), sum(r["samples_dynamic"] for r in rows)
+    wall, processor = time.perf_counter() - began, time.process_time() - processor
+    busiest = max([processor, *(executor.spent.values() if executor else ())])
+    return Measured(wall, busiest, sum(r["samples"] for r in rows), sum(r["samples_dynamic"] for r in rows))
 
 
 def throughput() -> None:
     bodies = [a for a in catalogue() if a.name != "Bennu"]
-    head = [
-        ("asteroids", 9),
-        ("workers", 7),
-        ("samples", 8),
-        ("by dynamics", 11),
-        ("samples/s", 10),
-        ("ratio", 5),
-    ]
+    head = [("asteroids", 9), ("workers", 7), ("samples", 8), ("by dynamics", 11), ("samples/s", 10)]
+    head += [("ratio", 6), ("of processor time", 18)]
     print(f"{'distance':>9} " + " ".join(f"{name:>{width}}" for name, width in head))
     rates: dict[tuple[str, int, int], float] = {}
     with ProcessPoolExecutor(2) as pool:
@@ -98,17 +132,18 @@ def throughput() -> None:
         measured(Screening(bodies[:20], settings(*SPAN, samples=40), two), pool)
         measured(Screening(bodies[:4], settings(*SPAN, samples=20), two), None)
         for name, n, samples in CASES:
-            for workers in (1, 2):
-                chosen = bodies[:n] if n > 1 else [Asteroid.from_catalogue("Anteros")]
-                run = Screening(chosen, settings(*SPAN, samples=samples), FINDERS[name])
-                spent, judged, dynamic = measured(run, pool if workers == 2 else None)
-                rate = rates[name, n, workers] = judged / spent
+            chosen = bodies[:n] if n > 1 else [Asteroid.from_catalogue("Anteros")]
+            run = Screening(chosen, settings(*SPAN, samples=samples), FINDERS[name])
+            one = measured(run, None)
+            for workers, m in ((1, one), (2, measured(run, pool))):
+                rate = rates[name, n, workers] = m.samples / m.wall
                 print(
-                    f"{name:>9} {n:9d} {workers:7d} {judged:8d} {100 * dynamic / judged:10.1f}% {rate:10.0f} "
-                    f"{rate / rates[name, n, 1]:5.2f}"
+                    f"{name:>9} {n:9d} {workers:7d} {m.samples:8d} {100 * m.dynamic / m.samples:10.1f}% "
+                    f"{rate:10.0f} {one.wall / m.wall:6.2f} {one.processor / m.processor:18.2f}"
                 )
+        print("ratio: over one worker; of processor time: one worker's over that of the busier one of two")
         nothing = Screening(bodies, settings(*SPAN), nowhere)
-        spent, _, _ = measured(nothing, pool)
+        spent = measured(nothing, pool).wall
         print(f"overhead of one task: {1e3 * spent / len(bodies):.2f} ms")
     run = Screening(catalogue(), settings(*SPAN))
     began = time.perf_counter()
