@@ -5,13 +5,16 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 from numba import njit
 from numba.core import event
 
 from flybystab.face import compiling
 from flybystab.face.cli import COMMANDS, main
+from flybystab.survey import quick
 from flybystab.survey.population import Population
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -404,3 +407,19 @@ def test_numba_tells_what_it_compiles():
         )
     finally:
         event.unregister("numba:compile", listener)
+
+
+def test_compiling_in_workers_is_said_beforehand(monkeypatch, tmp_path):
+    """Where the cache has no kernel of a screening; once one has run, it has it, under the name looked for."""
+    size = np.array([[300.0, 200.0, 150.0]])
+    out, verdict = np.zeros((1, 2)), np.zeros(1, dtype=np.int64)
+    one, spin = np.ones(1), np.array([[0.0, 0.0, 1e-4]])
+    quick.quick_margins(size, 2000 * one, spin, 0.6 * one, 0 * one, 0, 1e-9, 1e-6, out, verdict)
+    assert verdict[0] == quick.INTACT
+    stream = io.StringIO()
+    compiling.announce_elsewhere(stream)
+    assert stream.getvalue() == ""
+    empty = SimpleNamespace(stats=SimpleNamespace(cache_path=str(tmp_path)))
+    monkeypatch.setattr(quick, "quick_margins", empty)
+    compiling.announce_elsewhere(stream)
+    assert stream.getvalue() == compiling.WORDS

@@ -44,9 +44,11 @@ def main(argv: Sequence[str] | None = None) -> int:
     try:
         check_arguments(options)
         if sys.stderr.isatty() and not options.json and options.command not in ("cite", "completion"):
-            from flybystab.face.compiling import announce
+            from flybystab.face.compiling import announce, announce_elsewhere
 
             announce(sys.stderr)
+            if getattr(options, "jobs", 1) > 1:
+                announce_elsewhere(sys.stderr)
         COMMANDS[options.command].run(options)
         sys.stdout.flush()
     except WrongUsage as reason:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import TextIO
 
 from numba.core import event
@@ -32,3 +33,13 @@ def announce(stream: TextIO) -> Announcement:
     listener = Announcement(stream)
     event.register("numba:compile", listener)
     return listener
+
+
+def announce_elsewhere(stream: TextIO) -> None:
+    """Say at once that kernels will be compiled, in other processes, if the cache has none of a screening's."""
+    from flybystab.survey.quick import quick_margins
+
+    folder = quick_margins.stats.cache_path
+    if folder is not None and not any(Path(folder).glob("quick.quick_margins-*.nbi")):
+        stream.write(WORDS)
+        stream.flush()
