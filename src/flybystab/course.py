@@ -86,7 +86,7 @@ def rigid_course(
     if not isinstance(encounter, Encounter):
         raise InvalidInput("encounter", encounter, "a flybystab.Encounter")
     rotation = periapsis_axes(encounter).T @ attitude_matrix(attitude)
-    start, stop, limit, _ = span_of(encounter)
+    start, stop, limit, _ = span_of(body, encounter)
     material = body.material
     run = passage(
         body.axes,

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple
 import astropy.units as u
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import brentq
 
 from flybystab.aggregate.body import Body
 from flybystab.core import judgement
@@ -111,9 +112,12 @@ def one_row(body: Body, encounter: Encounter, rotation: Array | None = None) -> 
 
 def columns(bodies: Sequence[Body], rotations: Array, encounters: Sequence[Encounter]) -> tuple[Any, ...]:
     """Bodies and encounters as the arrays of `judge_rows`; the same encounter is stored once."""
-    met = list({id(e): e for e in encounters}.values())
-    place = {id(e): k for k, e in enumerate(met)}
-    tides = [e.tide for e in met]
+    # who touches the planet where the centre does not ends a run of its own
+    room = {key: clearance(e) for key, e in {id(e): e for e in encounters}.items()}
+    keys = [(id(e), id(b) if b.axes[0] > room[id(e)] else 0) for b, e in zip(bodies, encounters, strict=True)]
+    met = {key: (b, e) for key, b, e in zip(keys, bodies, encounters, strict=True)}
+    place = {key: k for k, key in enumerate(met)}
+    tides = [e.tide for _, e in met.values()]
     first = np.concatenate([[0], np.cumsum([len(t.coefficients) for t in tides])]).astype(np.int64)
     degree = max(t.coefficients.shape[1] for t in tides)
     coefficients = np.zeros((first[-1], degree, 6))  # a series of lower degree ends in zeros
@@ -125,8 +129,8 @@ def columns(bodies: Sequence[Body], rotations: Array, encounters: Sequence[Encou
         np.array([b.omega for b in bodies]),
         np.ascontiguousarray(rotations),
         np.array([_material(b) for b in bodies]),
-        np.array([place[id(e)] for e in encounters], dtype=np.int64),
-        np.array([span_of(e) for e in met]),
+        np.array([place[key] for key in keys], dtype=np.int64),
+        np.array([span_of(b, e) for b, e in met.values()]),
         np.array([[t.tau, t.start, t.width] for t in tides]),
         first,
         coefficients,
@@ -138,12 +142,40 @@ def _material(body: Body) -> Array:
     return np.array([m.phi, m.c_pa, m.dilatancy, m.surface_code, m.brittle], dtype=float)
 
 
-def span_of(encounter: Encounter) -> Array:
+def clearance(encounter: Encounter) -> float:
+    """Height of the centre above atmosphere or surface at closest approach, m; infinite on an impact of the centre."""
+    if encounter.impact:
+        return np.inf
+    return float(encounter.distance.to_value(u.m)) - encounter.planet.impact_distance
+
+
+def contact_time(body: Body, encounter: Encounter) -> float | None:
+    """When atmosphere or surface is reached, s from closest approach; None if it is not.
+
+    A body whose centre passes above them touches them once they are within its long semi-axis. Which way the body
+    points then is left out: a height below the long semi-axis counts as contact.
+    """
+    if encounter.impact:
+        return encounter.impact_time
+    if body.axes[0] <= clearance(encounter):
+        return None
+    reach = encounter.planet.impact_distance + body.axes[0]
+
+    def above(t: float) -> float:
+        return float(encounter.radius(t)[0]) - reach
+
+    if above(encounter.t_start) <= 0.0:
+        return encounter.t_start
+    return float(brentq(above, encounter.t_start, 0.0, xtol=1e-6))
+
+
+def span_of(body: Body, encounter: Encounter) -> Array:
     """Start, rest and stop (s, clock of the tide), and whether the planet is hit: a row of spans of `judge_rows`."""
     stop, limit = encounter.t_stop, encounter.t_stop + TAIL
-    if encounter.impact and encounter.impact_time is not None:
-        stop = limit = max(encounter.impact_time, encounter.t_start)
-    return np.array([encounter.t_start, stop, limit, encounter.impact], dtype=float)
+    contact = contact_time(body, encounter)
+    if contact is not None:
+        stop = limit = max(contact, encounter.t_start)
+    return np.array([encounter.t_start, stop, limit, encounter.impact or contact is not None], dtype=float)
 
 
 def failure_of(out: Array, encounter: Encounter, tolerance: float) -> str:

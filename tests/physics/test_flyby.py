@@ -13,6 +13,8 @@ from flybystab.errors import InvalidInput, UnitMismatch, UnknownName
 from flybystab.flybys import flyby
 from flybystab.many import flyby_many
 from flybystab.outcome import bound_fraction, classed
+from flybystab.sky.encounter import Encounter
+from flybystab.sky.planets import PLANETS
 from flybystab.spin import spin_sample
 
 
@@ -41,6 +43,26 @@ def test_impact_is_a_verdict():
     assert flyby(PILE, earth(0.9)).verdict == "IMPACT"
     assert flyby(PILE, earth(1.005)).verdict == "IMPACT"  # 32 km above the ground
     assert flyby(PILE, earth(1.02)).verdict != "IMPACT"
+
+
+def test_a_body_that_touches_the_planet_hits_it():
+    """A sphere of 1 km above the airless Moon, where contact is exact; its centre passes clear of it."""
+    strong = Material(cohesion=1 * u.MPa)
+    ball = Body([1, 1, 1] * u.km, 2000 * u.kg / u.m**3, material=strong)
+    radius = PLANETS["moon"].radius / 1e3 * u.km
+    clear = Encounter.hyperbolic("moon", radius + 1.001 * u.km, 5 * u.km / u.s)
+    close = Encounter.hyperbolic("moon", radius + 0.999 * u.km, 5 * u.km / u.s)
+    assert not close.impact
+    assert flyby(ball, clear).verdict == "INTACT"
+    hit = flyby(ball, close)
+    assert hit.verdict == "IMPACT"
+    # it ends where the surfaces meet, before closest approach
+    assert hit.history.distance[-1].to_value(u.km) == pytest.approx(radius.value + 1.0, abs=1e-6)
+    assert -60 * u.s < hit.history.time_from_periapsis[-1] < 0 * u.s
+    # each body by its own size in one table
+    pebble = ball.with_(semi_axes=[10, 10, 10] * u.m)
+    table = flyby_many([pebble, ball, pebble], [close, close, clear])
+    assert table.verdict.tolist() == ["INTACT", "IMPACT", "INTACT"]
 
 
 def test_not_in_equilibrium_says_what_would_help():
