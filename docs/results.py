@@ -300,7 +300,8 @@ Of the embedded catalogue since 1950 ({counts(past)[:-1].lower()}), these added 
 tens of metres whose shape, spin and density are drawn: {wall("deep")}. {counts(deep)}
 Bodies of that size turn in minutes and need cohesion to exist; the samples that have it, up to 100 Pa, feel nothing.
 
-What the tide could do at most is seen on slow piles without strength, `{WEAK}`:
+What the tide could do at most is seen on slow piles without strength, no cohesion and a period drawn evenly
+from {WEAK["spin_period_h"]["low"]} to {WEAK["spin_period_h"]["high"]} h:
 {counts(weak)} Passages in which any sample yields ({len(hit)}), worst first:
 
 {passages(weak, hit[:20])}

@@ -46,7 +46,7 @@ def test_passages_only_tighten_and_agree_with_the_flyby():
     one = flyby(body, enc, error=False, history=False).max_required_friction_angle.value
     assert rest[0] - 1e-6 <= one
     (what,) = table.meta["passages"]
-    assert what["passage"] == "earth scripted 19134 km"
+    assert what["passage"] == "Earth scripted, 19,134 km"
     assert what["followed"]
     assert what["adds_at_worst_attitude_deg"] == pytest.approx((most - rest)[np.isfinite(most)].max())
 

@@ -96,8 +96,8 @@ def failure_figure(surface: str = "drucker-prager") -> Figure:
     fluid = roche_limit()
     mean = GM_EARTH / (4.0 / 3.0 * np.pi * G * R_EARTH**3)
     far = (4.0 * mean / (3.0 * fluid.load * density.value)) ** (1 / 3)
-    bound.axhline(far, color=BLACK, ls=":", label="fluid: Roche limit")
+    bound.axhline(far, color=BLACK, ls=(0, (1, 3)), lw=2, label="fluid: Roche limit")
     bound.legend(frameon=False, fontsize=8)
     free.set_title("own spin, long axis to the planet, 2000 kg/m$^3$", fontsize=9)
-    bound.set_title("synchronous satellite", fontsize=9)
+    bound.set_title("synchronous satellite, 2000 kg/m$^3$", fontsize=9)
     return figure

@@ -193,8 +193,8 @@ def failure_distance_plot(
         d = failure_distance(body, mass_parameter, angles, synchronous=synchronous)
         color = (BLACK, BLUE, RED, GREEN, ORANGE, SKY)[i % 6]
         ratio = (d / radius).to_value(u.dimensionless_unscaled)
-        axes.plot(angles.value, ratio, color=color, ls=STYLES[i // 6 % 4], label=name)
-    axes.axhline(1.0, color="0.5", lw=0.8)
+        axes.plot(angles.value, ratio, color=color, ls=STYLES[i % 4], label=name)
+    axes.axhline(1.0, color="0.5", lw=0.8)  # the surface
     axes.set_xlabel("friction angle (deg)")
     axes.set_ylabel("failure distance (planetary radii)")
     axes.legend(frameon=False, fontsize=8)

@@ -41,7 +41,7 @@ def inference_figure(table: QTable, path: str | Path) -> Path:
     """Plot the region of density, cohesion and friction that :func:`flybystab.infer` leaves.
 
     Each panel is a map of the least friction angle over density and cohesion; hatched, no friction is enough.
-    The band is the density of the catalogue with its 1-sigma, the line the usual 35 deg.
+    The white line and band are the density of the catalogue and its 1-sigma.
 
     Returns
     -------

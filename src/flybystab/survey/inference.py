@@ -257,5 +257,5 @@ def _need(
 
 
 def _label(encounter: Encounter) -> str:
-    when = "scripted" if encounter.time is None else encounter.time.tdb.isot[:16]
-    return f"{encounter.planet.name} {when} {encounter.distance.to_value(u.km):.0f} km"
+    when = "scripted" if encounter.time is None else encounter.time.tdb.iso[:16]
+    return f"{encounter.planet.name.capitalize()} {when}, {encounter.distance.to_value(u.km):,.0f} km"
