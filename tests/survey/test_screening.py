@@ -23,6 +23,7 @@ from flybystab.survey.draws import Attitudes, draws
 from flybystab.survey.judging import contributors, judge, wilson
 from flybystab.survey.passages import Passage
 from flybystab.survey.population import Population
+from flybystab.survey.progress import ProgressBar
 from flybystab.survey.quick import tide_size
 from flybystab.survey.results import read_results
 from flybystab.survey.screening import Screening, screen
@@ -129,6 +130,24 @@ def test_a_deep_passage_is_work_for_every_worker():
     assert sum(sizes) >= 192  # all but the first samples of the deep passage at least
     assert max(sizes) <= 80
     assert len(sizes) >= 15
+
+
+def test_progress_shows_the_asteroid_in_work(tmp_path):
+    """One asteroid alone: the bar moves, and the time left is known, before its row is there."""
+    run = Screening([Asteroid.from_catalogue("Anteros")], settings(*SPAN, samples=200, seed=1), three)
+    states = []
+    with ThreadPoolExecutor(2) as pool:
+        run.run(tmp_path / "x.ecsv", executor=pool, progress=states.append)
+    assert [s.done for s in states] == [0] * (len(states) - 1) + [1]
+    shares = [s.begun for s in states[1:-1]]
+    assert len(shares) > 5
+    assert shares == sorted(shares)
+    assert 0.0 < shares[0] < 0.3
+    assert 0.7 < shares[-1] < 1.0
+    assert all(0.0 < s.remaining < np.inf for s in states[1:-1])
+    assert states[-1].begun == states[-1].remaining == 0.0
+    half = next(s for s in states if s.begun > 0.5)
+    assert ProgressBar().line(half, 100).startswith("[##########")
 
 
 def test_quick_verdicts_are_those_of_the_dynamics():

@@ -32,6 +32,8 @@ class Progress:
         Encounters by verdict; "error" counts rows that failed.
     seconds : float
         Since this run began.
+    begun : float
+        What is done of the asteroids in work, by samples, as a number of asteroids.
     """
 
     done: int
@@ -40,16 +42,17 @@ class Progress:
     rows: int
     verdicts: dict[str, int]
     seconds: float
+    begun: float = 0.0
 
     @property
     def rate(self) -> float:
         """Asteroids per second in this run."""
-        return (self.done - self.resumed) / self.seconds if self.seconds > 0.0 else 0.0
+        return (self.done + self.begun - self.resumed) / self.seconds if self.seconds > 0.0 else 0.0
 
     @property
     def remaining(self) -> float:
         """Seconds left at this rate."""
-        return (self.total - self.done) / self.rate if self.rate > 0.0 else np.inf
+        return (self.total - self.done - self.begun) / self.rate if self.rate > 0.0 else np.inf
 
 
 class ProgressBar:
@@ -88,7 +91,7 @@ class ProgressBar:
 
     def line(self, state: Progress, width: int = 0) -> str:
         """One line of text, cut to `width` if it is positive."""
-        share = state.done / state.total if state.total else 1.0
+        share = (state.done + state.begun) / state.total if state.total else 1.0
         verdicts = ", ".join(f"{n} {v}" for v, n in sorted(state.verdicts.items(), key=lambda x: -x[1]))
         text = f"{state.done}/{state.total} asteroids, {state.rate:.3g}/s"
         if 0.0 < state.remaining < np.inf:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from dataclasses import dataclass
 from itertools import islice
@@ -30,11 +30,13 @@ def _judge(part: Part, settings: Settings) -> Judged:
 
 @dataclass(eq=False)
 class _Asteroid:
-    """An asteroid in work: its passages, and how many of them are not done."""
+    """An asteroid in work: its passages, how many of them are not done, and the samples that those began with."""
 
     position: int
     work: list[Rows | Begun]
     open: int
+    samples: int
+    done: int = 0
 
 
 class _Piece(NamedTuple):
@@ -55,6 +57,7 @@ def scheduled(
     chunk: int,
     window: int,
     block: int,
+    report: Callable[[float], None] | None = None,
 ) -> Iterator[tuple[int, Rows]]:
     """Rows of the asteroids at the positions `todo`, as they are done: (position, rows).
 
@@ -68,6 +71,8 @@ def scheduled(
         Calls in flight at a time: memory does not grow with the length of the list.
     block : int
         Samples by the dynamics in one part (:func:`flybystab.survey.tasks.begun`).
+    report : callable, optional
+        Called after every part with what is done of the asteroids in work, as a number of asteroids.
 
     Raises
     ------
@@ -77,6 +82,7 @@ def scheduled(
     positions = iter(todo)
     waiting: deque[Iterator[tuple[_Piece, Part]]] = deque()
     calls: dict[Future[Any], list[int] | _Piece] = {}
+    begun: dict[int, float] = {}
 
     def send() -> bool:
         """Send one call; False if there is nothing to send."""
@@ -107,14 +113,21 @@ def scheduled(
                     raise WorkersLost(f"workers died or went away ({error}); in work: {names}") from None
                 if isinstance(call, _Piece):
                     call.passage.take(call.first, answer)
-                    call.asteroid.open -= not call.passage.left
-                    if not call.asteroid.open:
-                        yield call.asteroid.position, joined(call.asteroid.work, settings)
+                    asteroid = call.asteroid
+                    asteroid.open -= not call.passage.left
+                    asteroid.done += len(answer.verdict)
+                    begun[asteroid.position] = asteroid.done / asteroid.samples
+                    if not asteroid.open:
+                        del begun[asteroid.position]
+                        yield asteroid.position, joined(asteroid.work, settings)
+                    elif report is not None:
+                        report(sum(begun.values()))
                     continue
                 for i, work in zip(call, answer, strict=True):
                     left = [w for w in work if isinstance(w, Begun)]
                     if left:
-                        waiting.append(_pieces(_Asteroid(i, work, len(left)), left))
+                        samples = sum(w.left for w in left)
+                        waiting.append(_pieces(_Asteroid(i, work, len(left), samples), left))
                     else:
                         yield i, joined(work, settings)
     finally:

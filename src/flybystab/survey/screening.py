@@ -100,6 +100,7 @@ class Screening:
         chunk: int = 1,
         window: int | None = None,
         block: int | None = None,
+        report: Callable[[float], None] | None = None,
     ) -> Iterator[tuple[int, Rows]]:
         """Results of the asteroids that are not in `skip`, as they are done: (position, result).
 
@@ -113,6 +114,8 @@ class Screening:
             Calls in flight at a time; four a worker by default.
         block : int, optional
             Samples by the dynamics in one call of a worker. The rows do not depend on it.
+        report : callable, optional
+            Called with what is done of the asteroids in work, as a number of asteroids.
         """
         todo = (i for i in range(len(self.asteroids)) if i not in skip)
         if executor is None:
@@ -128,6 +131,7 @@ class Screening:
             chunk=chunk,
             window=window or window_of(executor),
             block=block or block_of(self.settings.samples),
+            report=report,
         )
 
     def run(
@@ -187,13 +191,13 @@ class Screening:
         def count(rows: Iterable[Row]) -> None:
             counts.update(r.get("verdict") or "error" for r in rows)
 
-        def state() -> Progress:
+        def state(begun: float = 0.0) -> Progress:
             total, seconds = len(self.asteroids), clock.monotonic() - began
-            return Progress(journal.count, total, resumed, counts.total(), dict(counts), seconds)
+            return Progress(journal.count, total, resumed, counts.total(), dict(counts), seconds, begun)
 
-        def tell() -> None:
+        def tell(begun: float = 0.0) -> None:
             if progress is not None:
-                progress(state())
+                progress(state(begun))
 
         for task in journal.tasks():
             count(task["rows"])
@@ -215,7 +219,7 @@ class Screening:
                 outputs = Outputs(journal, tables, self.meta())
                 outputs.follow()
             tell()
-            for i, result in self.results(executor, skip=journal, chunk=chunk):
+            for i, result in self.results(executor, skip=journal, chunk=chunk, report=tell):
                 with writing():
                     journal.add(i, result)
                     outputs.follow(i, result)
