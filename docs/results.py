@@ -26,7 +26,8 @@ from flybystab.survey.inference import infer, strongest_passage, survived
 from flybystab.survey.population import Population
 from flybystab.survey.progress import ProgressBar
 from flybystab.survey.results import read_results
-from flybystab.survey.screening import Screening, listed
+from flybystab.survey.screening import Screening
+from flybystab.survey.selection import listed
 from flybystab.survey.settings import settings
 from flybystab.survey.summary import summary
 

@@ -21,7 +21,7 @@ from flybystab.survey.asteroid import Asteroid
 from flybystab.survey.draws import nominal
 from flybystab.survey.population import Population
 from flybystab.survey.results import Column, table_of
-from flybystab.survey.screening import listed
+from flybystab.survey.selection import listed
 
 #: Friction angles at which the level is given.
 ANGLES = (30.0, 35.0, 40.0)

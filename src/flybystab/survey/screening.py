@@ -28,10 +28,8 @@ from flybystab import __version__
 from flybystab.aggregate.body import Material
 from flybystab.errors import InvalidInput, OutputFailed
 from flybystab.sky.ephemeris import ephemeris
-from flybystab.survey.catalogue import Asteroid, catalogue
+from flybystab.survey.catalogue import Asteroid
 from flybystab.survey.columns import COLUMNS, SAMPLE_COLUMNS
-from flybystab.survey.draws import identity
-from flybystab.survey.formats import foreign, with_physical_data
 from flybystab.survey.journal import Journal
 from flybystab.survey.outputs import Outputs
 from flybystab.survey.passages import Finder, passages
@@ -40,6 +38,7 @@ from flybystab.survey.progress import Progress
 from flybystab.survey.results import Column, table_of
 from flybystab.survey.rows import Row
 from flybystab.survey.scheduling import scheduled, window_of
+from flybystab.survey.selection import listed
 from flybystab.survey.settings import Settings, settings
 from flybystab.survey.table_files import check_output
 from flybystab.survey.tasks import Rows, begin, block_of, joined
@@ -307,27 +306,3 @@ def screen(
             rows = sum(counts.values())
             progress(Progress(len(found), len(chosen), 0, rows, dict(counts), clock.monotonic() - began))
     return table_of((r for i in sorted(found) for r in found[i]), COLUMNS, run.meta())
-
-
-def listed(asteroids: str | Path | Sequence[Asteroid | str | int | Path] | None) -> tuple[Asteroid, ...]:
-    """Asteroids from what `screen` accepts; bodies of tables of orbits are completed from the embedded tables."""
-    if asteroids is None:
-        return catalogue()
-    if isinstance(asteroids, str | Path):
-        asteroids = [Path(asteroids)]
-    found: list[Asteroid] = []
-    for a in asteroids:
-        if isinstance(a, Asteroid):
-            found.append(a)
-        elif isinstance(a, Path):
-            rows = catalogue(a)
-            found += with_physical_data(rows) if any(map(foreign, rows)) else rows
-        else:
-            found.append(Asteroid.from_catalogue(a))
-    if not found:
-        raise InvalidInput("asteroids", asteroids, "at least one asteroid")
-    keys = Counter(identity(a) for a in found)
-    twice = [k for k, n in keys.items() if n > 1]
-    if twice:
-        raise InvalidInput("asteroids", ", ".join(twice), "every asteroid once")
-    return tuple(found)

@@ -1,0 +1,36 @@
+"""The asteroids of a screening: named, from files, or the whole embedded catalogue; each of them once."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from pathlib import Path
+
+from flybystab.errors import InvalidInput
+from flybystab.survey.catalogue import Asteroid, catalogue
+from flybystab.survey.draws import identity
+from flybystab.survey.formats import foreign, with_physical_data
+
+
+def listed(asteroids: str | Path | Sequence[Asteroid | str | int | Path] | None) -> tuple[Asteroid, ...]:
+    """Asteroids from what `screen` accepts; bodies of tables of orbits are completed from the embedded tables."""
+    if asteroids is None:
+        return catalogue()
+    if isinstance(asteroids, str | Path):
+        asteroids = [Path(asteroids)]
+    found: list[Asteroid] = []
+    for a in asteroids:
+        if isinstance(a, Asteroid):
+            found.append(a)
+        elif isinstance(a, Path):
+            rows = catalogue(a)
+            found += with_physical_data(rows) if any(map(foreign, rows)) else rows
+        else:
+            found.append(Asteroid.from_catalogue(a))
+    if not found:
+        raise InvalidInput("asteroids", asteroids, "at least one asteroid")
+    keys = Counter(identity(a) for a in found)
+    twice = [k for k, n in keys.items() if n > 1]
+    if twice:
+        raise InvalidInput("asteroids", ", ".join(twice), "every asteroid once")
+    return tuple(found)
