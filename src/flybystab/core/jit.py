@@ -5,7 +5,8 @@ divisor gives inf or nan, which the callers test for, instead of an exception in
 ``fastmath`` stays off: compensated sums and sign tests rely on the order of operations. ``summing_kernel`` is for
 the few inner loops that are plain sums: there the compiler may reorder additions and fuse products, which lets it
 use vector instructions; infinities and nan keep their meaning. ``pasted_kernel`` is one that is pasted into its
-caller. Where the cache cannot be written anywhere (read-only package and home) each process compiles for itself.
+caller. A kernel on disk is compiled anew when any file that it is made from has changed
+(:mod:`flybystab.core.kernel_cache`). Where the cache cannot be written anywhere (read-only package and home) each process compiles for itself.
 """
 
 from __future__ import annotations
@@ -17,6 +18,10 @@ from numba import njit
 from numba.core import cgutils
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
+
+from flybystab.core.kernel_cache import watch
+
+watch()
 
 
 def _cacheable() -> bool:
