@@ -140,7 +140,7 @@ def test_energy_and_momentum_budget_of_a_flyby(surface, dilatancy, q):
     scale = np.abs(np.diff(energy)).max() + kinetic(h["shape"][0], h["velocity_gradient"][0])
     for a, b in zip([0, *edges], [*edges, len(h["time"])], strict=True):
         regime = h["regime"][a]
-        samples = 4 if regime == 0 else 2
+        samples = 4
         end = a + (b - a - 1) // samples * samples
         if end > a and np.ptp(last := np.diff(h["time"][end - samples : end + 1])) > 1e-6 * last.max():
             end -= samples  # a step cut short by the end of the regime

@@ -23,7 +23,14 @@ from flybystab.core.motion import (
     rate,
 )
 from flybystab.core.rheology import MOHR_COULOMB
-from flybystab.core.steppers import flow_jacobian, implicit_at, implicit_step
+from flybystab.core.steppers import (
+    explicit_at,
+    explicit_dense,
+    explicit_step,
+    flow_jacobian,
+    implicit_at,
+    implicit_step,
+)
 from flybystab.core.tensors import deviator, eigensystem
 from flybystab.core.tide import TidePanels
 from flybystab.core.workspace import (
@@ -33,6 +40,7 @@ from flybystab.core.workspace import (
     DONE,
     JAM,
     LOSS,
+    N_SAMPLE,
     STUCK,
     SWITCH,
     Counts,
@@ -46,6 +54,15 @@ Array = NDArray[np.float64]
 #: Lode angle, rad, by which `D` may be past the fan of a corner, and share of a face that counts as its end: the switch
 #: is located no better, and it is far below any other error.
 _SLACK = 1e-9
+
+#: Longest explicit step, times the rate of relaxation of ``D``: DOP853 is stable to 6 on the axis.
+_STABLE = 5.0
+
+#: Longest step towards rest, over the time to it.
+_APPROACH = 0.45
+
+#: Implicit steps at least between explicit stretches.
+_BETWEEN = 3
 
 #: Time to rest at which flow ends, dynamical times over the tolerance of a step.
 _BRIEF = 0.1
@@ -122,6 +139,38 @@ def _record_end(
 
 
 @kernel
+def _at(explicit: bool, x: float, y: Array, ws: Workspace) -> None:
+    """State ``ws.ys`` at the fraction `x` of a step just made."""
+    if explicit:
+        explicit_at(x, y, N_FULL, ws.dense, ws.ys)
+    else:
+        implicit_at(x, y, N_FULL, ws.dense, ws.y1, ws.ys)
+
+
+@kernel
+def _record_inside(
+    explicit: bool,
+    t: float,
+    y: Array,
+    h: float,
+    dy: Array,
+    par: Array,
+    tide: TidePanels,
+    limit2: float,
+    ws: Workspace,
+    hist: Array,
+    count: Counts,
+) -> None:
+    """Append the quarters of a step to the history."""
+    for j in range(1, N_SAMPLE):
+        x = j / N_SAMPLE
+        _at(explicit, x, y, ws)
+        _health(t + x * h, ws.ys, dy, par, tide, limit2, ws)
+        p, strength, det = ws.work.m[W_SCRATCH, 1, 2], ws.work.m[W_SCRATCH, 1, 1], ws.work.m[W_SCRATCH, 2, 0]
+        record(t + x * h, FLOWING, ws.ys, par, p, strength, det, ws, hist, count)
+
+
+@kernel
 def choose_part(t: float, y: Array, par: Array, tide: TidePanels, near: float, ws: Workspace) -> None:
     """Find the part of the yield section for a flow: a face if `D` is normal to one and can stay so, or a corner.
 
@@ -147,6 +196,42 @@ def choose_part(t: float, y: Array, par: Array, tide: TidePanels, near: float, w
 
 
 @kernel
+def _step(explicit: bool, t: float, y: Array, h: float, par: Array, tide: TidePanels, ws: Workspace) -> float:
+    """One step of flow to ``ws.y1``, explicit (with its first rate in ``ws.k[0]``) or implicit; returns the error."""
+    if explicit:
+        return explicit_step(FLOWING, t, y, N_FULL, h, par, tide, ws.work, ws.k, ws.scale, ws.y1)
+    return implicit_step(
+        t, y, h, par, tide, ws.work, ws.jac, ws.ft, ws.lu, ws.pivots, ws.k, ws.scale, ws.y1, ws.dense
+    )
+
+
+@kernel
+def _stiffness(jac: Array, v: Array) -> float:
+    """Rate at which ``D`` relaxes: spectral radius of its block of the Jacobian, by power iteration in ``v[12]``."""
+    for i in range(6):
+        v[i] = 0.0
+        for j in range(6, 12):
+            v[i] += jac[6 + i, j] * (1.0 if j % 2 == 0 else -0.5)
+    size = 0.0
+    for _ in range(6):
+        before = 0.0
+        for i in range(6):
+            before += v[i] * v[i]
+        if before == 0.0:
+            return 0.0
+        before = 1.0 / np.sqrt(before)
+        size = 0.0
+        for i in range(6):
+            v[6 + i] = 0.0
+            for j in range(6):
+                v[6 + i] += jac[6 + i, 6 + j] * v[j] * before
+            size += v[6 + i] ** 2
+        copy(v[6:12], v, 6)
+        size = np.sqrt(size)
+    return size
+
+
+@kernel
 def follow_flow(
     t: float,
     t1: float,
@@ -159,11 +244,19 @@ def follow_flow(
     hist: Array,
     count: Counts,
 ) -> tuple[int, float]:
-    """Plastic flow of ``ws.y`` up to one of its ends or `t1`; returns (reason, time)."""
+    """Plastic flow of ``ws.y`` up to one of its ends or `t1`; returns (reason, time).
+
+    Near onset and rest, where the direction of ``D`` relaxes as ``1/|D|``, the steps are implicit; in between, where
+    explicit ones of order 8 can be longer without losing stability, they are explicit.
+    """
     y = ws.y
-    f0 = ws.k[8]
-    spare = ws.k[9]
+    f0 = ws.spare[15:30]
+    spare = ws.spare[:15]
     h = 1e-4
+    explicit = False
+    pull = 0.0  # rate of relaxation times |D|, from the last Jacobian
+    slow = 0.0  # |D| at which explicit steps end
+    implicit_ahead = 0
     limit2 = limit * limit
     near = 1e-6 + 10.0 * tol  # the direction of D is known no better
     fastest = 0.0
@@ -185,66 +278,85 @@ def follow_flow(
             # Rest is nearer than the tolerance can tell: the direction of so small a D is noise, and on a sharp corner
             # of the yield section, which turns the stress with it, D would never come to rest.
             return ARREST, t
-        flow_jacobian(t, y, f0, 1e-6, par, tide, ws.work, ws.jac, ws.ft, ws.ys)
+        if explicit and d < slow:
+            explicit, implicit_ahead = False, _BETWEEN
+        if not explicit:
+            flow_jacobian(t, y, f0, 1e-6, par, tide, ws.work, ws.jac, ws.ft, ws.ys)
+            pull = d * _stiffness(ws.jac, spare)
+            implicit_ahead -= 1
+            if implicit_ahead < 0 and 1.5 * h * pull < _STABLE * d:
+                explicit, slow = True, 0.5 * d
+        if explicit:
+            copy(f0, ws.k[0], N_FULL)
+            h = min(h, _STABLE * d / pull)
         if trend < 0.0:
             # |D| falls linearly to arrest, its direction relaxes as 1/|D|: approach it geometrically.
-            h = min(h, 0.8 * d / -trend)
+            h = min(h, _APPROACH * d / -trend)
         for i in range(6):
             ws.scale[i] = tol
             ws.scale[6 + i] = tol * max(d, 1e-4)
         for i in range(12, 15):
             ws.scale[i] = tol
+        growth = 6.0
         while True:
             if count[2] >= max_steps:
                 return STUCK, t
             last = h >= t1 - t
             if last:
                 h = t1 - t
-            error = implicit_step(
-                t, y, h, par, tide, ws.work, ws.jac, ws.ft, ws.lu, ws.pivots, ws.k, ws.scale, ws.y1, ws.dense
-            )
+            error = _step(explicit, t, y, h, par, tide, ws)
             count[2] += 1
             if error <= 1.0:
                 break
             count[3] += 1
-            h *= max(0.1, 0.9 * error ** (-0.2)) if np.isfinite(error) else 0.1
+            # Near onset the error falls slower than the order says: a second refusal halves the step at least.
+            most = 0.9 if growth > 1.0 else 0.5
+            growth = 1.0
+            h *= (
+                min(most, max(0.1, 0.9 * error ** (-0.125 if explicit else -0.2)))
+                if np.isfinite(error)
+                else 0.1
+            )
             if h < 1e-15 * max(1.0, abs(t)):
                 return STUCK, t
-        # Half-way and at the end: has one of the event functions changed its sign?
+        # On the way and at the end: has one of the event functions changed its sign?
+        if explicit:
+            explicit_dense(FLOWING, t, y, N_FULL, h, par, tide, ws.work, ws.k, ws.y1, ws.ys, ws.dense)
         found = 2.0
         low = 0.0
-        implicit_at(0.5, y, N_FULL, ws.dense, ws.y1, ws.ys)
-        half = _health(t + 0.5 * h, ws.ys, spare, par, tide, limit2, ws)
-        p, strength, det = ws.work.m[W_SCRATCH, 1, 2], ws.work.m[W_SCRATCH, 1, 1], ws.work.m[W_SCRATCH, 2, 0]
-        if half < 0.0:
-            found = 0.5
-        elif _health(t + h, ws.y1, f0, par, tide, limit2, ws) < 0.0:
-            low, found = 0.5, 1.0
+        points = 4 if explicit else 2
+        for j in range(1, points):
+            x = j / points
+            _at(explicit, x, y, ws)
+            if _health(t + x * h, ws.ys, spare, par, tide, limit2, ws) < 0.0:
+                found = x
+                break
+            low = x
+        if found > 1.0 and _health(t + h, ws.y1, f0, par, tide, limit2, ws) < 0.0:
+            found = 1.0
+        if found > 1.0:
+            if hist.shape[0] > 1:
+                _record_inside(explicit, t, y, h, spare, par, tide, limit2, ws, hist, count)
+                _health(t + h, ws.y1, f0, par, tide, limit2, ws)
         else:
-            record(t + 0.5 * h, FLOWING, ws.ys, par, p, strength, det, ws, hist, count)
-        if found <= 1.0:
             high = found
             for _ in range(52):
                 mid = 0.5 * (low + high)
-                implicit_at(mid, y, N_FULL, ws.dense, ws.y1, ws.ys)
+                _at(explicit, mid, y, ws)
                 if _health(t + mid * h, ws.ys, spare, par, tide, limit2, ws) < 0.0:
                     high = mid
                 else:
                     low = mid
-            implicit_at(high, y, N_FULL, ws.dense, ws.y1, ws.ys)
+            _at(explicit, high, y, ws)
             _health(t + high * h, ws.ys, spare, par, tide, limit2, ws)
             reason = int(ws.mark[3])
             # Repeat the step up to the root: the order of the method instead of that of the interpolant.
             h *= high
-            implicit_step(
-                t, y, h, par, tide, ws.work, ws.jac, ws.ft, ws.lu, ws.pivots, ws.k, ws.scale, ws.y1, ws.dense
-            )
-            if reason == SWITCH:  # the history has the middle of every step
-                implicit_at(0.5, y, N_FULL, ws.dense, ws.y1, ws.ys)
-                _health(t + 0.5 * h, ws.ys, spare, par, tide, limit2, ws)
-                p, strength = ws.work.m[W_SCRATCH, 1, 2], ws.work.m[W_SCRATCH, 1, 1]
-                det = ws.work.m[W_SCRATCH, 2, 0]
-                record(t + 0.5 * h, FLOWING, ws.ys, par, p, strength, det, ws, hist, count)
+            _step(explicit, t, y, h, par, tide, ws)
+            if reason == SWITCH and hist.shape[0] > 1:
+                if explicit:
+                    explicit_dense(FLOWING, t, y, N_FULL, h, par, tide, ws.work, ws.k, ws.y1, ws.ys, ws.dense)
+                _record_inside(explicit, t, y, h, spare, par, tide, limit2, ws, hist, count)
             copy(ws.y1, y, N_FULL)
             t += h
             if reason != SWITCH:
@@ -254,6 +366,7 @@ def follow_flow(
             if _health(t, y, f0, par, tide, limit2, ws) < 0.0:
                 return int(ws.mark[3]), t
             h = max(h, 1e-4)
+            explicit, implicit_ahead = False, _BETWEEN
             continue
         t = t1 if last else t + h
         copy(ws.y1, y, N_FULL)
@@ -261,5 +374,5 @@ def follow_flow(
         if d < D_REST:
             _record_end(t, y, f0, par, tide, limit2, ws, hist, count)
             return ARREST, t
-        h *= min(6.0, max(0.2, 0.9 * error ** (-0.2))) if error > 0.0 else 6.0
+        h *= min(growth, max(0.2, 0.9 * error ** (-0.125 if explicit else -0.2))) if error > 0.0 else growth
     return DONE, t

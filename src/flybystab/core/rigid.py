@@ -160,6 +160,9 @@ def follow_rigid(
     surface = int(par[SURFACE])
     cohesion = par[COHESION] * np.sqrt(par[S1] * par[S2] * par[S3])
     record(t, RIGID, y, par, p, norm, det, ws, hist, count)
+    # A step never spans more of the change of variable of the tide than its panels resolve, and less of it for a
+    # smaller tolerance: else runs of different tolerance would share their steps, and their errors.
+    reach = 0.4 * (1e3 * tol) ** 0.05
     f = ws.sample
     f[0, N_SAMPLE] = _onset(excess, p, norm, det, par, ws.stress)
     f[1, N_SAMPLE] = required_friction(surface, cohesion, norm, p, det)
@@ -257,8 +260,7 @@ def follow_rigid(
         _normalise(y)
         k[0] = k[12]
         h *= min(5.0, max(0.3, 0.9 * error ** (-0.125))) if error > 0.0 else 5.0
-        # A step never spans more of the change of variable of the tide than its panels resolve.
-        h = min(h, 0.4 * np.sqrt(t * t + tide.tau * tide.tau) if tide.coefficients.shape[0] > 0 else h)
+        h = min(h, reach * np.sqrt(t * t + tide.tau * tide.tau) if tide.coefficients.shape[0] > 0 else h)
     ws.mark[2] = 0.0
     return DONE, t
 

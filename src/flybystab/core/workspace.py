@@ -30,7 +30,7 @@ SWITCH = code(8)  # flow passes from one part of the yield section to another (n
 N_HISTORY = 24
 #: Columns of the event log: code, time, Lode determinant, volume.
 N_EVENT = 4
-#: Samples in a rigid step: history rows, and the grid on which extrema of the yield function are looked for.
+#: Samples in a step: history rows, and the grid on which extrema of the yield function are looked for while rigid.
 N_SAMPLE = 4
 
 #: Rate of strain, in dynamical units, below which the body is at rest.

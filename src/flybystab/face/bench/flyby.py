@@ -78,7 +78,7 @@ def rows(figure: str | Path | None = None, repeat: int = 5) -> list[dict[str, An
         error = float(np.abs(axes(shape) / truth - 1.0).max())
         out.append({"method": method, "setting": setting, "error_relative": error, "wall_s": wall})
 
-    for tolerance in (1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10):
+    for tolerance in (1e-3, 3e-4, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10):
         run = default(tolerance)
         add("default", f"tol {tolerance:.0e}", run.shape, _best(kernel(tolerance, e), repeat))
 
