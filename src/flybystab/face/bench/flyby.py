@@ -39,17 +39,17 @@ def case() -> tuple[Body, Encounter]:
 
 
 def _best(run: Any, repeat: int) -> float:
-    """Least wall time of several runs, s: the least disturbed one."""
+    """Least processor time of several runs, s: the least disturbed one. All of them use one core."""
     times = []
     for _ in range(repeat):
-        start = time.perf_counter()
+        start = time.process_time()
         run()
-        times.append(time.perf_counter() - start)
+        times.append(time.process_time() - start)
     return min(times)
 
 
 def rows(figure: str | Path | None = None, repeat: int = 5) -> list[dict[str, Any]]:
-    """Rows of method, setting, relative error, wall time (s) and time over that of the default at 1e-6."""
+    """Rows of method, setting, relative error, processor time (s) and time over that of the default at 1e-6."""
     body, e = case()
     t0 = body.dynamical_time
     a0 = float(np.cbrt(np.prod(body.axes)))
@@ -74,9 +74,9 @@ def rows(figure: str | Path | None = None, repeat: int = 5) -> list[dict[str, An
     out: list[dict[str, Any]] = []
     answer = np.empty((1, N_ANSWER))
 
-    def add(method: str, setting: str, shape: Any, wall: float) -> None:
+    def add(method: str, setting: str, shape: Any, cpu: float) -> None:
         error = float(np.abs(axes(shape) / truth - 1.0).max())
-        out.append({"method": method, "setting": setting, "error_relative": error, "wall_s": wall})
+        out.append({"method": method, "setting": setting, "error_relative": error, "cpu_s": cpu})
 
     for tolerance in (1e-3, 3e-4, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10):
         run = default(tolerance)
@@ -99,7 +99,7 @@ def rows(figure: str | Path | None = None, repeat: int = 5) -> list[dict[str, An
             "error_relative": float(
                 np.linalg.norm(gradients[0] - gradients[1]) / np.linalg.norm(gradients[1])
             ),
-            "wall_s": _best(kernel(1e-8, far), 20),
+            "cpu_s": _best(kernel(1e-8, far), 20),
         }
     )
     par = parameters(body.axes, body.rho, PHI, 0.0, 0.0, 0)
@@ -113,8 +113,8 @@ def rows(figure: str | Path | None = None, repeat: int = 5) -> list[dict[str, An
 
     for n in (2000, 8000, 32000):
         coarse, fine = stepping(n), stepping(2 * n)
-        wall = _best(lambda n=n: (stepping(n), stepping(2 * n)), 2)
-        add("stepping", f"{n} and {2 * n} steps", 2.0 * fine - coarse, wall)
+        cpu = _best(lambda n=n: (stepping(n), stepping(2 * n)), 2)
+        add("stepping", f"{n} and {2 * n} steps", 2.0 * fine - coarse, cpu)
 
     # SciPy: from just after onset, where the flow is started as the default starts it, to just before arrest.
     history = exact.history
@@ -140,24 +140,32 @@ def rows(figure: str | Path | None = None, repeat: int = 5) -> list[dict[str, An
     target = axes(history["shape"][last])
     for method, tolerances in (("Radau", (1e-4, 1e-6, 1e-8)), ("DOP853", (1e-4, 1e-6, 1e-8))):
         for tolerance in tolerances:
-            begin = time.perf_counter()
-            # |D| starts at 1e-10: its own tolerance must be below it
-            solution = solve_ivp(
-                derivative, (start, stop), state(first), method=method, rtol=tolerance, atol=tolerance * 1e-4
-            )
-            wall = time.perf_counter() - begin
+
+            def solved(method: str = method, tolerance: float = tolerance) -> Any:
+                # |D| starts at 1e-10: its own tolerance must be below it
+                return solve_ivp(
+                    derivative,
+                    (start, stop),
+                    state(first),
+                    method=method,
+                    rtol=tolerance,
+                    atol=tolerance * 1e-4,
+                )
+
+            solution = solved()
+            cpu = _best(solved, 3)
             error = float(np.abs(axes(tensor(solution.y[:6, -1])) * a0 / target - 1.0).max())
             out.append(
                 {
                     "method": f"SciPy {method}",
                     "setting": f"rtol {tolerance:.0e}",
                     "error_relative": error,
-                    "wall_s": wall,
+                    "cpu_s": cpu,
                 }
             )
-    reached = [r["wall_s"] for r in out if r["method"] == "default" and r["error_relative"] <= 1e-6]
+    reached = [r["cpu_s"] for r in out if r["method"] == "default" and r["error_relative"] <= 1e-6]
     for row in out:
-        row["wall_over_default_at_1e-6"] = row["wall_s"] / min(reached)
+        row["cpu_over_default_at_1e-6"] = row["cpu_s"] / min(reached)
     if figure is not None:
         _plot(out, figure)
     return out
@@ -166,11 +174,11 @@ def rows(figure: str | Path | None = None, repeat: int = 5) -> list[dict[str, An
 def lines(rows: list[dict[str, Any]]) -> list[str]:
     """The table as text."""
     head = (
-        f"{'method':14s} {'setting':24s} {'rel. error':>10s} {'wall (ms)':>10s} {'over default at 1e-6':>21s}"
+        f"{'method':14s} {'setting':24s} {'rel. error':>10s} {'cpu (ms)':>10s} {'over default at 1e-6':>21s}"
     )
     return [head] + [
-        f"{r['method']:14s} {r['setting']:24s} {r['error_relative']:10.1e} {1e3 * r['wall_s']:10.2f} "
-        f"{r['wall_over_default_at_1e-6']:21.1f}"
+        f"{r['method']:14s} {r['setting']:24s} {r['error_relative']:10.1e} {1e3 * r['cpu_s']:10.2f} "
+        f"{r['cpu_over_default_at_1e-6']:21.1f}"
         for r in rows
     ]
 
@@ -183,8 +191,10 @@ def _plot(rows: list[dict[str, Any]], path: str | Path) -> None:
     FigureCanvasAgg(figure)
     panel: Any = figure.subplots()
     for method, marker in zip(dict.fromkeys(r["method"] for r in rows), "oxs^Dv", strict=False):
-        points = [(r["wall_s"] * 1e3, r["error_relative"]) for r in rows if r["method"] == method]
+        points = [(r["cpu_s"] * 1e3, r["error_relative"]) for r in rows if r["method"] == method]
         panel.loglog(*zip(*points, strict=True), marker=marker, label=method)
-    panel.set(xlabel="wall time (ms)", ylabel="relative error of the semi-axes", title="Flyby P1, with flow")
+    panel.set(
+        xlabel="processor time (ms)", ylabel="relative error of the semi-axes", title="Flyby P1, with flow"
+    )
     panel.legend(frameon=False)
     figure.savefig(path, dpi=150)
