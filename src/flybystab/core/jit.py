@@ -6,7 +6,8 @@ divisor gives inf or nan, which the callers test for, instead of an exception in
 the few inner loops that are plain sums: there the compiler may reorder additions and fuse products, which lets it
 use vector instructions; infinities and nan keep their meaning. ``pasted_kernel`` is one that is pasted into its
 caller. A kernel on disk is compiled anew when any file that it is made from has changed
-(:mod:`flybystab.core.kernel_cache`). Where the cache cannot be written anywhere (read-only package and home) each process compiles for itself.
+(:mod:`flybystab.core.kernel_cache`). Where the cache
+cannot be written anywhere (read-only package and home) each process compiles for itself.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import re
-from functools import lru_cache
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +29,7 @@ def _file(module: str) -> Path | None:
     return next((p for p in (place.with_suffix(".py"), place / "__init__.py") if p.is_file()), None)
 
 
-@lru_cache(maxsize=None)
+@cache
 def imports(file: Path) -> frozenset[Path]:
     """Files of this package that a file of it imports, anywhere in it."""
     modules = []
@@ -39,7 +39,7 @@ def imports(file: Path) -> frozenset[Path]:
     return frozenset(found for m in modules if (found := _file(m)) is not None)
 
 
-@lru_cache(maxsize=None)
+@cache
 def sources(file: Path) -> tuple[Path, ...]:
     """A file of this package and all that it imports, directly or not, sorted."""
     known, new = {file}, [file]
@@ -50,7 +50,7 @@ def sources(file: Path) -> tuple[Path, ...]:
     return tuple(sorted(known))
 
 
-@lru_cache(maxsize=None)
+@cache
 def stamp(file: Path) -> str:
     """Digest of the `sources` of a file."""
     digest = hashlib.sha256()
@@ -60,7 +60,7 @@ def stamp(file: Path) -> str:
     return digest.hexdigest()
 
 
-def _stamped(locator: Any) -> type:
+def _stamped(locator: Any) -> Any:
     """The same place for the cache, for files of this package only, with their `stamp`."""
 
     class Stamped(locator):
@@ -83,6 +83,6 @@ def _stamped(locator: Any) -> type:
 
 def watch() -> None:
     """Let numba ask for the `stamp` of every kernel of this package; others are not concerned."""
-    locators = FunctionCache._impl_class._locator_classes
+    locators: list[Any] = FunctionCache._impl_class._locator_classes
     if not any(c.__name__.startswith("Stamped") for c in locators):
         locators[:0] = [_stamped(c) for c in locators]
