@@ -100,7 +100,7 @@ def energy_gain(found: Judged, body: fs.Body) -> float:
 
 
 def plastic_gain(found: Judged) -> float:
-    """Largest negative plastic power over the largest sum of its parts; the flow rule forbids any."""
+    """Largest negative plastic power over the largest stress times rate of strain; the flow rule forbids any."""
     h = found.history
     assert h is not None
     flow = h["regime"] == 1
@@ -116,7 +116,7 @@ def plastic_gain(found: Judged) -> float:
 
     turn = lode(np.linalg.det(d / size[:, None, None])) - lode(h["determinant"][flow])
     friction, dilation = h["deviator"][flow] * size * np.cos(turn), h["pressure"][flow] * trace
-    return float(np.max(dilation - friction) / np.max(np.abs(friction) + np.abs(dilation)))
+    return float(np.max(dilation - friction) / np.max((h["deviator"] + np.abs(h["pressure"]))[flow] * size))
 
 
 def stress(n: int, seed: int) -> Counter[str]:
@@ -170,7 +170,7 @@ def stress(n: int, seed: int) -> Counter[str]:
     for name in ("not converged", "not finite", "energy gained", "verdicts differ"):
         print(f"{name:18s} {count[name]:6d}  {count[name] / n:.2%}")
     print(f"largest gain of kinetic energy across an impulse or arrest: {worst:.1e} of it")
-    print(f"largest plastic power of the wrong sign: {power:.1e} of its parts")
+    print(f"largest plastic power of the wrong sign: {power:.1e} of stress times rate of strain")
     print(f"longest run: {longest:.2f} s of processor time")
     print("verdicts: " + ", ".join(f"{v} {k}" for k, v in verdicts.most_common()))
     for tol in TOLERANCES:
