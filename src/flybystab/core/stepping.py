@@ -152,6 +152,7 @@ def follow_steps(
                 break
             if not touching and turn == 0:
                 contact = volume
+                beta, _ = dilatancy(contact, par)
                 gap = 0.0
                 for i in range(3):
                     offset[i] = 0.0
