@@ -148,6 +148,23 @@ def test_degenerate_principal_axes(axes):
     np.testing.assert_allclose(axes_of(q.shape), axes_of(p.shape), rtol=1e-6)
 
 
+@pytest.mark.parametrize("dilatancy", [0.0, 0.35, 1.0])
+def test_a_sphere_that_yields_on_a_corner_of_the_section(dilatancy):
+    """Stress and strain of a sphere without spin stay at triaxial extension, a kink of Mohr-Coulomb, in each integrator."""
+    body = Body(
+        [250, 250, 250] * u.m,
+        1300 * u.kg / u.m**3,
+        spin=[0, 0, 0] * u.rad / u.s,
+        material=material(41, dilatancy=dilatancy, yield_surface="mohr-coulomb"),
+    )
+    e = earth(1.3, 17.0)
+    p, q = (carried(body, e.t_start, e.t_stop, e.tide, tolerance=tol) for tol in (1e-9, 1e-7))
+    np.testing.assert_allclose(axes_of(q.shape), axes_of(p.shape), rtol=1e-6)
+    coarse, fine = (stepped(body, e.t_start, e.t_stop, n, e.tide)[0] for n in (8000, 16000))
+    apart = np.abs(2.0 * fine - coarse - p.shape).max() / np.trace(p.shape)
+    assert apart < (3e-4 if dilatancy == 1.0 else 1e-5)  # impacts fall between the steps
+
+
 def test_axis_ratios_of_a_hundred():
     """1 : 0.1 : 0.01 held by cohesion: rigid through the encounter, momentum kept without a tide."""
     body = Body(
