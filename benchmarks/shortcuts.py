@@ -18,7 +18,7 @@ from astropy.time import Time
 from numba import njit
 
 import flybystab as fs
-from flybystab.core import judgement, motion
+from flybystab.core import judgement, motion, state
 from flybystab.core.passage import parameters
 from flybystab.core.steppers import N_STAGES, factorise, flow_jacobian, implicit_step, solve
 from flybystab.core.tide import TidePanels, components
@@ -97,13 +97,13 @@ def distant() -> None:
 @njit
 def _rates(n, t, y, dy, par, tide, work):
     for _ in range(n):
-        motion.rate(motion.FLOWING, t, y, dy, par, tide, work)
+        motion.rate(state.FLOWING, t, y, dy, par, tide, work)
 
 
 @njit
 def _cheap_rates(n, y, dy, par, work):
     for _ in range(n):
-        motion.deformation_rate(motion.FLOWING, y, dy, par, work)
+        motion.deformation_rate(state.FLOWING, y, dy, par, work)
 
 
 @njit
@@ -139,7 +139,7 @@ def planar() -> None:
     e = scenes()[1][2]
     t0 = PILE.dynamical_time
     tide = TidePanels(e.tide.tau / t0, e.tide.start, e.tide.width, e.tide.coefficients * t0**2)
-    work = motion.Buffers(np.zeros((motion.N_WORK, 3, 3)), np.zeros((3, 6)))
+    work = state.Buffers(np.zeros((state.N_WORK, 3, 3)), np.zeros((3, 6)))
     y, dy, s, ft = (np.zeros(15) for _ in range(4))
     y[:3] = (PILE.axes / np.cbrt(np.prod(PILE.axes))) ** 2
     y[6:12] = components(0.05 * np.array([[1.0, 0.3, 0.0], [0.3, -0.4, 0.0], [0.0, 0.0, -0.6]]))
@@ -147,7 +147,7 @@ def planar() -> None:
     jac, lu = np.zeros((15, 15)), np.zeros((15, 15))
     pivots = np.zeros(15, dtype=np.int64)
     k, dense, y1, scale = np.zeros((N_STAGES, 15)), np.zeros((7, 15)), np.zeros(15), np.full(15, 1e-8)
-    motion.rate(motion.FLOWING, 0.0, y, dy, par, tide, work)
+    motion.rate(state.FLOWING, 0.0, y, dy, par, tide, work)
     system = np.eye(15) / 1e-3
 
     def cost(run: Callable[..., object], *arguments: object) -> float:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from flybystab.aggregate.body import Body, Material
 from flybystab.constants import R_EARTH, G
-from flybystab.core import motion
+from flybystab.core import state
 from flybystab.core.passage import Passage, parameters, passage
 from flybystab.core.regimes import follow
 from flybystab.core.stepping import follow_steps
@@ -141,7 +141,7 @@ def deforming(
     rate: Array,
     t_stop: float,
     *,
-    regime: int = motion.FLOWING,
+    regime: int = state.FLOWING,
     viscosity: float = 0.0,
     tolerance: float = 1e-11,
     tide: TidePanels | None = None,

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from flybystab.aggregate.body import Body
 from flybystab.attitudes import attitude_matrix, periapsis_axes
 from flybystab.core.jit import kernel
-from flybystab.core.motion import rotated_to_body, rotation_matrix
 from flybystab.core.passage import passage
+from flybystab.core.state import rotated_to_body, rotation_matrix
 from flybystab.core.tide import TidePanels, tide_at
 from flybystab.errors import InvalidInput, NotConverged
 from flybystab.rows import span_of

@@ -8,7 +8,7 @@ from scenes import axes_of, carried, deforming, kinetic, material, momentum, pot
 from flybystab.aggregate.body import Body
 from flybystab.constants import G
 from flybystab.core.ellipsoid import gravity_coefficients
-from flybystab.core.motion import DISPERSED, FLOWING, FLUID
+from flybystab.core.state import DISPERSED, FLOWING, FLUID
 from flybystab.core.tide import components, tide_panels
 
 DENSITY = 2000 * u.kg / u.m**3

@@ -18,7 +18,7 @@ from scenes import (
 from scipy.spatial.transform import Rotation
 
 from flybystab.aggregate.body import YIELD_SURFACES, Body
-from flybystab.core import motion
+from flybystab.core import state
 from flybystab.core.rheology import required_friction
 from flybystab.core.workspace import ARREST, CONTACT, JAM, LOSS, ONSET
 from flybystab.errors import InvalidInput
@@ -178,7 +178,7 @@ def test_axis_ratios_of_a_hundred():
     np.testing.assert_allclose(r.semi_axes.value, [1000, 100, 10], rtol=1e-12)
     # the same body without cohesion or friction: an inviscid filament that keeps its volume
     body = body.with_(material=material(0.0))
-    shape, *_ = deforming(body, np.zeros((3, 3)), 2000.0, regime=motion.FLUID, limit=1e4)
+    shape, *_ = deforming(body, np.zeros((3, 3)), 2000.0, regime=state.FLUID, limit=1e4)
     assert axes_of(shape)[2] != pytest.approx(10.0, rel=1e-3)
     assert np.prod(axes_of(shape)) == pytest.approx(1e6, rel=1e-8)
 
@@ -260,7 +260,7 @@ def test_contact_lost_and_regained_without_a_gain_of_energy(dilatancy):
     l0 = rate + np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
     start = np.diag(body.axes**2)
     before = kinetic(start, l0) + potential(body, start)
-    shape, gradient, events, _ = deforming(body, rate, 30.0 * body.dynamical_time, regime=motion.DISPERSED)
+    shape, gradient, events, _ = deforming(body, rate, 30.0 * body.dynamical_time, regime=state.DISPERSED)
     codes = [c for c, _ in events]
     assert codes[0] == CONTACT
     assert set(codes) <= {CONTACT, LOSS, ARREST, ONSET}
@@ -295,8 +295,8 @@ def test_many_impacts_in_a_row():
 def test_frictionless_impulse_is_the_closed_form():
     """beta = 0 and no friction: L += -(tr L/tr S^-1) S^-1."""
     from flybystab.core.contact import SLIDING, friction_impulse
-    from flybystab.core.motion import N_WORK, Buffers
     from flybystab.core.passage import parameters
+    from flybystab.core.state import N_WORK, Buffers
     from flybystab.core.tide import components, tensor
 
     rng = np.random.default_rng(4)

@@ -15,8 +15,10 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from flybystab.core.flow_rule import dilatancy, dilation, flow_stress, isotropic
 from flybystab.core.jit import code, kernel
-from flybystab.core.motion import (
+from flybystab.core.rheology import MOHR_COULOMB, beyond_face, corner, flow_direction, slope_over_sine
+from flybystab.core.state import (
     COHESION,
     COMPRESSION_CORNER,
     COS_PHI,
@@ -34,14 +36,9 @@ from flybystab.core.motion import (
     W_S,
     W_SINV,
     Buffers,
-    dilatancy,
-    dilation,
-    flow_stress,
     gradient,
-    isotropic,
     set_gradient,
 )
-from flybystab.core.rheology import MOHR_COULOMB, beyond_face, corner, flow_direction, slope_over_sine
 from flybystab.core.steppers import factorise, solve
 from flybystab.core.tensors import determinant, deviator, inverse, multiply, pack, unpack
 from flybystab.core.tide import COMPONENTS

@@ -6,7 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.core.jit import kernel
-from flybystab.core.motion import (
+from flybystab.core.motion import rate
+from flybystab.core.rheology import MOHR_COULOMB
+from flybystab.core.state import (
     BESIDE,
     COHESION,
     COMPRESSION_CORNER,
@@ -20,9 +22,7 @@ from flybystab.core.motion import (
     SMOOTH,
     SURFACE,
     W_SCRATCH,
-    rate,
 )
-from flybystab.core.rheology import MOHR_COULOMB
 from flybystab.core.steppers import (
     explicit_at,
     explicit_dense,

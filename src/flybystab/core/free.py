@@ -7,7 +7,8 @@ from numpy.typing import NDArray
 
 from flybystab.core.flow import axis_ratio2
 from flybystab.core.jit import kernel
-from flybystab.core.motion import DISPERSED, FLUID, N_FULL, W_SCRATCH, rate
+from flybystab.core.motion import rate
+from flybystab.core.state import DISPERSED, FLUID, N_FULL, W_SCRATCH
 from flybystab.core.steppers import explicit_at, explicit_dense, explicit_step
 from flybystab.core.tensors import determinant
 from flybystab.core.tide import TidePanels

@@ -7,9 +7,9 @@ from numpy.typing import NDArray
 
 from flybystab.constants import G
 from flybystab.core.jit import code, inlined, kernel
-from flybystab.core.motion import RIGID
 from flybystab.core.outcome import angle_between, bound_share, momentum, principal_axes, spin_vector
 from flybystab.core.passage import carry
+from flybystab.core.state import RIGID
 from flybystab.core.statics import demand, overload, rigid_stress
 from flybystab.core.tide import TidePanels
 from flybystab.core.workspace import BEYOND, N_EVENT, N_HISTORY, ONSET, STUCK, Counts

@@ -1,120 +1,57 @@
-"""Equations of motion of the homogeneous ellipsoid in each regime (theory, sections 2 and 3).
+"""Rates of the homogeneous ellipsoid in each regime (theory, sections 2 and 3), in the units of the body.
 
-Kernels work in the units of the body: length ``a0 = (a1 a2 a3)^(1/3)``, time ``1/sqrt(pi G rho0)`` at the
-initial density, stress in the form ``T = 5 sigma/rho``. Then ``det S = (V/V0)^2`` and self-gravity is
-``K_g = -2 (V0/V) A(S)``. Two states:
-
-RIGID, 7 numbers: unit quaternion (body axes -> fixed frame, scalar first), ``omega`` along the body axes.
-Every other regime, 15 numbers, fixed frame: ``S`` (6 components), ``D = sym L`` (6), ``w``: ``W x = w x x``.
-
-The parameters of a run are one flat array, see ``SIN_PHI`` and the constants below it.
+The states and the parameters are those of :mod:`flybystab.core.state`; self-gravity is ``K_g = -2 (V0/V) A(S)``.
 """
 
 from __future__ import annotations
-
-from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.core.ellipsoid import gravity_coefficients
-from flybystab.core.jit import code, kernel
-from flybystab.core.rheology import beyond_face, corner, normal, slope_over_sine
+from flybystab.core.flow_rule import dilatancy, dilation, flow_stress, isotropic
+from flybystab.core.jit import kernel
+from flybystab.core.rheology import beyond_face, corner, slope_over_sine
+from flybystab.core.state import (
+    COHESION,
+    COS_PHI,
+    FACE,
+    FLOWING,
+    FLUID,
+    G1,
+    G2,
+    G3,
+    NORMAL,
+    PART,
+    RIGID,
+    S1,
+    S2,
+    S3,
+    SIN_PHI,
+    SMOOTH,
+    SURFACE,
+    VISCOSITY,
+    W_A,
+    W_B,
+    W_FACE,
+    W_K,
+    W_L,
+    W_N,
+    W_R,
+    W_S,
+    W_SCRATCH,
+    W_SINV,
+    W_VECTORS,
+    Buffers,
+    gradient,
+    rotated_to_body,
+    set_gradient,
+)
 from flybystab.core.statics import rigid_load
 from flybystab.core.tensors import determinant, deviator, eigensystem, inverse, multiply, pack, unpack
-from flybystab.core.tide import COMPONENTS, TidePanels, tide_at
+from flybystab.core.tide import TidePanels, tide_at
 
 Array = NDArray[np.float64]
-
-RIGID = code(0)
-FLOWING = code(1)
-DISPERSED = code(2)
-FLUID = code(3)
-
-# Numbers in a state.
-N_RIGID = code(7)
-N_FULL = code(15)
-
-# Slots of the parameter array.
-SURFACE = 0  # code of the yield surface
-SIN_PHI = 1
-COS_PHI = 2
-BETA = 3  # dilatancy beta (not beta over k); 1 where NORMAL is on
-COHESION = 4  # 5 Y/rho0 in units of a0^2 pi G rho0
-VISCOSITY = 5  # 5 (2 mu)/rho0 in units of a0^2 sqrt(pi G rho0), FLUID only
-EXPANSION = 6  # V/V0 at which dilation has ended
-S1 = 7  # squared semi-axes of the rigid body, and its gravity K_g,i
-S2 = 8
-S3 = 9
-G1 = 10
-G2 = 11
-G3 = 12
-NORMAL = 13  # 1: associative flow on a slope k(theta), the true normal; 0: D along the stress deviator
-PART = 14  # which part of the yield section the stress is on, see the codes below
-BESIDE = 15  # angle past the normal of a Mohr-Coulomb face, rad, up to which a corner keeps the stress
-N_PARAMETERS = 16
-
-# Where the stress is on the hexagon of Mohr-Coulomb in associative flow; SMOOTH on any other section.
-SMOOTH = code(0)
-EXTENSION_CORNER = code(1)
-COMPRESSION_CORNER = code(2)
-FACE = code(3)
-
-# Matrices of `Buffers.m` that `field` fills and the rates read.
-W_SINV = 0
-W_K = 1  # K_g + K_t
-W_L = 2
-W_R = 3  # K_g + K_t - L^2
-W_S = 4
-W_N = 5  # FLOWING: stress deviator over p sin(phi) + c cos(phi)
-W_A = 6
-W_B = 7
-W_VECTORS = 8
-# row 0: eigenvalues; row 1: V/V0, k P + kc, P; row 2: determinant of the unit stress deviator, place between the
-# corners of a face (0: extension, 1: compression), angle of D past the normal of the face
-W_SCRATCH = 9
-W_FACE = 10  # step from the extension to the compression corner
-N_WORK = 11
-
-
-class Buffers(NamedTuple):
-    """Scratch of the rates: matrices ``m[N_WORK, 3, 3]`` and components ``c[3, 6]``."""
-
-    m: Array
-    c: Array
-
-
-@kernel
-def rotation_matrix(q: Array, m: Array) -> None:
-    """Rotation matrix ``m[3, 3]`` (body -> fixed) of a quaternion that need not be normalised."""
-    w, x, y, z = q[0], q[1], q[2], q[3]
-    s = 2.0 / (w * w + x * x + y * y + z * z)
-    m[0, 0] = 1.0 - s * (y * y + z * z)
-    m[1, 1] = 1.0 - s * (x * x + z * z)
-    m[2, 2] = 1.0 - s * (x * x + y * y)
-    m[0, 1] = s * (x * y - w * z)
-    m[1, 0] = s * (x * y + w * z)
-    m[0, 2] = s * (x * z + w * y)
-    m[2, 0] = s * (x * z - w * y)
-    m[1, 2] = s * (y * z - w * x)
-    m[2, 1] = s * (y * z + w * x)
-
-
-@kernel
-def rotated_to_body(q: Array, k: Array, m: Array, out: Array) -> None:
-    """Components ``out[6]`` along the body axes of a fixed-frame tensor ``k[6]``; `m` is scratch (3, 3)."""
-    rotation_matrix(q, m)
-    for a in range(3):
-        # row a of m^T K
-        u0 = m[0, a] * k[0] + m[1, a] * k[3] + m[2, a] * k[4]
-        u1 = m[0, a] * k[3] + m[1, a] * k[1] + m[2, a] * k[5]
-        u2 = m[0, a] * k[4] + m[1, a] * k[5] + m[2, a] * k[2]
-        out[a] = u0 * m[0, a] + u1 * m[1, a] + u2 * m[2, a]
-        if a == 0:
-            out[3] = u0 * m[0, 1] + u1 * m[1, 1] + u2 * m[2, 1]
-            out[4] = u0 * m[0, 2] + u1 * m[1, 2] + u2 * m[2, 2]
-        elif a == 1:
-            out[5] = u0 * m[0, 2] + u1 * m[1, 2] + u2 * m[2, 2]
 
 
 @kernel
@@ -138,17 +75,6 @@ def rigid_rate(t: float, y: Array, dy: Array, par: Array, tide: TidePanels, work
     dy[1] = 0.5 * (y[0] * w0 + y[2] * w2 - y[3] * w1)
     dy[2] = 0.5 * (y[0] * w1 + y[3] * w0 - y[1] * w2)
     dy[3] = 0.5 * (y[0] * w2 + y[1] * w1 - y[2] * w0)
-
-
-@kernel
-def to_fixed_frame(y: Array, par: Array, m: Array, shape: Array, spin: Array) -> None:
-    """Write ``S`` (``shape[6]``) and ``w`` (``spin[3]``) of a RIGID state; ``m[3, 3]`` gets the rotation."""
-    rotation_matrix(y, m)
-    s1, s2, s3 = par[S1], par[S2], par[S3]
-    for c, (i, j) in enumerate(COMPONENTS):
-        shape[c] = s1 * m[i, 0] * m[j, 0] + s2 * m[i, 1] * m[j, 1] + s3 * m[i, 2] * m[j, 2]
-    for i in range(3):
-        spin[i] = m[i, 0] * y[4] + m[i, 1] * y[5] + m[i, 2] * y[6]
 
 
 @kernel
@@ -219,83 +145,6 @@ def field(t: float, y: Array, tide: TidePanels, work: Buffers) -> None:
 
 
 @kernel
-def gradient(y: Array, out: Array) -> None:
-    """Velocity gradient ``L = D + W`` of a 15-number state."""
-    unpack(y[6:12], out)
-    out[0, 1] -= y[14]
-    out[1, 0] += y[14]
-    out[0, 2] += y[13]
-    out[2, 0] -= y[13]
-    out[1, 2] -= y[12]
-    out[2, 1] += y[12]
-
-
-@kernel
-def set_gradient(m: Array, y: Array) -> None:
-    """Store ``D`` and ``w`` of a velocity gradient ``m[3, 3]`` in a 15-number state, or of its rate."""
-    pack(m, y[6:12])
-    y[12] = 0.5 * (m[2, 1] - m[1, 2])
-    y[13] = 0.5 * (m[0, 2] - m[2, 0])
-    y[14] = 0.5 * (m[1, 0] - m[0, 1])
-
-
-@kernel
-def dilatancy(volume: float, par: Array) -> tuple[float, float]:
-    """``beta`` and ``d beta/dV`` at ``V/V0``: constant, then faded to zero where the material is loosest.
-
-    Where NORMAL is on, the share of the dilation ``m(D')`` of the normal.
-
-    The fade is a cubic over the last tenth of the allowed expansion: a critical state reached smoothly.
-    """
-    beta = par[BETA]
-    end = par[EXPANSION]
-    begin = end - 0.1 * (end - 1.0)
-    if beta == 0.0 or volume <= begin:
-        return beta, 0.0
-    if volume >= end:
-        return 0.0, 0.0
-    x = (volume - begin) / (end - begin)
-    return beta * (1.0 - x * x * (3.0 - 2.0 * x)), -beta * 6.0 * x * (1.0 - x) / (end - begin)
-
-
-@kernel
-def flow_stress(d: Array, par: Array, unit: Array, n: Array) -> tuple[float, float, float, float]:
-    """Stress deviator ``n[3, 3]`` over ``p sin(phi) + c cos(phi)`` of a flow with rate of strain ``d[6]``.
-
-    Returns ``|D'|``, the norm of `n`, the support ``n:Dhat`` and the determinant of the unit stress deviator; sets
-    ``unit[6]`` to ``Dhat``.
-    """
-    _, norm, det = deviator(d, unit)
-    unpack(unit, n)
-    surface = int(par[SURFACE])
-    if par[NORMAL] == 0.0 or norm == 0.0:
-        g = slope_over_sine(surface, par[SIN_PHI], det)
-        for i in range(3):
-            for j in range(3):
-                n[i, j] *= g
-        return norm, g, g, det
-    part = int(par[PART])
-    if part == SMOOTH:
-        a, b, support, g, det = normal(surface, par[SIN_PHI], det)
-    else:
-        a, b, support, g, det = corner(par[SIN_PHI], det, part != COMPRESSION_CORNER)
-    isotropic(a, b, unit, n)
-    return norm, g, support, det
-
-
-@kernel
-def isotropic(a: float, b: float, u: Array, n: Array) -> None:
-    """Write the deviator ``n[3, 3] = a u + b (u^2 - 1/3)`` of a unit deviator ``u[6]``."""
-    u0, u1, u2, u3, u4, u5 = u[0], u[1], u[2], u[3], u[4], u[5]
-    n[0, 0] = a * u0 + b * (u0 * u0 + u3 * u3 + u4 * u4 - 1.0 / 3.0)
-    n[1, 1] = a * u1 + b * (u3 * u3 + u1 * u1 + u5 * u5 - 1.0 / 3.0)
-    n[2, 2] = a * u2 + b * (u4 * u4 + u5 * u5 + u2 * u2 - 1.0 / 3.0)
-    n[0, 1] = n[1, 0] = a * u3 + b * (u0 * u3 + u3 * u1 + u4 * u5)
-    n[0, 2] = n[2, 0] = a * u4 + b * (u0 * u4 + u3 * u5 + u4 * u2)
-    n[1, 2] = n[2, 1] = a * u5 + b * (u3 * u4 + u1 * u5 + u5 * u2)
-
-
-@kernel
 def _contract(a: Array, b: Array) -> float:
     """``A:B`` of two (3, 3) arrays."""
     total = 0.0
@@ -303,12 +152,6 @@ def _contract(a: Array, b: Array) -> float:
         for j in range(3):
             total += a[i, j] * b[i, j]
     return total
-
-
-@kernel
-def dilation(beta: float, norm: float, support: float, par: Array) -> float:
-    """``tr D`` of the flow rule: ``beta |D'|``, or the share `beta` of ``m(D')`` where NORMAL is on."""
-    return beta * norm * (support * par[SIN_PHI] if par[NORMAL] > 0.0 else 1.0)
 
 
 @kernel
@@ -440,17 +283,3 @@ def rate(regime: int, t: float, y: Array, dy: Array, par: Array, tide: TidePanel
         return 1.0
     field(t, y, tide, work)
     return deformation_rate(regime, y, dy, par, work)
-
-
-@kernel
-def angular_momentum(y: Array, work: Buffers, h: Array) -> None:
-    """Angular momentum ``H = axial(L S - S L^T)`` about the centre, per ``m/5``, of a 15-number state."""
-    big_l = work.m[W_L]
-    gradient(y, big_l)
-    unpack(y[0:6], work.m[W_S])
-    multiply(big_l, work.m[W_S], work.m[W_A])
-    a = work.m[W_A]
-    # H = int rho x x (L x) = axial vector of (L I) - (L I)^T
-    h[0] = a[2, 1] - a[1, 2]
-    h[1] = a[0, 2] - a[2, 0]
-    h[2] = a[1, 0] - a[0, 1]

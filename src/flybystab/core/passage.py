@@ -1,6 +1,6 @@
 """One run of the dynamics: SI floats and arrays in, SI arrays out.
 
-The kernels of :mod:`flybystab.core.regimes` work in the units of the body (see :mod:`flybystab.core.motion`);
+The kernels of :mod:`flybystab.core.regimes` work in the units of the body (see :mod:`flybystab.core.state`);
 this is the only place where the two systems meet.
 """
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.constants import G
-from flybystab.core import motion, regimes
+from flybystab.core import motion, regimes, state
 from flybystab.core.jit import inlined, kernel
 from flybystab.core.rheology import DRUCKER_PRAGER, EXTENSION_CONE, least_slope
 from flybystab.core.tensors import determinant, multiply, pack, unpack
@@ -79,18 +79,18 @@ def parameters(
     """Parameter array of the kernels from SI floats (`phi` in rad, `cohesion` in Pa, `viscosity` in Pa s)."""
     a0 = np.cbrt(axes[0] * axes[1] * axes[2])
     rate2 = np.pi * G * rho
-    par = np.zeros(motion.N_PARAMETERS)
-    par[motion.SURFACE] = surface
-    par[motion.SIN_PHI] = np.sin(phi)
-    par[motion.COS_PHI] = np.cos(phi)
-    par[motion.BETA] = dilatancy * least_slope(surface, np.sin(phi))
+    par = np.zeros(state.N_PARAMETERS)
+    par[state.SURFACE] = surface
+    par[state.SIN_PHI] = np.sin(phi)
+    par[state.COS_PHI] = np.cos(phi)
+    par[state.BETA] = dilatancy * least_slope(surface, np.sin(phi))
     # Associative flow on a slope k(theta) is the true normal; less dilatant flow goes along the stress deviator.
     if dilatancy >= 1.0 and surface not in (DRUCKER_PRAGER, EXTENSION_CONE):
-        par[motion.NORMAL] = 1.0
-        par[motion.BETA] = 1.0
-    par[motion.COHESION] = 5.0 * cohesion / (rho * a0 * a0 * rate2)
-    par[motion.VISCOSITY] = 10.0 * viscosity / (rho * a0 * a0 * np.sqrt(rate2))
-    par[motion.EXPANSION] = expansion
+        par[state.NORMAL] = 1.0
+        par[state.BETA] = 1.0
+    par[state.COHESION] = 5.0 * cohesion / (rho * a0 * a0 * rate2)
+    par[state.VISCOSITY] = 10.0 * viscosity / (rho * a0 * a0 * np.sqrt(rate2))
+    par[state.EXPANSION] = expansion
     motion.set_rigid_shape((axes[0] / a0) ** 2, (axes[1] / a0) ** 2, (axes[2] / a0) ** 2, par)
     return par
 
@@ -113,7 +113,7 @@ def _set_flowing(axes: Array, omega: Array, deformation: Array, attitude: Array,
     a[0, 1] -= omega[2]
     multiply(attitude, a, b)
     multiply(b, back, a)
-    motion.set_gradient(a, y)
+    state.set_gradient(a, y)
 
 
 @inlined
@@ -153,13 +153,13 @@ def carry(
     t0 = 1.0 / np.sqrt(np.pi * G * rho)
     a0 = np.cbrt(axes[0] * axes[1] * axes[2])
     par = parameters(axes, rho, phi, cohesion, dilatancy, surface, 0.0, expansion)
-    y = np.zeros(motion.N_FULL)
+    y = np.zeros(state.N_FULL)
     regimes.quaternion(attitude, y)
     for i in range(3):
         y[4 + i] = omega[i] * t0
-    start = motion.RIGID
+    start = state.RIGID
     if np.any(deformation != 0.0):
-        start = motion.FLOWING
+        start = state.FLOWING
         _set_flowing(axes / a0, omega * t0, deformation * t0, attitude, y)
     scaled = TidePanels(tide.tau / t0, tide.start, tide.width, tide.coefficients * t0**2)
     reason, t, regime = regimes.follow(
@@ -167,7 +167,7 @@ def carry(
         brittle, unyielding, max_steps, hist, events, count, mark,
     )  # fmt: skip
     unpack(y[0:6], shape)
-    motion.gradient(y, gradient)
+    state.gradient(y, gradient)
     for i in range(3):
         for j in range(3):
             shape[i, j] *= a0 * a0
@@ -182,6 +182,10 @@ def carry(
         events[i, 1] *= t0
     mark[1] *= t0
     return reason, t * t0, regime
+
+
+# Outside of a kernel the plain function, which calls the compiled `follow`; as a kernel it would be compiled anew.
+_carry = getattr(carry, "py_func", carry)
 
 
 def passage(
@@ -240,7 +244,7 @@ def passage(
     events = np.zeros((64, N_EVENT))
     count = np.zeros(4, dtype=np.int64)
     mark = np.zeros(2)
-    reason, time, regime = carry.py_func(
+    reason, time, regime = _carry(
         np.array(axes, dtype=float),
         rho,
         np.array(omega, dtype=float),

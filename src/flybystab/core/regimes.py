@@ -25,9 +25,13 @@ from numpy.typing import NDArray
 
 from flybystab.core.contact import FAILED, FREE, SLIDING, friction_impulse
 from flybystab.core.flow import follow_flow
+from flybystab.core.flow_rule import dilatancy
 from flybystab.core.free import follow_free
 from flybystab.core.jit import kernel
-from flybystab.core.motion import (
+from flybystab.core.motion import rigid_excess, set_rigid_shape
+from flybystab.core.rheology import flow_direction
+from flybystab.core.rigid import follow_rigid
+from flybystab.core.state import (
     COHESION,
     DISPERSED,
     FLOWING,
@@ -43,13 +47,8 @@ from flybystab.core.motion import (
     SURFACE,
     W_SCRATCH,
     angular_momentum,
-    dilatancy,
-    rigid_excess,
-    set_rigid_shape,
     to_fixed_frame,
 )
-from flybystab.core.rheology import flow_direction
-from flybystab.core.rigid import follow_rigid
 from flybystab.core.tensors import determinant, deviator, eigensystem
 from flybystab.core.tide import COMPONENTS, TidePanels
 from flybystab.core.workspace import (
@@ -186,7 +185,7 @@ def follow(
     y : ndarray (15,)
         State, overwritten with the last one, which is a 15-number state in any regime.
     par : ndarray (16,)
-        Parameters, see :mod:`flybystab.core.motion`; cohesion and rigid shape are updated.
+        Parameters, see :mod:`flybystab.core.state`; cohesion and rigid shape are updated.
     tol : float
         Relative error allowed in a step.
     limit : float

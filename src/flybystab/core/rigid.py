@@ -5,22 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from flybystab.core.flow_rule import dilatancy
 from flybystab.core.jit import code, kernel
-from flybystab.core.motion import (
-    COHESION,
-    N_RIGID,
-    NORMAL,
-    RIGID,
-    S1,
-    S2,
-    S3,
-    SIN_PHI,
-    SURFACE,
-    dilatancy,
-    rate,
-    rigid_excess,
-)
+from flybystab.core.motion import rate, rigid_excess
 from flybystab.core.rheology import required_friction, slope
+from flybystab.core.state import COHESION, N_RIGID, NORMAL, RIGID, S1, S2, S3, SIN_PHI, SURFACE
 from flybystab.core.steppers import explicit_at, explicit_dense, explicit_step
 from flybystab.core.tide import TidePanels
 from flybystab.core.workspace import DONE, N_SAMPLE, ONSET, STUCK, Counts, Workspace, copy, record

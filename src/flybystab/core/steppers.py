@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 from scipy.integrate._ivp import dop853_coefficients as _dop853
 
 from flybystab.core.jit import kernel
-from flybystab.core.motion import FLOWING, Buffers, deformation_rate, field, rate
+from flybystab.core.motion import deformation_rate, field, rate
+from flybystab.core.state import FLOWING, Buffers
 from flybystab.core.tide import TidePanels
 
 Array = NDArray[np.float64]

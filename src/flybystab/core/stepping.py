@@ -15,8 +15,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.core.contact import FAILED, FREE, REST, SLIDING, friction_impulse
+from flybystab.core.flow_rule import dilatancy, dilation
 from flybystab.core.jit import kernel
-from flybystab.core.motion import (
+from flybystab.core.motion import field
+from flybystab.core.rheology import normal
+from flybystab.core.state import (
     COHESION,
     N_FULL,
     N_WORK,
@@ -28,13 +31,9 @@ from flybystab.core.motion import (
     W_L,
     W_S,
     Buffers,
-    dilatancy,
-    dilation,
-    field,
     gradient,
     set_gradient,
 )
-from flybystab.core.rheology import normal
 from flybystab.core.tensors import determinant, deviator, multiply, pack, unpack
 from flybystab.core.tide import TidePanels
 from flybystab.core.workspace import copy

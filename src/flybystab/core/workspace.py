@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.core.jit import code, kernel
-from flybystab.core.motion import N_WORK, RIGID, W_SCRATCH, Buffers, to_fixed_frame
+from flybystab.core.state import N_WORK, RIGID, W_SCRATCH, Buffers, to_fixed_frame
 from flybystab.core.steppers import N_STAGES
 
 Array = NDArray[np.float64]

@@ -20,6 +20,7 @@ from flybystab.aggregate.body import Body
 from flybystab.core import motion
 from flybystab.core.judgement import N_ANSWER
 from flybystab.core.passage import parameters, passage
+from flybystab.core.state import FLOWING, N_WORK, Buffers
 from flybystab.core.stepping import follow_steps
 from flybystab.core.tide import TidePanels, tensor
 from flybystab.rows import MAX_STEPS, buffers, judge_rows, one_row
@@ -118,12 +119,12 @@ def rows(figure: str | Path | None = None, repeat: int = 5) -> list[dict[str, An
 
     # SciPy: from just after onset, where the flow is started as the default starts it, to just before arrest.
     history = exact.history
-    flowing = np.flatnonzero(history["regime"] == motion.FLOWING)
+    flowing = np.flatnonzero(history["regime"] == FLOWING)
     first, last = flowing[0], flowing[-1]
     start, stop = history["time"][first] / t0, history["time"][last] / t0
-    work = motion.Buffers(np.zeros((motion.N_WORK, 3, 3)), np.zeros((3, 6)))
+    work = Buffers(np.zeros((N_WORK, 3, 3)), np.zeros((3, 6)))
 
-    def state(i: int) -> Any:
+    def numbers(i: int) -> Any:
         gradient = history["velocity_gradient"][i] * t0
         d, w = 0.5 * (gradient + gradient.T), 0.5 * (gradient - gradient.T)
         shape = history["shape"][i] / a0**2
@@ -132,7 +133,7 @@ def rows(figure: str | Path | None = None, repeat: int = 5) -> list[dict[str, An
 
     def derivative(t: float, y: Any) -> Any:
         dy = np.zeros(15)
-        motion.rate(motion.FLOWING, t, y, dy, par, tide, work)
+        motion.rate(FLOWING, t, y, dy, par, tide, work)
         return dy
 
     from scipy.integrate import solve_ivp
@@ -146,7 +147,7 @@ def rows(figure: str | Path | None = None, repeat: int = 5) -> list[dict[str, An
                 return solve_ivp(
                     derivative,
                     (start, stop),
-                    state(first),
+                    numbers(first),
                     method=method,
                     rtol=tolerance,
                     atol=tolerance * 1e-4,
