@@ -150,7 +150,7 @@ def test_degenerate_principal_axes(axes):
 
 @pytest.mark.parametrize("dilatancy", [0.0, 0.35, 1.0])
 def test_a_sphere_that_yields_on_a_corner_of_the_section(dilatancy):
-    """Stress and strain of a sphere without spin stay at triaxial extension, a kink of Mohr-Coulomb, in each integrator."""
+    """Stress and strain of a sphere without spin stay on a kink of Mohr-Coulomb, in each integrator."""
     body = Body(
         [250, 250, 250] * u.m,
         1300 * u.kg / u.m**3,
