@@ -20,6 +20,7 @@ from scipy.spatial.transform import Rotation
 from flybystab.aggregate.body import YIELD_SURFACES, Body
 from flybystab.core import state
 from flybystab.core.rheology import required_friction
+from flybystab.core.tide import tensor
 from flybystab.core.workspace import ARREST, CONTACT, JAM, LOSS, ONSET
 from flybystab.errors import InvalidInput
 from flybystab.flybys import flyby
@@ -292,12 +293,27 @@ def test_many_impacts_in_a_row():
     assert apart[2] < 3e-4
 
 
+@pytest.mark.parametrize("beyond", [1e-3, 1e-5, 1e-8, -1e-5])
+def test_the_first_end_of_dispersed_motion_is_the_one_that_counts(beyond):
+    """Grains meet again shortly before or after the axis ratio where the model is left, in one and the same step."""
+    body = PILE.with_(spin=[0, 0, 0] * u.rad / u.s)
+    rate = np.diag([1.2, -0.2, -0.5]) / body.dynamical_time
+    start = {"regime": state.DISPERSED, "tolerance": 1e-9}
+    _, _, log, rows = deforming(body, rate, 2.0 * body.dynamical_time, **start)
+    assert log[0][0] == CONTACT
+    met = axes_of(tensor(rows[rows[:, 0] == log[0][1], 1:])[0])
+    _, _, log, _ = deforming(
+        body, rate, 2.0 * body.dynamical_time, limit=met[0] / met[2] * (1.0 + beyond), **start
+    )
+    assert [what for what, _ in log] == ([CONTACT] if beyond > 0.0 else [])
+
+
 def test_frictionless_impulse_is_the_closed_form():
     """beta = 0 and no friction: L += -(tr L/tr S^-1) S^-1."""
     from flybystab.core.contact import SLIDING, friction_impulse
     from flybystab.core.passage import parameters
     from flybystab.core.state import N_WORK, Buffers
-    from flybystab.core.tide import components, tensor
+    from flybystab.core.tide import components
 
     rng = np.random.default_rng(4)
     body = Body(semi_axes=[700, 500, 400] * u.m, density=DENSITY, material=material(0.0))

@@ -18,6 +18,14 @@ Array = NDArray[np.float64]
 
 
 @kernel
+def _end(regime: int, y: Array, lost: float, limit: float, ws: Workspace) -> int:
+    """CONTACT below the squared volume `lost`, BEYOND past the axis ratio `limit`, or DONE."""
+    if regime == DISPERSED and determinant(y[0:6]) < lost:
+        return CONTACT
+    return BEYOND if axis_ratio2(y, ws) > limit * limit else DONE
+
+
+@kernel
 def follow_free(
     regime: int,
     t: float,
@@ -69,28 +77,25 @@ def follow_free(
         explicit_dense(regime, t, y, N_FULL, h, par, tide, ws.work, k, ws.y1, ws.ys, ws.dense)
         found = 2.0
         low = 0.0
-        reason = DONE
         for j in range(1, 2 * N_SAMPLE + 1):
             x = 0.5 * j / N_SAMPLE
             explicit_at(x, y, N_FULL, ws.dense, ws.ys)
-            if axis_ratio2(ws.ys, ws) > limit * limit:
-                found, reason = x, BEYOND
-                break
-            if regime == DISPERSED and determinant(ws.ys[0:6]) < lost:
-                found, reason = x, CONTACT
+            if _end(regime, ws.ys, lost, limit, ws) != DONE:
+                found = x
                 break
             low = x
         if found <= 1.0:
+            # Both ends may be passed between two samples: the root of the first of them.
             high = found
             for _ in range(55):
                 mid = 0.5 * (low + high)
                 explicit_at(mid, y, N_FULL, ws.dense, ws.ys)
-                if (reason == BEYOND and axis_ratio2(ws.ys, ws) > limit * limit) or (
-                    reason == CONTACT and determinant(ws.ys[0:6]) < lost
-                ):
+                if _end(regime, ws.ys, lost, limit, ws) != DONE:
                     high = mid
                 else:
                     low = mid
+            explicit_at(high, y, N_FULL, ws.dense, ws.ys)
+            reason = _end(regime, ws.ys, lost, limit, ws)
             explicit_step(regime, t, y, N_FULL, high * h, par, tide, ws.work, k, ws.scale, ws.y1)
             copy(ws.y1, y, N_FULL)
             record(t + high * h, regime, y, par, 0.0, 0.0, 0.0, ws, hist, count)
