@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from flybystab.aggregate.body import Body, Material
 from flybystab.constants import R_EARTH, G
 from flybystab.core import state
+from flybystab.core.ground import no_ground
 from flybystab.core.passage import Passage, parameters, passage
 from flybystab.core.regimes import follow
 from flybystab.core.stepping import follow_steps
@@ -165,7 +166,7 @@ def deforming(
     history, events = np.zeros((20000, N_HISTORY)), np.zeros((64, N_EVENT))
     count, mark = np.zeros(4, dtype=np.int64), np.zeros(2)
     follow(
-        0.0, t_stop / t0, t_stop / t0, regime, y, par, scaled, tolerance, limit, m.brittle, False,
+        0.0, t_stop / t0, t_stop / t0, regime, y, par, scaled, no_ground(), tolerance, limit, m.brittle, False,
         200_000, history, events, count, mark,
     )  # fmt: skip
     w = y[12:15]

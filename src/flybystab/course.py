@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from flybystab.aggregate.body import Body
 from flybystab.attitudes import attitude_matrix, periapsis_axes
 from flybystab.core.jit import kernel
+from flybystab.core.judgement import NEAR_GROUND
 from flybystab.core.passage import passage
 from flybystab.core.state import rotated_to_body, rotation_matrix
 from flybystab.core.tide import TidePanels, tide_at
@@ -86,7 +87,7 @@ def rigid_course(
     if not isinstance(encounter, Encounter):
         raise InvalidInput("encounter", encounter, "a flybystab.Encounter")
     rotation = periapsis_axes(encounter).T @ attitude_matrix(attitude)
-    start, stop, limit, _ = span_of(body, encounter)
+    start, stop, limit = span_of(encounter)
     material = body.material
     run = passage(
         body.axes,
@@ -104,6 +105,7 @@ def rigid_course(
         tolerance=tolerance,
         max_axis_ratio=np.inf,
         keep=ROWS,
+        ground=encounter.ground if encounter.height <= NEAR_GROUND * body.axes[0] else None,
     )
     if run.reason == "stuck" or run.history is None:
         raise NotConverged(f"the rigid course stopped {run.time - start:.1f} s after the start")

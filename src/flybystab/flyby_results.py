@@ -121,7 +121,7 @@ class FlybyResult:
     onset_time, arrest_time : Quantity or None
         First yield and last arrest since the start of the encounter; None if there was none.
     end_time : Quantity
-        End of the run, since the start of the encounter.
+        End of the run, since the start of the encounter; on an IMPACT the first touch.
     max_required_friction_angle : Quantity
         Largest friction angle that the body mobilises if it stays rigid throughout; inf if none would do.
     margin : Quantity
@@ -175,6 +175,18 @@ class FlybyResult:
     modelled: tuple[str, ...] = field(repr=False)
     left_out: tuple[tuple[str, float], ...] = field(repr=False)
     encounter: Encounter = field(repr=False)
+
+    @property
+    def contact(self) -> str | None:
+        """What reaches the ground on an IMPACT, None otherwise.
+
+        ``"path"``: the closest approach lies below the top of the atmosphere (the surface, if there is none);
+        ``"body"``: the centre would pass above it, but the body is large enough there, towards the planet, to touch it.
+        The run ends with the first touch: `end_time`.
+        """
+        if self.verdict != Verdict.IMPACT:
+            return None
+        return "path" if self.encounter.impact else "body"
 
     def __repr__(self) -> str:
         letter = f" ({self.verdict_class})" if self.verdict_class else ""

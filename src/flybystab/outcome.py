@@ -24,7 +24,7 @@ class Verdict(StrEnum):
     MASS_LOSS = "MASS LOSS"
     #: Lost half of its mass or more: class S.
     DISRUPTED = "DISRUPTED"
-    #: Reached the surface or the atmosphere, with its centre or within its long semi-axis.
+    #: Reached the surface or the atmosphere with any part of it.
     IMPACT = "IMPACT"
     #: Passed the axis ratio beyond which a homogeneous ellipsoid says nothing.
     BEYOND_MODEL = "BEYOND MODEL"

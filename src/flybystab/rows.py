@@ -8,10 +8,10 @@ from typing import Any, NamedTuple
 import astropy.units as u
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq
 
 from flybystab.aggregate.body import Body
 from flybystab.core import judgement
+from flybystab.core.ground import no_ground
 from flybystab.core.passage import REGIMES, event_log, unpacked_history
 from flybystab.core.workspace import N_EVENT, N_HISTORY
 from flybystab.errors import InvalidInput
@@ -112,29 +112,34 @@ def one_row(body: Body, encounter: Encounter, rotation: Array | None = None) -> 
 
 def columns(bodies: Sequence[Body], rotations: Array, encounters: Sequence[Encounter]) -> tuple[Any, ...]:
     """Bodies and encounters as the arrays of `judge_rows`; the same encounter is stored once."""
-    # who touches the planet where the centre does not ends a run of its own
-    room = {key: clearance(e) for key, e in {id(e): e for e in encounters}.items()}
-    keys = [(id(e), id(b) if b.axes[0] > room[id(e)] else 0) for b, e in zip(bodies, encounters, strict=True)]
-    met = {key: (b, e) for key, b, e in zip(keys, bodies, encounters, strict=True)}
+    met = {id(e): e for e in encounters}
     place = {key: k for k, key in enumerate(met)}
-    tides = [e.tide for _, e in met.values()]
-    first = np.concatenate([[0], np.cumsum([len(t.coefficients) for t in tides])]).astype(np.int64)
-    degree = max(t.coefficients.shape[1] for t in tides)
-    coefficients = np.zeros((first[-1], degree, 6))  # a series of lower degree ends in zeros
-    for t, k in zip(tides, first, strict=False):
-        coefficients[k : k + len(t.coefficients), : t.coefficients.shape[1]] = t.coefficients
+    tides = [e.tide for e in met.values()]
+    # The way above the ground is made for encounters in which one of these bodies is near it.
+    longest = judgement.NEAR_GROUND * max(b.axes[0] for b in bodies)
+    grounds = [e.ground if e.height <= longest else no_ground() for e in met.values()]
     return (
         np.array([b.axes for b in bodies]),
         np.array([b.rho for b in bodies]),
         np.array([b.omega for b in bodies]),
         np.ascontiguousarray(rotations),
         np.array([_material(b) for b in bodies]),
-        np.array([place[key] for key in keys], dtype=np.int64),
-        np.array([span_of(b, e) for b, e in met.values()]),
+        np.array([place[id(e)] for e in encounters], dtype=np.int64),
+        np.array([span_of(e) for e in met.values()]),
         np.array([[t.tau, t.start, t.width] for t in tides]),
-        first,
-        coefficients,
+        *_joined([t.coefficients for t in tides]),
+        np.array([[g.tau, g.start, g.width, g.floor, g.least] for g in grounds]),
+        *_joined([g.coefficients for g in grounds]),
     )
+
+
+def _joined(series: Sequence[Array]) -> tuple[NDArray[np.int64], Array]:
+    """Where each of the series begins in one array of them all, and the array; one of lower degree ends in zeros."""
+    first = np.concatenate([[0], np.cumsum([len(s) for s in series])]).astype(np.int64)
+    out = np.zeros((first[-1], max(s.shape[1] for s in series), series[0].shape[2]))
+    for s, k in zip(series, first, strict=False):
+        out[k : k + len(s), : s.shape[1]] = s
+    return first, out
 
 
 def _material(body: Body) -> Array:
@@ -142,40 +147,12 @@ def _material(body: Body) -> Array:
     return np.array([m.phi, m.c_pa, m.dilatancy, m.surface_code, m.brittle], dtype=float)
 
 
-def clearance(encounter: Encounter) -> float:
-    """Height of the centre above atmosphere or surface at closest approach, m; infinite on an impact of the centre."""
-    if encounter.impact:
-        return np.inf
-    return float(encounter.distance.to_value(u.m)) - encounter.planet.impact_distance
-
-
-def contact_time(body: Body, encounter: Encounter) -> float | None:
-    """When atmosphere or surface is reached, s from closest approach; None if it is not.
-
-    A body whose centre passes above them touches them once they are within its long semi-axis. Which way the body
-    points then is left out: a height below the long semi-axis counts as contact.
-    """
-    if encounter.impact:
-        return encounter.impact_time
-    if body.axes[0] <= clearance(encounter):
-        return None
-    reach = encounter.planet.impact_distance + body.axes[0]
-
-    def above(t: float) -> float:
-        return float(encounter.radius(t)[0]) - reach
-
-    if above(encounter.t_start) <= 0.0:
-        return encounter.t_start
-    return float(brentq(above, encounter.t_start, 0.0, xtol=1e-6))
-
-
-def span_of(body: Body, encounter: Encounter) -> Array:
-    """Start, rest and stop (s, clock of the tide), and whether the planet is hit: a row of spans of `judge_rows`."""
+def span_of(encounter: Encounter) -> Array:
+    """Start, rest and stop, s, clock of the tide: a row of spans of `judge_rows`."""
     stop, limit = encounter.t_stop, encounter.t_stop + TAIL
-    contact = contact_time(body, encounter)
-    if contact is not None:
-        stop = limit = max(contact, encounter.t_start)
-    return np.array([encounter.t_start, stop, limit, encounter.impact or contact is not None], dtype=float)
+    if encounter.impact_time is not None:  # a body of any size has touched the ground by then
+        stop = limit = max(encounter.impact_time, encounter.t_start)
+    return np.array([encounter.t_start, stop, limit], dtype=float)
 
 
 def failure_of(out: Array, encounter: Encounter, tolerance: float) -> str:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from flybystab.core.ground import Ground, touches
 from flybystab.core.jit import kernel
 from flybystab.core.motion import rate
 from flybystab.core.rheology import MOHR_COULOMB
@@ -43,6 +44,7 @@ from flybystab.core.workspace import (
     N_SAMPLE,
     STUCK,
     SWITCH,
+    TOUCH,
     Counts,
     Workspace,
     copy,
@@ -237,6 +239,7 @@ def follow_flow(
     t1: float,
     par: Array,
     tide: TidePanels,
+    ground: Ground,
     tol: float,
     limit: float,
     max_steps: int,
@@ -258,6 +261,7 @@ def follow_flow(
     slow = 0.0  # |D| at which explicit steps end
     implicit_ahead = 0
     limit2 = limit * limit
+    touched = False
     near = 1e-6 + 10.0 * tol  # the direction of D is known no better
     fastest = 0.0
     choose_part(t, y, par, tide, near, ws)
@@ -322,6 +326,14 @@ def follow_flow(
         # On the way and at the end: has one of the event functions changed its sign?
         if explicit:
             explicit_dense(FLOWING, t, y, N_FULL, h, par, tide, ws.work, ws.k, ws.y1, ws.ys, ws.dense)
+        if not touched:
+            end_time = touches(FLOWING, explicit, t, h, par, ground, ws)
+            if end_time < np.inf:  # the step again, up to there
+                touched = True
+                t1 = end_time
+                count[0] = max(count[0] - 1, 0)
+                _health(t, y, f0, par, tide, limit2, ws)
+                continue
         found = 2.0
         low = 0.0
         points = 4 if explicit else 2
@@ -375,4 +387,5 @@ def follow_flow(
             _record_end(t, y, f0, par, tide, limit2, ws, hist, count)
             return ARREST, t
         h *= min(growth, max(0.2, 0.9 * error ** (-0.125 if explicit else -0.2))) if error > 0.0 else growth
-    return DONE, t
+    _record_end(t, y, f0, par, tide, limit2, ws, hist, count)
+    return TOUCH if touched else DONE, t

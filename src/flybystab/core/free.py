@@ -6,13 +6,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.core.flow import axis_ratio2
+from flybystab.core.ground import Ground, touches
 from flybystab.core.jit import kernel
 from flybystab.core.motion import rate
 from flybystab.core.state import DISPERSED, FLUID, N_FULL, W_SCRATCH
 from flybystab.core.steppers import explicit_at, explicit_dense, explicit_step
 from flybystab.core.tensors import determinant
 from flybystab.core.tide import TidePanels
-from flybystab.core.workspace import BEYOND, CONTACT, DONE, N_SAMPLE, STUCK, Counts, Workspace, copy, record
+from flybystab.core.workspace import (
+    BEYOND,
+    CONTACT,
+    DONE,
+    N_SAMPLE,
+    STUCK,
+    TOUCH,
+    Counts,
+    Workspace,
+    copy,
+    record,
+)
 
 Array = NDArray[np.float64]
 
@@ -32,6 +44,7 @@ def follow_free(
     t1: float,
     par: Array,
     tide: TidePanels,
+    ground: Ground,
     tol: float,
     limit: float,
     max_steps: int,
@@ -39,10 +52,11 @@ def follow_free(
     hist: Array,
     count: Counts,
 ) -> tuple[int, float]:
-    """Dispersed or fluid motion of ``ws.y`` up to contact, the axis ratio `limit` or `t1`; (reason, time)."""
+    """Dispersed or fluid motion of ``ws.y`` up to contact, the ratio `limit`, the ground or `t1`; (reason, time)."""
     y = ws.y
     k = ws.k
     h = 1e-2
+    touched = False
     lost = determinant(y[0:6])
     rate(regime, t, y, k[0], par, tide, ws.work)
     while t < t1:
@@ -75,6 +89,13 @@ def follow_free(
                 return STUCK, t
             continue
         explicit_dense(regime, t, y, N_FULL, h, par, tide, ws.work, k, ws.y1, ws.ys, ws.dense)
+        if not touched:
+            end_time = touches(regime, True, t, h, par, ground, ws)
+            if end_time < np.inf:  # the step again, up to there
+                touched = True
+                t1 = end_time
+                count[0] = max(count[0] - 1, 0)
+                continue
         found = 2.0
         low = 0.0
         for j in range(1, 2 * N_SAMPLE + 1):
@@ -106,4 +127,6 @@ def follow_free(
         h *= min(5.0, max(0.3, 0.9 * error ** (-0.125))) if error > 0.0 else 5.0
         if tide.coefficients.shape[0] > 0:
             h = min(h, 0.4 * np.sqrt(t * t + tide.tau * tide.tau))
-    return DONE, t
+    p = ws.work.m[W_SCRATCH, 1, 2] if regime == FLUID else 0.0
+    record(t, regime, y, par, p, 0.0, 0.0, ws, hist, count)
+    return TOUCH if touched else DONE, t

@@ -6,13 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.constants import G
+from flybystab.core.ground import Ground
 from flybystab.core.jit import code, inlined, kernel
 from flybystab.core.outcome import angle_between, bound_share, momentum, principal_axes, spin_vector
 from flybystab.core.passage import carry
 from flybystab.core.state import RIGID
 from flybystab.core.statics import demand, overload, rigid_stress
 from flybystab.core.tide import TidePanels
-from flybystab.core.workspace import BEYOND, N_EVENT, N_HISTORY, ONSET, STUCK, Counts
+from flybystab.core.workspace import BEYOND, N_EVENT, N_HISTORY, ONSET, STUCK, TOUCH, Counts
 
 Array = NDArray[np.float64]
 
@@ -37,12 +38,14 @@ SURFACE = 3  # code
 BRITTLE = 4  # 0 or 1
 N_MATERIAL = 5
 
-# Columns of an encounter: times (s), and whether it ends in the planet (0 or 1).
+# Columns of an encounter: times (s).
 START = 0
 REST = 1  # a body that is rigid after this ends the run
 STOP = 2
-HITS = 3
-N_SPAN = 4
+N_SPAN = 3
+
+#: A body whose centre stays higher than this many long semi-axes is not looked at for touching the ground.
+NEAR_GROUND = 100.0
 
 # Columns of a row of answers.
 VERDICT = 0
@@ -78,6 +81,7 @@ def judge(
     material: Array,
     span: Array,
     tide: TidePanels,
+    ground: Ground,
     tolerance: float,
     limit: float,
     needs: bool,
@@ -95,10 +99,12 @@ def judge(
     ----------
     axes, rho, omega, attitude
         As in :func:`flybystab.core.passage.passage`.
-    material, span : ndarray (5,), (4,)
+    material, span : ndarray (5,), (3,)
         See the columns above.
     tide : TidePanels
         SI.
+    ground : Ground
+        A body that reaches it ends there.
     tolerance, limit, max_steps
         Relative error a step, axis ratio where the model is left (never below that of the body), most steps.
     needs : bool
@@ -122,9 +128,9 @@ def judge(
     mark = np.zeros(2)
     # A body that cannot exist on its own is not carried on: its demand at the start is the answer.
     reason, time, regime = carry(
-        axes, rho, omega, attitude, span[START], span[STOP], span[REST], tide, material[PHI],
-        material[COHESION], material[DILATANCY], surface, material[BRITTLE] > 0.0, 1.5, not holds, tolerance,
-        ratio, max_steps, shape, gradient, hist, events, count, mark, np.zeros((3, 3)),
+        axes, rho, omega, attitude, span[START], span[STOP], span[REST], tide, ground,
+        material[PHI], material[COHESION], material[DILATANCY], surface, material[BRITTLE] > 0.0, 1.5,
+        not holds, tolerance, ratio, max_steps, shape, gradient, hist, events, count, mark, np.zeros((3, 3)),
     )  # fmt: skip
     out[TIME], out[REASON], out[REGIME], out[STEPS] = time, reason, regime, count[2]
     out[FRICTION], out[FRICTION_TIME] = mark[0], mark[1]
@@ -153,13 +159,13 @@ def judge(
         no_events = np.zeros((1, N_EVENT))
         tries = np.zeros(4, dtype=np.int64)
         second, _, _ = carry(
-            axes, rho, omega, attitude, span[START], span[STOP], span[REST], tide, material[PHI],
-            material[COHESION], material[DILATANCY], surface, False, 1.5, True, tolerance,
+            axes, rho, omega, attitude, span[START], span[STOP], span[REST], tide, ground,
+            material[PHI], material[COHESION], material[DILATANCY], surface, False, 1.5, True, tolerance,
             ratio, max_steps, still, first, no_rows, no_events, tries, mark, np.zeros((3, 3)),
         )  # fmt: skip
         out[FRICTION], out[FRICTION_TIME] = mark[0], mark[1]
         reason = STUCK if second == STUCK else reason
-    out[VERDICT] = _verdict(reason, holds, span[HITS] > 0.0, yielded, bound)
+    out[VERDICT] = _verdict(reason, holds, out[REASON] == TOUCH or ground.least < 0.0, yielded, bound)
 
 
 @kernel
@@ -206,6 +212,9 @@ def judge_rows(
     scales: Array,
     first: NDArray[np.int64],
     coefficients: Array,
+    grounds: Array,
+    first_ground: NDArray[np.int64],
+    positions: Array,
     tolerance: float,
     limit: float,
     max_steps: int,
@@ -225,10 +234,14 @@ def judge_rows(
     axes, rho, omega, attitude, material : ndarray (n, 3), (n,), (n, 3), (n, 3, 3), (n, 5)
     which : ndarray of int (n,)
         Encounter of each row.
-    spans, scales : ndarray (e, 4), (e, 3)
+    spans, scales : ndarray (e, 3), (e, 3)
         Of each encounter: its span; ``tau``, ``start`` and ``width`` of its panels.
     first : ndarray of int (e + 1,)
         Where its panels begin in ``coefficients[panels, degree + 1, 6]``.
+    grounds : ndarray (e, 5)
+        Of each encounter: the first five of :class:`flybystab.core.ground.Ground`.
+    first_ground : ndarray of int (e + 1,)
+        Where its panels begin in ``positions[panels, degree + 1, 3]``.
     shape, gradient, hist, events, count
         As in `judge`, of the last row.
     """
@@ -240,8 +253,13 @@ def judge_rows(
             scales[e, 2],
             np.ascontiguousarray(coefficients[first[e] : first[e + 1]]),
         )
+        g = grounds[e]
+        a, b = first_ground[e], first_ground[e + 1]
+        if g[4] > NEAR_GROUND * axes[i, 0]:
+            b = a
+        ground = Ground(g[0], g[1], g[2], g[3], g[4], 1.0, np.ascontiguousarray(positions[a:b]))
         count[:] = 0
         judge(
-            axes[i], rho[i], omega[i], attitude[i], material[i], spans[e], tide, tolerance, limit, needs,
-            max_steps, shape, gradient, hist, events, count, out[i],
+            axes[i], rho[i], omega[i], attitude[i], material[i], spans[e], tide, ground, tolerance,
+            limit, needs, max_steps, shape, gradient, hist, events, count, out[i],
         )  # fmt: skip

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from flybystab.constants import G
 from flybystab.core import motion, regimes, state
+from flybystab.core.ground import Ground, no_ground
 from flybystab.core.jit import inlined, kernel
 from flybystab.core.rheology import DRUCKER_PRAGER, EXTENSION_CONE, least_slope
 from flybystab.core.tensors import determinant, multiply, pack, unpack
@@ -22,7 +23,9 @@ from flybystab.core.workspace import N_EVENT, N_HISTORY, Counts
 Array = NDArray[np.float64]
 
 REGIMES = ("rigid", "flowing", "dispersed", "fluid")
-EVENTS = ("done", "onset", "arrest", "loss of contact", "contact", "beyond model", "jam", "stuck")
+EVENTS = (
+    "done", "onset", "arrest", "loss of contact", "contact", "beyond model", "jam", "stuck", "switch", "ground"
+)  # fmt: skip
 
 
 class Passage(NamedTuple):
@@ -31,7 +34,7 @@ class Passage(NamedTuple):
     Attributes
     ----------
     reason : str
-        "done", "beyond model" (axis ratio past the limit) or "stuck".
+        "done", "ground" (reached), "beyond model" (axis ratio past the limit) or "stuck".
     regime : str
         Regime at the end.
     time : float
@@ -126,6 +129,7 @@ def carry(
     t_stop: float,
     t_rest: float,
     tide: TidePanels,
+    ground: Ground,
     phi: float,
     cohesion: float,
     dilatancy: float,
@@ -162,8 +166,11 @@ def carry(
         start = state.FLOWING
         _set_flowing(axes / a0, omega * t0, deformation * t0, attitude, y)
     scaled = TidePanels(tide.tau / t0, tide.start, tide.width, tide.coefficients * t0**2)
+    below = Ground(
+        ground.tau / t0, ground.start, ground.width, ground.floor, ground.least, a0, ground.coefficients
+    )
     reason, t, regime = regimes.follow(
-        t_start / t0, t_stop / t0, t_rest / t0, start, y, par, scaled, tolerance, max_axis_ratio,
+        t_start / t0, t_stop / t0, t_rest / t0, start, y, par, scaled, below, tolerance, max_axis_ratio,
         brittle, unyielding, max_steps, hist, events, count, mark,
     )  # fmt: skip
     unpack(y[0:6], shape)
@@ -210,6 +217,7 @@ def passage(
     max_steps: int = 200_000,
     keep: int = 0,
     deformation: Array | None = None,
+    ground: Ground | None = None,
 ) -> Passage:
     """Follow a body that starts rigid, or in flow, through a tide.
 
@@ -238,6 +246,8 @@ def passage(
         Rows of history to keep at most; 0 for none.
     deformation : ndarray (3, 3), optional
         Velocity gradient along the body axes, 1/s, on top of the spin: the body starts in flow.
+    ground : Ground, optional
+        Ends the run where the body reaches it; none by default.
     """
     shape, gradient = np.empty((3, 3)), np.empty((3, 3))
     hist = np.zeros((max(keep, 1), N_HISTORY))
@@ -253,6 +263,7 @@ def passage(
         t_stop,
         t_stop if t_rest is None else t_rest,
         tide,
+        no_ground() if ground is None else ground,
         phi,
         cohesion,
         dilatancy,

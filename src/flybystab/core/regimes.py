@@ -14,6 +14,8 @@ DISPERSED  the volume is back at its value at the loss of contact        inelast
                                                                          FLOWING or RIGID
 =========  ============================================================  ==========================
 
+A body that reaches the ground (:mod:`flybystab.core.ground`) ends the run in any regime.
+
 Every end is a root on the dense output, and the step is then repeated up to the root. `D_REST`, the rate of
 strain at which flow starts and ends, is 1e-10 of the dynamical rate: its share of any result is of that size.
 """
@@ -27,6 +29,7 @@ from flybystab.core.contact import FAILED, FREE, SLIDING, friction_impulse
 from flybystab.core.flow import follow_flow
 from flybystab.core.flow_rule import dilatancy
 from flybystab.core.free import follow_free
+from flybystab.core.ground import Ground
 from flybystab.core.jit import kernel
 from flybystab.core.motion import rigid_excess, set_rigid_shape
 from flybystab.core.rheology import flow_direction
@@ -163,6 +166,7 @@ def follow(
     y: Array,
     par: Array,
     tide: TidePanels,
+    ground: Ground,
     tol: float,
     limit: float,
     brittle: bool,
@@ -186,6 +190,8 @@ def follow(
         State, overwritten with the last one, which is a 15-number state in any regime.
     par : ndarray (16,)
         Parameters, see :mod:`flybystab.core.state`; cohesion and rigid shape are updated.
+    ground : Ground
+        Its surface ends the run; times in dynamical ones.
     tol : float
         Relative error allowed in a step.
     limit : float
@@ -202,7 +208,7 @@ def follow(
     Returns
     -------
     reason, time, regime
-        DONE, BEYOND or STUCK; the time reached; the regime there.
+        DONE, TOUCH, BEYOND or STUCK; the time reached; the regime there.
     """
     ws = workspace()
     copy(y, ws.y, N_FULL)
@@ -217,7 +223,7 @@ def follow(
             break
         if regime == RIGID:
             reason, t = follow_rigid(
-                t, min(t1, t_rest), par, tide, tol, unyielding, max_steps, ws, hist, count
+                t, min(t1, t_rest), par, tide, ground, tol, unyielding, max_steps, ws, hist, count
             )
             if reason != ONSET:
                 break
@@ -228,7 +234,7 @@ def follow(
             loosen(ws.y, par, ws)
             regime = FLOWING
         elif regime == FLOWING:
-            reason, t = follow_flow(t, t1, par, tide, tol, limit, max_steps, ws, hist, count)
+            reason, t = follow_flow(t, t1, par, tide, ground, tol, limit, max_steps, ws, hist, count)
             volume = np.sqrt(determinant(ws.y[0:6]))
             if reason in (ARREST, JAM):
                 det = ws.work.m[W_SCRATCH, 2, 0]
@@ -241,7 +247,7 @@ def follow(
             else:
                 break
         else:
-            reason, t = follow_free(regime, t, t1, par, tide, tol, limit, max_steps, ws, hist, count)
+            reason, t = follow_free(regime, t, t1, par, tide, ground, tol, limit, max_steps, ws, hist, count)
             if reason != CONTACT:
                 break
             log(CONTACT, t, 0.0, np.sqrt(determinant(ws.y[0:6])), events, count)

@@ -6,13 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.core.flow_rule import dilatancy
+from flybystab.core.ground import Ground, touches
 from flybystab.core.jit import code, kernel
 from flybystab.core.motion import rate, rigid_excess
 from flybystab.core.rheology import required_friction, slope
 from flybystab.core.state import COHESION, N_RIGID, NORMAL, RIGID, S1, S2, S3, SIN_PHI, SURFACE
 from flybystab.core.steppers import explicit_at, explicit_dense, explicit_step
 from flybystab.core.tide import TidePanels
-from flybystab.core.workspace import DONE, N_SAMPLE, ONSET, STUCK, Counts, Workspace, copy, record
+from flybystab.core.workspace import DONE, N_SAMPLE, ONSET, STUCK, TOUCH, Counts, Workspace, copy, record
 
 Array = NDArray[np.float64]
 
@@ -133,6 +134,7 @@ def follow_rigid(
     t1: float,
     par: Array,
     tide: TidePanels,
+    ground: Ground,
     tol: float,
     unyielding: bool,
     max_steps: int,
@@ -140,7 +142,7 @@ def follow_rigid(
     hist: Array,
     count: Counts,
 ) -> tuple[int, float]:
-    """Rigid motion of ``ws.y[:7]`` up to yield or `t1`; returns (reason, time)."""
+    """Rigid motion of ``ws.y[:7]`` up to yield, the ground or `t1`; returns (reason, time)."""
     y = ws.y
     k = ws.k
     h = min(0.05, t1 - t) if ws.mark[2] <= 0.0 else min(ws.mark[2], t1 - t)
@@ -152,6 +154,7 @@ def follow_rigid(
     # A step never spans more of the change of variable of the tide than its panels resolve, and less of it for a
     # smaller tolerance: else runs of different tolerance would share their steps, and their errors.
     reach = 0.4 * (1e3 * tol) ** 0.05
+    touched = False
     f = ws.sample
     f[0, N_SAMPLE] = _onset(excess, p, norm, det, par, ws.stress)
     f[1, N_SAMPLE] = required_friction(surface, cohesion, norm, p, det)
@@ -175,6 +178,12 @@ def follow_rigid(
             h *= max(0.2, 0.9 * error ** (-0.125)) if np.isfinite(error) else 0.2
             continue
         explicit_dense(RIGID, t, y, N_RIGID, h, par, tide, ws.work, k, ws.y1, ws.ys, ws.dense)
+        if not touched:
+            end_time = touches(RIGID, True, t, h, par, ground, ws)
+            if end_time < np.inf:  # the step again, up to there
+                touched = True
+                t1 = end_time
+                continue
         f[0, 0], f[1, 0] = f[0, N_SAMPLE], f[1, N_SAMPLE]
         end = 2.0  # fraction at which the body yields
         for j in range(1, N_SAMPLE + 1):
@@ -251,7 +260,7 @@ def follow_rigid(
         h *= min(5.0, max(0.3, 0.9 * error ** (-0.125))) if error > 0.0 else 5.0
         h = min(h, reach * np.sqrt(t * t + tide.tau * tide.tau) if tide.coefficients.shape[0] > 0 else h)
     ws.mark[2] = 0.0
-    return DONE, t
+    return TOUCH if touched else DONE, t
 
 
 @kernel

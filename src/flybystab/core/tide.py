@@ -164,7 +164,8 @@ def tide_panels(
     Parameters
     ----------
     tide : callable
-        Maps times, shape (n,), in s from closest approach, to components, shape (n, 6), in s^-2.
+        Maps times, shape (n,), in s from closest approach, to components, shape (n, 6), in s^-2; or to any other
+        number of functions of time.
     t_start, t_stop : float
         Span, s from closest approach.
     tau : float
@@ -188,13 +189,13 @@ def tide_panels(
     left = u0 + w * np.arange(n)
     u_nodes = left[:, None] + 0.5 * w * (1.0 + nodes)
     u_tests = left[:, None] + 0.5 * w * (1.0 + between)
-    values = tide(tau * np.sinh(u_nodes.ravel())).reshape(n, degree + 1, 6)
-    exact = tide(tau * np.sinh(u_tests.ravel())).reshape(n, degree, 6)
+    values = tide(tau * np.sinh(u_nodes.ravel())).reshape(n, degree + 1, -1)
+    exact = tide(tau * np.sinh(u_tests.ravel())).reshape(n, degree, -1)
     # Discrete cosine transform: exact interpolation at the Chebyshev nodes.
     transform = 2.0 / (degree + 1) * np.cos(np.pi * k[:, None] * (k + 0.5) / (degree + 1))
     transform[0] *= 0.5
     coefficients = np.ascontiguousarray(np.einsum("ab,nbj->naj", transform, values))
-    fitted = np.stack([chebyshev.chebval(between, c) for c in coefficients])  # (n, 6, degree)
+    fitted = np.stack([chebyshev.chebval(between, c) for c in coefficients])  # (n, components, degree)
     peak = np.abs(values).max()
     error = np.abs(np.swapaxes(fitted, 1, 2) - exact).max() / peak if peak > 0 else 0.0
     return TidePanels(float(tau), float(u0), float(w), coefficients), float(error)

@@ -69,6 +69,7 @@ def flyby_document(result: FlybyResult, sample: SpinSample | None = None, **abou
         "verdict_class": result.verdict_class,
         "verdict_by_surface": {k: str(v) for k, v in result.verdict_by_surface.items()},
         "robust": result.robust,
+        "contact": result.contact,
         "friction_angle_deg": result.body.material.friction_angle.to_value(u.deg),
         "max_required_friction_angle_deg": result.max_required_friction_angle.to_value(u.deg),
         "margin_deg": result.margin.to_value(u.deg),

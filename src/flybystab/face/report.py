@@ -21,7 +21,7 @@ from astropy.table import Row
 from flybystab import __version__
 from flybystab.face.plotting import BLUE, flyby_panels
 from flybystab.face.scene import scene_plot
-from flybystab.face.text import MEANING, angle, known, left_out, modelled
+from flybystab.face.text import MEANING, angle, contact, known, left_out, modelled
 from flybystab.flyby_results import FlybyResult
 from flybystab.sky.ephemeris import ephemeris
 from flybystab.spin import SpinSample
@@ -183,6 +183,8 @@ def _encounter_rows(r: FlybyResult, when: str) -> list[tuple[str, str]]:
         rows.append(("how well the encounter is known", _e(known(e))))
     if e.impact:
         rows.append(("impact", f"reaches the {_e(e.impact_level)}"))
+    if r.contact is not None:
+        rows.append(("contact", _e(contact(r))))
     return rows
 
 

@@ -50,6 +50,19 @@ def known(e: Encounter) -> str:
     return f"{e.predictability}: {e.neighbour} moves the asteroid by {e.displacement.to_value(u.km):,.3g} km there"
 
 
+def contact(r: FlybyResult) -> str:
+    """What reaches the planet, and when, in words; of an IMPACT."""
+    e = r.encounter
+    top = "the top of the atmosphere" if e.planet.atmosphere else "the ground"
+    before = -(e.t_start + r.end_time.to_value(u.s))
+    if r.contact == "path":
+        return f"on a path into the {e.impact_level}; touches {top} {before:,.1f} s before closest approach"
+    return (
+        f"its centre would pass {e.height / 1e3:,.3g} km above {top}, but its side touches it, "
+        f"{abs(before):,.1f} s {'before' if before >= 0 else 'after'} closest approach"
+    )
+
+
 def flyby_lines(r: FlybyResult) -> list[str]:
     """Verdict, margins and error."""
     m = r.body.material
@@ -61,6 +74,8 @@ def flyby_lines(r: FlybyResult) -> list[str]:
             f"{m.friction_angle.to_value(u.deg):g} deg a cohesion of {r.required_cohesion.to_value(u.Pa):.3g} Pa"
         )
         return out
+    if r.contact is not None:
+        out.append(f"contact    {contact(r)}")
     has = f"{m.friction_angle.to_value(u.deg):g} deg"
     if r.margin > 0 * u.deg:
         out.append(

@@ -14,6 +14,7 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.constants import AU, HOUR
+from flybystab.core.ground import Ground
 from flybystab.core.jit import kernel
 from flybystab.core.tide import TidePanels, tide_j2, tide_panels, tide_point
 from flybystab.errors import InvalidInput
@@ -177,6 +178,24 @@ class Encounter:
     def radius(self, t: Array | float) -> Array:
         """Distance from the planet's centre, m, shape (n,), at ``t`` s from closest approach."""
         return np.sqrt(np.sum(self.position(t) ** 2, axis=1))
+
+    @property
+    def height(self) -> float:
+        """Least height of the centre above atmosphere or surface, m; minus infinity on an impact of the centre."""
+        if self.impact:
+            return -np.inf
+        return float(self.distance.to_value(u.m)) - self.planet.impact_distance
+
+    @cached_property
+    def ground(self) -> Ground:
+        """The ground along the way: top of the atmosphere, or the surface if there is none."""
+        tide = self.tide
+        end = tide.tau * float(np.sinh(tide.start + tide.width * len(tide.coefficients)))
+        stop = self.t_stop if self.impact else end
+        way, _ = tide_panels(self.position, self.t_start, stop, tide.tau, width=min(tide.width, 0.5))
+        return Ground(
+            way.tau, way.start, way.width, self.planet.impact_distance, self.height, 1.0, way.coefficients
+        )
 
     @cached_property
     def periapsis_axes(self) -> Array:

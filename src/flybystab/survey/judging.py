@@ -16,7 +16,6 @@ from flybystab.errors import FlybystabError
 from flybystab.flybys import LOOSER
 from flybystab.many import flyby_many
 from flybystab.outcome import Verdict
-from flybystab.rows import clearance
 from flybystab.survey.draws import Attitudes, Draws
 from flybystab.survey.passages import Passage
 from flybystab.survey.quick import INTACT, UNDECIDED, quick_margins
@@ -110,7 +109,7 @@ def judge(
                 close, sharper = _quick(draw, code, passage.close_bounds())
                 fresh = (decided == UNDECIDED) & (sharper != UNDECIDED)
                 fresh &= (sharper != INTACT) | (close[:, 1] <= close[:, 0] + sharp)
-                fresh &= draw.axes[:, 0] <= clearance(encounter)  # a body that touches the planet hits it
+                fresh &= draw.axes[:, 0] <= encounter.height  # clear of the ground at any attitude
                 friction[fresh], decided[fresh] = close[fresh], sharper[fresh]
     dynamic = decided == UNDECIDED
     out = Judged([""] * n, np.full(n, np.nan), friction[:, 0].copy(), dynamic, [""] * n)
