@@ -6,9 +6,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.core.ground import Ground, touches
+from flybystab.core.jacobian import flow_jacobian
 from flybystab.core.jit import kernel
 from flybystab.core.motion import rate
 from flybystab.core.rheology import MOHR_COULOMB
+from flybystab.core.selfgravity import spread
 from flybystab.core.state import (
     BESIDE,
     COHESION,
@@ -23,12 +25,13 @@ from flybystab.core.state import (
     SMOOTH,
     SURFACE,
     W_SCRATCH,
+    W_SINV,
+    W_VECTORS,
 )
 from flybystab.core.steppers import (
     explicit_at,
     explicit_dense,
     explicit_step,
-    flow_jacobian,
     implicit_at,
     implicit_step,
 )
@@ -74,13 +77,7 @@ _BRIEF = 0.1
 def axis_ratio2(y: Array, ws: Workspace) -> float:
     """Square of the largest over the least semi-axis."""
     values = ws.work.m[W_SCRATCH, 0]
-    eigensystem(y[0:6], values, ws.work.m[W_SCRATCH + 1])
-    return _spread(values)
-
-
-@kernel
-def _spread(values: Array) -> float:
-    """Largest over least of three numbers."""
+    eigensystem(y[0:6], values, ws.work.m[W_VECTORS])
     return max(values[0], max(values[1], values[2])) / min(values[0], min(values[1], values[2]))
 
 
@@ -95,12 +92,14 @@ def _health(
     the fan of the corner where the stress is. ``ws.mark[3]`` keeps the code of the least.
     """
     denominator = rate(FLOWING, t, y, dy, par, tide, ws.work)
-    ratio2 = _spread(ws.work.m[W_SCRATCH, 0])  # left there by `rate`
     strength = ws.work.m[W_SCRATCH, 1, 1]
     if par[SIN_PHI] == 0.0 and par[COHESION] == 0.0:
         strength = ws.work.m[W_SCRATCH, 1, 2]
-    least = limit2 - ratio2
+    least = np.inf
     ws.mark[3] = BEYOND
+    ratio = np.sqrt(limit2)
+    if spread(y[0:6], ws.work.m[W_SINV]) > (ratio + 1.0 + 1.0 / ratio) ** 2:
+        least = limit2 - axis_ratio2(y, ws)
     # Past a vanishing denominator the sign of the strength says nothing.
     if denominator < least:
         least = denominator
@@ -203,7 +202,7 @@ def _step(explicit: bool, t: float, y: Array, h: float, par: Array, tide: TidePa
     if explicit:
         return explicit_step(FLOWING, t, y, N_FULL, h, par, tide, ws.work, ws.k, ws.scale, ws.y1)
     return implicit_step(
-        t, y, h, par, tide, ws.work, ws.jac, ws.ft, ws.lu, ws.pivots, ws.k, ws.scale, ws.y1, ws.dense
+        t, y, h, par, tide, ws.work, ws.jac, ws.lu, ws.pivots, ws.k, ws.scale, ws.y1, ws.dense
     )
 
 
@@ -285,7 +284,7 @@ def follow_flow(
         if explicit and d < slow:
             explicit, implicit_ahead = False, _BETWEEN
         if not explicit:
-            flow_jacobian(t, y, f0, 1e-6, par, tide, ws.work, ws.jac, ws.ft, ws.ys)
+            flow_jacobian(t, y, f0, 1e-6, par, tide, ws.work, ws.jac, ws.lu)
             pull = d * _stiffness(ws.jac, spare)
             implicit_ahead -= 1
             if implicit_ahead < 0 and 1.5 * h * pull < _STABLE * d:

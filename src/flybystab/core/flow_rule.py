@@ -37,26 +37,34 @@ def dilatancy(volume: float, par: Array) -> tuple[float, float]:
 
 
 @kernel
+def flow_coefficients(det: float, par: Array) -> tuple[float, float, float, float, float]:
+    """``a, b`` of the stress with the direction ``u`` of ``D'``, ``det u`` given, and what belongs to them.
+
+    Returns ``a, b``, the support ``N:u``, the norm of ``N`` and the determinant of the unit stress deviator.
+    """
+    surface = int(par[SURFACE])
+    if par[NORMAL] == 0.0:
+        g = slope_over_sine(surface, par[SIN_PHI], det)
+        return g, 0.0, g, g, det
+    part = int(par[PART])
+    if part == SMOOTH:
+        return normal(surface, par[SIN_PHI], det)
+    return corner(par[SIN_PHI], det, part != COMPRESSION_CORNER)
+
+
+@kernel
 def flow_stress(d: Array, par: Array, unit: Array, n: Array) -> tuple[float, float, float, float]:
     """Stress deviator ``n[3, 3]`` over ``p sin(phi) + c cos(phi)`` of a flow with rate of strain ``d[6]``.
 
     Returns ``|D'|``, the norm of `n`, the support ``n:Dhat`` and the determinant of the unit stress deviator; sets
-    ``unit[6]`` to ``Dhat``.
+    ``unit[6]`` to ``Dhat``. At rest `n` is zero.
     """
     _, norm, det = deviator(d, unit)
-    unpack(unit, n)
-    surface = int(par[SURFACE])
-    if par[NORMAL] == 0.0 or norm == 0.0:
-        g = slope_over_sine(surface, par[SIN_PHI], det)
-        for i in range(3):
-            for j in range(3):
-                n[i, j] *= g
+    if norm == 0.0:
+        g = slope_over_sine(int(par[SURFACE]), par[SIN_PHI], det)
+        unpack(unit, n)
         return norm, g, g, det
-    part = int(par[PART])
-    if part == SMOOTH:
-        a, b, support, g, det = normal(surface, par[SIN_PHI], det)
-    else:
-        a, b, support, g, det = corner(par[SIN_PHI], det, part != COMPRESSION_CORNER)
+    a, b, support, g, det = flow_coefficients(det, par)
     isotropic(a, b, unit, n)
     return norm, g, support, det
 

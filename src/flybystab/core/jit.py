@@ -15,7 +15,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import njit
+from numba import config, njit
 from numba.core import cgutils
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
@@ -63,4 +63,4 @@ def _borrowed(context, array):  # type: ignore[no-untyped-def]
 #: Inside a kernel: the same array without its reference count. Counting costs an atomic instruction at each use,
 #: which in a loop over bodies is most of the time. Only an argument may be borrowed, as its caller keeps it alive: a
 #: local is freed after its last use, and the next array would lie in its place.
-borrowed: Any = intrinsic(_borrowed)
+borrowed: Any = (lambda array: array) if getattr(config, "DISABLE_JIT", 0) else intrinsic(_borrowed)

@@ -12,6 +12,7 @@ from flybystab.core.ellipsoid import gravity_coefficients
 from flybystab.core.flow_rule import dilatancy, dilation, flow_stress, isotropic
 from flybystab.core.jit import kernel
 from flybystab.core.rheology import beyond_face, corner, slope_over_sine
+from flybystab.core.selfgravity import gravity_tensor
 from flybystab.core.state import (
     COHESION,
     COS_PHI,
@@ -48,7 +49,7 @@ from flybystab.core.state import (
     set_gradient,
 )
 from flybystab.core.statics import rigid_load
-from flybystab.core.tensors import determinant, deviator, eigensystem, inverse, multiply, pack, unpack
+from flybystab.core.tensors import contract, determinant, deviator, inverse, multiply, pack, unpack
 from flybystab.core.tide import TidePanels, tide_at
 
 Array = NDArray[np.float64]
@@ -112,46 +113,21 @@ def set_rigid_shape(s1: float, s2: float, s3: float, par: Array) -> None:
 
 @kernel
 def field(t: float, y: Array, tide: TidePanels, work: Buffers) -> None:
-    """Fill what depends on ``t`` and ``S`` only: ``S``, ``S^-1``, ``K_g + K_t``, volume."""
-    scratch = work.m[W_SCRATCH]
-    values = scratch[0]
-    vectors = work.m[W_VECTORS]
+    """Fill what depends on ``t`` and ``S`` only: ``S``, ``S^-1``, ``K_g + K_t``, volume; the tide in ``work.c[0]``."""
     unpack(y[0:6], work.m[W_S])
     det = inverse(y[0:6], work.m[W_SINV])
-    volume = np.sqrt(det)
-    scratch[1, 0] = volume
-    eigensystem(y[0:6], values, vectors)
-    a1, a2, a3 = gravity_coefficients(values[0], values[1], values[2])
-    c = -2.0 / volume
+    work.m[W_SCRATCH, 1, 0] = np.sqrt(det)
     k = work.m[W_K]
-    for i in range(3):
-        for j in range(i, 3):
-            k[i, j] = k[j, i] = c * (
-                a1 * vectors[i, 0] * vectors[j, 0]
-                + a2 * vectors[i, 1] * vectors[j, 1]
-                + a3 * vectors[i, 2] * vectors[j, 2]
-            )
+    gravity_tensor(y[0:6], work.m[W_SINV], det, work.m[W_SCRATCH, 0], work.m[W_VECTORS], k)
     kt = work.c[0]
     tide_at(tide.tau, tide.start, tide.width, tide.coefficients, t, kt)
-    k[0, 0] += kt[0]
-    k[1, 1] += kt[1]
-    k[2, 2] += kt[2]
-    k[0, 1] += kt[3]
-    k[1, 0] += kt[3]
-    k[0, 2] += kt[4]
-    k[2, 0] += kt[4]
-    k[1, 2] += kt[5]
-    k[2, 1] += kt[5]
-
-
-@kernel
-def _contract(a: Array, b: Array) -> float:
-    """``A:B`` of two (3, 3) arrays."""
-    total = 0.0
-    for i in range(3):
-        for j in range(3):
-            total += a[i, j] * b[i, j]
-    return total
+    # K_g = -2 (V0/V) A = -2 Gamma
+    k[0, 0] = kt[0] - 2.0 * k[0, 0]
+    k[1, 1] = kt[1] - 2.0 * k[1, 1]
+    k[2, 2] = kt[2] - 2.0 * k[2, 2]
+    k[0, 1] = k[1, 0] = kt[3] - 2.0 * k[0, 1]
+    k[0, 2] = k[2, 0] = kt[4] - 2.0 * k[0, 2]
+    k[1, 2] = k[2, 1] = kt[5] - 2.0 * k[1, 2]
 
 
 @kernel
@@ -210,8 +186,8 @@ def deformation_rate(regime: int, y: Array, dy: Array, par: Array, work: Buffers
         e = beta * sin if par[NORMAL] > 0.0 else beta / g  # E = e N
         multiply(n, sinv, b)
         n_sinv = b[0, 0] + b[1, 1] + b[2, 2]
-        nn_sinv = _contract(n, b)
-        n_r = _contract(n, r)
+        nn_sinv = contract(n, b)
+        n_r = contract(n, r)
         denominator = trace_sinv - (sin + e) * n_sinv + sin * e * nn_sinv
         fading = dilation(dbeta * volume * trace_d, norm, support, par)
         numerator = fading - trace_r + e * n_r + cohesive * (n_sinv - e * nn_sinv)
@@ -225,10 +201,10 @@ def deformation_rate(regime: int, y: Array, dy: Array, par: Array, work: Buffers
                 for j in range(3):
                     x[i, j] -= n[i, j]
             multiply(x, sinv, xs)
-            across = _contract(x, xs)
-            nx_sinv = _contract(x, b)
+            across = contract(x, xs)
+            nx_sinv = contract(x, b)
             along = xs[0, 0] + xs[1, 1] + xs[2, 2]
-            pull = _contract(x, r) - cohesive * nx_sinv
+            pull = contract(x, r) - cohesive * nx_sinv
             bx = along - e * nx_sinv
             denominator -= bx * (along - sin * nx_sinv) / across
             numerator += bx * pull / across

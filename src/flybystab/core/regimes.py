@@ -30,7 +30,7 @@ from flybystab.core.flow import follow_flow
 from flybystab.core.flow_rule import dilatancy
 from flybystab.core.free import follow_free
 from flybystab.core.ground import Ground
-from flybystab.core.jit import kernel
+from flybystab.core.jit import borrowed, kernel
 from flybystab.core.motion import rigid_excess, set_rigid_shape
 from flybystab.core.rheology import flow_direction
 from flybystab.core.rigid import follow_rigid
@@ -65,6 +65,7 @@ from flybystab.core.workspace import (
     STUCK,
     Counts,
     Workspace,
+    borrowed_workspace,
     copy,
     log,
     workspace,
@@ -210,7 +211,38 @@ def follow(
     reason, time, regime
         DONE, TOUCH, BEYOND or STUCK; the time reached; the regime there.
     """
-    ws = workspace()
+    return _follow(
+        t, t1, t_rest, regime, y, par, tide, ground, tol, limit, brittle, unyielding, max_steps, hist, events,
+        count, mark, workspace(),
+    )  # fmt: skip
+
+
+@kernel
+def _follow(
+    t: float,
+    t1: float,
+    t_rest: float,
+    regime: int,
+    y: Array,
+    par: Array,
+    tide: TidePanels,
+    ground: Ground,
+    tol: float,
+    limit: float,
+    brittle: bool,
+    unyielding: bool,
+    max_steps: int,
+    hist: Array,
+    events: Array,
+    count: Counts,
+    mark: Array,
+    room: Workspace,
+) -> tuple[int, float, int]:
+    """`follow` in the buffers of the caller."""
+    # Counting references at each use of a buffer would take longer than the sums.
+    ws = borrowed_workspace(room)
+    y, par, hist = borrowed(y), borrowed(par), borrowed(hist)
+    tide = TidePanels(tide.tau, tide.start, tide.width, borrowed(tide.coefficients))
     copy(y, ws.y, N_FULL)
     ws.mark[0] = -1.0
     reason = DONE

@@ -70,7 +70,19 @@ W_VECTORS = 8
 # corners of a face (0: extension, 1: compression), angle of D past the normal of the face
 W_SCRATCH = 9
 W_FACE = 10  # step from the extension to the compression corner
-N_WORK = 11
+# Scratch of `flybystab.core.jacobian`.
+J_RATE = 11
+J_UNIT = 12
+J_SQUARE = 13
+J_STRESS = 14
+J_SLIP = 15
+J_FACE = 16
+J_ACROSS = 17
+J_CHANGE = 18
+J_TURN = 19
+J_PRODUCT = 20
+J_NORMAL = 21
+N_WORK = 22
 
 
 class Buffers(NamedTuple):

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from scipy.integrate._ivp import dop853_coefficients as _dop853
 
 from flybystab.core.jit import kernel
-from flybystab.core.motion import deformation_rate, field, rate
+from flybystab.core.motion import rate
 from flybystab.core.state import FLOWING, Buffers
 from flybystab.core.tide import TidePanels
 
@@ -226,52 +226,6 @@ def implicit_at(x: float, y: Array, n: int, dense: Array, y1: Array, out: Array)
 
 
 @kernel
-def flow_jacobian(
-    t: float,
-    y: Array,
-    f0: Array,
-    dt: float,
-    par: Array,
-    tide: TidePanels,
-    work: Buffers,
-    jac: Array,
-    ft: Array,
-    s: Array,
-) -> None:
-    """Jacobian ``jac[15, 15]`` and time derivative ``ft[15]`` of plastic flow by forward differences.
-
-    The increments follow the variables: ``|D|`` sets that of ``D``, on whose direction the stress depends.
-    Columns of ``D`` and ``w`` leave `field` alone, which carries the elliptic integrals.
-    """
-    n = 15
-    size = 0.0
-    for i in range(3):
-        size += y[6 + i] ** 2 + 2.0 * y[9 + i] ** 2
-    step_d = 3e-8 * np.sqrt(size)
-    field(t, y, tide, work)
-    for j in range(6, n):
-        delta = step_d if j < 12 else 3e-8
-        saved = y[j]
-        y[j] = saved + delta
-        delta = y[j] - saved
-        deformation_rate(FLOWING, y, s, par, work)
-        y[j] = saved
-        for i in range(n):
-            jac[i, j] = (s[i] - f0[i]) / delta
-    for j in range(6):
-        saved = y[j]
-        y[j] = saved + 3e-8
-        delta = y[j] - saved
-        rate(FLOWING, t, y, s, par, tide, work)
-        y[j] = saved
-        for i in range(n):
-            jac[i, j] = (s[i] - f0[i]) / delta
-    rate(FLOWING, t + dt, y, s, par, tide, work)
-    for i in range(n):
-        ft[i] = (s[i] - f0[i]) / dt
-
-
-@kernel
 def factorise(a: Array, n: int, pivots: NDArray[np.int64]) -> bool:
     """LU factors of ``a[n, n]`` in place with partial pivoting; False if singular."""
     for c in range(n):
@@ -325,7 +279,6 @@ def implicit_step(
     tide: TidePanels,
     work: Buffers,
     jac: Array,
-    ft: Array,
     lu: Array,
     pivots: NDArray[np.int64],
     k: Array,
@@ -333,7 +286,7 @@ def implicit_step(
     y1: Array,
     dense: Array,
 ) -> float:
-    """One Rodas5P step of plastic flow, given `flow_jacobian`; returns the error norm (accept at <= 1).
+    """One Rodas5P step of plastic flow with its Jacobian ``jac[15, 16]``; returns the error norm (accept at <= 1).
 
     Writes ``y1`` and the interpolant ``dense[3, 15]``.
     """
@@ -356,7 +309,7 @@ def implicit_step(
             total = 0.0
             for j in range(s):
                 total += _RK[s, j] * k[j, i]
-            k[s, i] += total / h + h * _RD[s] * ft[i]
+            k[s, i] += total / h + h * _RD[s] * jac[i, n]
         solve(lu, n, pivots, k[s])
     error = 0.0
     for i in range(n):

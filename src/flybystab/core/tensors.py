@@ -45,6 +45,16 @@ def multiply(a: Array, b: Array, out: Array) -> None:
 
 
 @kernel
+def contract(a: Array, b: Array) -> float:
+    """``A:B`` of two (3, 3) arrays."""
+    total = 0.0
+    for i in range(3):
+        for j in range(3):
+            total += a[i, j] * b[i, j]
+    return total
+
+
+@kernel
 def determinant(c: Array) -> float:
     """Determinant of a symmetric tensor ``c[6]``."""
     return (

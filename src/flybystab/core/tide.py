@@ -118,16 +118,24 @@ def tide_at(tau: float, start: float, width: float, coefficients: Array, t: floa
     v = (np.arcsinh(t / tau) - start) / width
     i = min(max(int(np.floor(v)), 0), n - 1)
     x = min(max(2.0 * (v - i) - 1.0, -1.0), 1.0)
-    m = coefficients.shape[1]
-    # Clenshaw: b_k = c_k + 2 x b_(k+1) - b_(k+2)
-    for j in range(6):
-        b1 = 0.0
-        b2 = 0.0
-        for k in range(m - 1, 0, -1):
-            b0 = coefficients[i, k, j] + 2.0 * x * b1 - b2
-            b2 = b1
-            b1 = b0
-        out[j] = coefficients[i, 0, j] + x * b1 - b2
+    c = coefficients[i]
+    # Clenshaw, b_k = c_k + 2 x b_(k+1) - b_(k+2), all six at once: each alone would wait for itself
+    x2 = 2.0 * x
+    p0 = p1 = p2 = p3 = p4 = p5 = 0.0
+    q0 = q1 = q2 = q3 = q4 = q5 = 0.0
+    for k in range(c.shape[0] - 1, 0, -1):
+        p0, q0 = c[k, 0] + x2 * p0 - q0, p0
+        p1, q1 = c[k, 1] + x2 * p1 - q1, p1
+        p2, q2 = c[k, 2] + x2 * p2 - q2, p2
+        p3, q3 = c[k, 3] + x2 * p3 - q3, p3
+        p4, q4 = c[k, 4] + x2 * p4 - q4, p4
+        p5, q5 = c[k, 5] + x2 * p5 - q5, p5
+    out[0] = c[0, 0] + x * p0 - q0
+    out[1] = c[0, 1] + x * p1 - q1
+    out[2] = c[0, 2] + x * p2 - q2
+    out[3] = c[0, 3] + x * p3 - q3
+    out[4] = c[0, 4] + x * p4 - q4
+    out[5] = c[0, 5] + x * p5 - q5
 
 
 def tensor(components: Array) -> Array:

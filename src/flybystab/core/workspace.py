@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flybystab.core.jit import code, kernel
+from flybystab.core.jit import borrowed, code, kernel
 from flybystab.core.state import N_WORK, RIGID, W_SCRATCH, Buffers, to_fixed_frame
 from flybystab.core.steppers import N_STAGES
 
@@ -44,7 +44,6 @@ class Workspace(NamedTuple):
     work: Buffers
     k: Array
     jac: Array
-    ft: Array
     lu: Array
     pivots: NDArray[np.int64]
     dense: Array
@@ -71,8 +70,7 @@ def workspace() -> Workspace:
     return Workspace(
         Buffers(np.zeros((N_WORK, 3, 3)), np.zeros((3, 6))),
         np.zeros((N_STAGES, 15)),
-        np.zeros((15, 15)),
-        np.zeros(15),
+        np.zeros((15, 16)),
         np.zeros((15, 15)),
         np.zeros(15, dtype=np.int64),
         np.zeros((7, 15)),
@@ -84,6 +82,27 @@ def workspace() -> Workspace:
         np.zeros((2, N_SAMPLE + 1)),
         np.zeros(42),
         np.zeros(4),
+    )
+
+
+@kernel
+def borrowed_workspace(ws: Workspace) -> Workspace:
+    """The same buffers without reference counts, for use inside a kernel that has them as an argument."""
+    return Workspace(
+        Buffers(borrowed(ws.work.m), borrowed(ws.work.c)),
+        borrowed(ws.k),
+        borrowed(ws.jac),
+        borrowed(ws.lu),
+        borrowed(ws.pivots),
+        borrowed(ws.dense),
+        borrowed(ws.y),
+        borrowed(ws.y1),
+        borrowed(ws.ys),
+        borrowed(ws.scale),
+        borrowed(ws.stress),
+        borrowed(ws.sample),
+        borrowed(ws.spare),
+        borrowed(ws.mark),
     )
 
 
