@@ -221,6 +221,42 @@ def test_stopped_run_goes_on_without_losing_or_repeating(tmp_path, suffix):
     assert set(samples["verdict"]) <= set(VERDICTS)
 
 
+def test_a_run_stopped_inside_an_asteroid_goes_on_with_its_parts(tmp_path, monkeypatch):
+    """The samples that were judged before the kill are not judged again, and the tables are the same."""
+    run = Screening(
+        [Asteroid.from_catalogue("Anteros")], settings(*SPAN, samples=200, seed=1, keep_samples=True), three
+    )
+    whole, out = tmp_path / "whole.ecsv", tmp_path / "out.ecsv"
+    samples = tmp_path / "ws.ecsv", tmp_path / "s.ecsv"
+    judged, original = [], Part.judged
+
+    def counted(part, settings):
+        judged.append(len(part.attitudes.uniform))
+        return original(part, settings)
+
+    monkeypatch.setattr(Part, "judged", counted)
+    run.run(whole, samples_output=samples[0])
+    every = sum(judged)
+
+    def stop(state):
+        if state.begun > 0.5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run.run(out, samples_output=samples[1], progress=stop)
+    journal = tmp_path / "out.ecsv.journal"
+    kept = [len(json.loads(line)["verdict"]) for line in journal.read_bytes().splitlines()[1:]]
+    assert sum(kept) > 60
+    assert read_results(out).meta["complete"] is False
+    journal.write_bytes(journal.read_bytes() + b'{"task": 0, "passage": 2, "fir')  # killed in the middle of a line
+    judged.clear()
+    run.run(out, samples_output=samples[1])
+    assert sum(judged) == every - sum(kept)
+    assert out.read_text() == whole.read_text()
+    assert samples[1].read_text() == samples[0].read_text()
+    assert not journal.exists()
+
+
 def test_settings_are_checked():
     with pytest.raises(InvalidInput, match="start"):
         settings("soon", "2036-01-01")

@@ -1,5 +1,6 @@
 """The uncertainty of an orbit in the samples of its passages."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
 
 import astropy.units as u
@@ -7,14 +8,15 @@ import numpy as np
 import pytest
 from astropy.time import Time
 
-from flybystab.constants import R_EARTH
+from flybystab.constants import AU, R_EARTH
+from flybystab.errors import NotConverged
 from flybystab.sky.encounter import Encounter
 from flybystab.sky.orbit import Orbit
 from flybystab.survey.catalogue import Asteroid
 from flybystab.survey.passages import Passage, passages
 from flybystab.survey.screening import Screening, screen
 from flybystab.survey.settings import settings
-from flybystab.survey.spread import spread
+from flybystab.survey.spread import Clones, spread
 
 APOPHIS = Asteroid.from_catalogue("Apophis")
 SPAN = "2029-04-01", "2029-05-01"
@@ -33,7 +35,7 @@ def only(asteroid):
 
 def test_a_well_known_orbit_is_shared_by_all_samples():
     s = spread(only(APOPHIS), 100, 0)
-    assert s.passages is None
+    assert s.clones is None
     assert s.sigma == pytest.approx(1100, rel=0.03)  # 3.3 km at three sigma (JPL)
     assert s.note == ""
 
@@ -41,10 +43,11 @@ def test_a_well_known_orbit_is_shared_by_all_samples():
 def test_samples_of_a_badly_known_orbit_have_passages_of_their_own():
     many, few = (spread(only(with_spread(1000.0)), n, 3) for n in (24, 8))
     assert many.sigma == pytest.approx(1.1e6, rel=0.05)
-    distances = np.array([p.distance for p in many.passages])
+    followed = many.clones.passages(0, 24)
+    distances = np.array([p.distance for p in followed])
     assert distances.std(ddof=1) == pytest.approx(1.1e6, rel=0.35)  # four sigma of the sampling of 24
-    assert [p.distance for p in few.passages] == pytest.approx(distances[:8], rel=1e-9)
-    p = min(many.passages, key=lambda p: p.distance)
+    assert [p.distance for p in few.clones.passages(0, 8)] == pytest.approx(distances[:8], rel=1e-9)
+    p = min(followed, key=lambda p: p.distance)
     assert p.meet().distance.to_value(u.m) == pytest.approx(p.distance, abs=1e3)
 
 
@@ -58,6 +61,40 @@ def test_rows_draw_the_orbit_and_name_the_distance_among_the_contributors():
     assert row["distance_sigma"] == pytest.approx(7700, rel=0.1)
     assert len({s["distance"] for s in result["samples"]}) == 30
     assert run.fingerprint() != Screening([APOPHIS], run.settings).fingerprint()
+
+
+def test_clones_and_rows_are_the_same_to_the_bit_however_they_are_split():
+    asteroid = with_spread(7000.0)
+    clones = spread(only(asteroid), 18, 0).clones
+    whole = [p.distance for p in clones.passages(0, 18)]
+    assert whole == [clones.passages(k, k + 1)[0].distance for k in range(18)]
+    run = Screening([asteroid], settings(*SPAN, within=0.01 * u.au, samples=18, keep_samples=True))
+    ((_, together),) = run.results(block=18)
+    with ThreadPoolExecutor(2) as pool:
+        ((_, split),) = run.results(pool, block=3)
+    assert repr(split) == repr(together)  # nan is nan
+    assert [s["distance"] * AU for s in split["samples"]] == pytest.approx(whole, rel=1e-15)
+
+
+def test_a_clone_that_cannot_be_followed_costs_its_own_sample_only(monkeypatch):
+    asteroid = with_spread(7000.0)
+    original = Clones.passages
+
+    def passages_but_one(self, first, last):
+        if first <= 11 < last:
+            raise NotConverged("clone 11: the step size collapsed")
+        return original(self, first, last)
+
+    wanted = settings(*SPAN, within=0.01 * u.au, samples=14, keep_samples=True)
+    ((_, whole),) = Screening([asteroid], wanted).results()
+    monkeypatch.setattr(Clones, "passages", passages_but_one)
+    for block in (14, 3):
+        ((_, found),) = Screening([asteroid], wanted).results(block=block)
+        errors = [s["error"] for s in found["samples"]]
+        assert [k for k, e in enumerate(errors) if e] == [11]
+        assert errors[11] == "NotConverged: clone 11: the step size collapsed"
+        assert found["rows"][0]["error"] == "1 samples: " + errors[11]
+        assert [s["verdict"] for s in found["samples"][:11]] == [s["verdict"] for s in whole["samples"][:11]]
 
 
 def test_what_is_not_known_of_an_orbit_is_said():

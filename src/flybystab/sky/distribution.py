@@ -247,6 +247,44 @@ def distributions(
     return [_distribution(path, row, clones, len(points), found, reach) for row in table]
 
 
+def clone_passages(
+    clones: Sequence[Orbit],
+    planet: str | Planet,
+    time: Time,
+    *,
+    search: Quantity,
+    within: Quantity,
+    ephemeris: str | Ephemeris | None = None,
+    tolerance: float = 1e-12,
+    threads: int | None = None,
+) -> tuple[Array, Array, Array]:
+    """The passages of some clones that belong to one of the nominal orbit, at `time`.
+
+    Other arguments as of :func:`encounter_distribution`, of which this is a part: the answer for a clone does not
+    depend on the others.
+
+    Returns
+    -------
+    time_offset, distance, v_inf : ndarray (n,)
+        s, m, m/s; nan for a clone without a passage there.
+    """
+    body = _planet(planet)
+    reach = to_si(search, u.s, "search", low=0.0, open_low=True)
+    start, stop = later(time, -reach), later(time, reach)
+    found = find_encounters(
+        list(clones),
+        start,
+        stop,
+        [body.name],
+        within,
+        ephemeris=ephemeris,
+        tolerance=tolerance,
+        threads=threads,
+    )
+    columns = _belonging(found, body, time, len(clones), reach)
+    return columns[:, 0], columns[:, 1], columns[:, 4]
+
+
 def _distribution(
     orbit: Orbit, nominal: Any, clones: tuple[Orbit, ...], points: int, found: QTable, reach: float
 ) -> EncounterDistribution:
@@ -254,16 +292,7 @@ def _distribution(
     covariance = orbit.covariance
     assert covariance is not None
     body = planet(str(nominal["planet"]))
-    columns = np.full((len(clones) + points, 12), np.nan)
-    if len(found):
-        offset = (found["time"] - nominal["time"]).to_value(u.s)
-        here = np.flatnonzero((found["planet"] == body.name) & (np.abs(offset) <= reach))
-        # The last one written stays: an impact before any other minimum, then the one nearest in time.
-        order = here[np.lexsort((np.abs(offset[here]), ~found["impact"][here]))[::-1]]
-        every = [offset, *(found[c].to_value(u.m) for c in ("distance", "b_t", "b_r"))]
-        every += [found["v_inf"].to_value(u.m / u.s), found["impact"]]
-        every += [*found["position"].to_value(u.m).T, *found["velocity"].to_value(u.m / u.s).T]
-        columns[found["index"][order]] = np.column_stack(every)[order]
+    columns = _belonging(found, body, nominal["time"], len(clones) + points, reach)
     first = columns[: len(clones)]
     return EncounterDistribution(
         planet=body,
@@ -282,6 +311,24 @@ def _distribution(
         source=covariance.source,
         correlated=covariance.correlated,
     )
+
+
+def _belonging(found: QTable, body: Planet, time: Time, n: int, reach: float) -> Array:
+    """Of `n` orbits the passages that belong to the one at `time`, SI; nan without one.
+
+    Columns: time offset, distance, b_t, b_r, v_inf, impact, position and velocity.
+    """
+    columns = np.full((n, 12), np.nan)
+    if len(found):
+        offset = (found["time"] - time).to_value(u.s)
+        here = np.flatnonzero((found["planet"] == body.name) & (np.abs(offset) <= reach))
+        # The last one written stays: an impact before any other minimum, then the one nearest in time.
+        order = here[np.lexsort((np.abs(offset[here]), ~found["impact"][here]))[::-1]]
+        every = [offset, *(found[c].to_value(u.m) for c in ("distance", "b_t", "b_r"))]
+        every += [found["v_inf"].to_value(u.m / u.s), found["impact"]]
+        every += [*found["position"].to_value(u.m).T, *found["velocity"].to_value(u.m / u.s).T]
+        columns[found["index"][order]] = np.column_stack(every)[order]
+    return columns
 
 
 def _path(orbit: Any) -> Orbit:

@@ -212,7 +212,14 @@ class Orbit:
             state = state - window.states(BODIES.index(where), np.array([t]))[0]
         return (state[:3] * u.m).to(u.km), (state[3:] * u.m / u.s).to(u.km / u.s)
 
-    def clones(self, n: int, seed: int = 0, ephemeris: str | Ephemeris | None = None) -> tuple[Orbit, ...]:
+    def clones(
+        self,
+        n: int,
+        seed: int = 0,
+        ephemeris: str | Ephemeris | None = None,
+        first: int = 0,
+        last: int | None = None,
+    ) -> tuple[Orbit, ...]:
         """Orbits drawn from the covariance, at its epoch.
 
         The deviations from the mean of the covariance are added to this orbit, taken to the epoch of the
@@ -226,6 +233,8 @@ class Orbit:
             Clone k depends on the seed and k alone.
         ephemeris : str or Ephemeris, optional
             For the way to the epoch of the covariance.
+        first, last : int
+            Only numbers `first` to ``last - 1`` of the `n`.
 
         Raises
         ------
@@ -236,7 +245,8 @@ class Orbit:
         """
         covariance = self._known("clones")
         parameters, _ = covariance.samples(_count(n), seed)
-        return deviated(self, covariance.epoch, *covariance.deviations(parameters), "clone", ephemeris)
+        found = covariance.deviations(parameters[first:last])
+        return deviated(self, covariance.epoch, *found, "clone", ephemeris, first)
 
     def sigma_points(self, ephemeris: str | Ephemeris | None = None) -> tuple[tuple[Orbit, ...], ...]:
         """Pairs of orbits, plus and minus one sigma along each principal axis of the correlations.
@@ -265,9 +275,18 @@ class Orbit:
 
 
 def deviated(
-    orbit: Orbit, epoch: Time, states: Array, pushes: Array, label: str, ephemeris: str | Ephemeris | None
+    orbit: Orbit,
+    epoch: Time,
+    states: Array,
+    pushes: Array,
+    label: str,
+    ephemeris: str | Ephemeris | None,
+    first: int = 0,
 ) -> tuple[Orbit, ...]:
-    """An orbit taken to `epoch`, plus deviations of the state (m, 6) and of A1, A2, A3 (m, 3) there; SI."""
+    """An orbit taken to `epoch`, plus deviations of the state (m, 6) and of A1, A2, A3 (m, 3) there; SI.
+
+    They are named by `label` and their numbers from `first` on.
+    """
     position, velocity, centre = orbit.position, orbit.velocity, orbit.centre
     if abs(seconds(epoch, orbit.epoch)) > 1e-3:
         centre = "sun"
@@ -284,7 +303,7 @@ def deviated(
             NonGravitational(tuple((a + da).tolist()), orbit.nongrav.law),
             f"{orbit.name} {label} {k}".strip(),
         )
-        for k, (ds, da) in enumerate(zip(states, pushes, strict=True))
+        for k, (ds, da) in enumerate(zip(states, pushes, strict=True), first)
     )
 
 

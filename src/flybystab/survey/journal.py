@@ -1,7 +1,8 @@
 """The journal of a screening: finished tasks on disk, whatever ends the run.
 
-Every finished task is one line next to the output. A killed run leaves at worst half a last line, which the next run
-drops; it then goes on with the tasks that are missing. Tables are made from it in the order of the tasks.
+Every finished task is one line next to the output, and so is every finished part of one that takes long. A killed run
+leaves at worst half a last line, which the next run drops; it then goes on with what is missing. Tables are made from
+it in the order of the tasks.
 """
 
 from __future__ import annotations
@@ -11,13 +12,13 @@ import os
 from array import array
 from collections.abc import Iterator, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, BinaryIO
 
 from flybystab.errors import InvalidInput
 
 
 class Journal:
-    """Finished tasks, one JSON line each, behind a first line that says which run they belong to.
+    """Finished tasks and parts of tasks, one JSON line each, behind a first line that says which run they belong to.
 
     Parameters
     ----------
@@ -42,6 +43,8 @@ class Journal:
         self.count = 0
         # Offset of each task's line, -1 where there is none: 8 bytes a task.
         self._offsets = array("q")
+        # Of tasks that are not finished: the offsets of their parts.
+        self._parts: dict[int, list[int]] = {}
         wanted = json.dumps(header, sort_keys=True)
         # Unbuffered: what is written is in the hands of the system, and a full disk is noticed at once.
         self._file = path.open("ab", buffering=0)
@@ -87,12 +90,14 @@ class Journal:
             end = stream.tell()
             for line in stream:
                 try:
-                    task = json.loads(line)["task"] if line.endswith(b"\n") else None
+                    found = json.loads(line) if line.endswith(b"\n") else {}
+                    task, part = int(found["task"]), "first" in found
                 except (ValueError, KeyError, TypeError):
-                    task = None
-                if task is None:
                     break
-                self._note(int(task), end)
+                if part:
+                    self._parts.setdefault(task, []).append(end)
+                else:
+                    self._note(task, end)
                 end += len(line)
             stream.truncate(end)
 
@@ -105,31 +110,49 @@ class Journal:
         if task >= len(self._offsets):
             self._offsets.extend([-1] * (task + 1 - len(self._offsets)))
         self._offsets[task] = offset
+        self._parts.pop(task, None)
         self.count += 1
 
     def add(self, task: int, content: Mapping[str, Any]) -> None:
         """Write down a finished task; a task that is there already is not repeated."""
         if task in self:
             return
-        line = memoryview(json.dumps({"task": task, **content}).encode() + b"\n")
+        self._note(task, self._append({"task": task, **content}))
+
+    def add_part(self, task: int, passage: int, first: int, content: Mapping[str, Any]) -> None:
+        """Write down a part of a task: samples from `first` on of one of its passages."""
+        offset = self._append({"task": task, "passage": passage, "first": first, **content})
+        self._parts.setdefault(task, []).append(offset)
+
+    def _append(self, content: Mapping[str, Any]) -> int:
+        """Write one line; where it begins."""
+        line = memoryview(json.dumps(content).encode() + b"\n")
         offset = self._file.seek(0, os.SEEK_END)
         while line:
             line = line[self._file.write(line) :]
-        self._note(task, offset)
+        return offset
+
+    def parts(self, task: int) -> list[dict[str, Any]]:
+        """The parts of a task that is not finished."""
+        with self.path.open("rb") as stream:
+            return [self._line(stream, offset) for offset in self._parts.get(task, ())]
+
+    @staticmethod
+    def _line(stream: BinaryIO, offset: int) -> dict[str, Any]:
+        stream.seek(offset)
+        return dict(json.loads(stream.readline()))
 
     def tasks(self) -> Iterator[dict[str, Any]]:
         """The finished tasks in their order, read one by one."""
         with self.path.open("rb") as stream:
             for offset in self._offsets:
                 if offset >= 0:
-                    stream.seek(offset)
-                    yield json.loads(stream.readline())
+                    yield self._line(stream, offset)
 
     def task(self, task: int) -> dict[str, Any]:
         """A finished task."""
         with self.path.open("rb") as stream:
-            stream.seek(self._offsets[task])
-            return dict(json.loads(stream.readline()))
+            return self._line(stream, self._offsets[task])
 
     def close(self, *, remove: bool = False) -> None:
         """Close the file, and remove it if everything it holds is safe elsewhere."""

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import astropy.units as u
 import numpy as np
@@ -42,13 +43,30 @@ def _quick(draw: Draws, code: int, size: tuple[float, float]) -> tuple[Array, ND
 
 @dataclass
 class Judged:
-    """Verdicts on the samples of one passage."""
+    """Verdicts on the samples of one passage.
+
+    Attributes
+    ----------
+    verdict : list of str
+        Empty where there is none.
+    margin, rest : ndarray
+        Friction angle of the material less the one mobilised in the passage; the one mobilised far from it, rad.
+    dynamic : ndarray of bool
+        Decided by the dynamics, not by the bound.
+    error : list of str
+        Why there is no verdict.
+    distance : ndarray
+        Of the passage, m.
+    numerical : float
+        Numerical error of the first mobilised angle, deg, where it was measured.
+    """
 
     verdict: list[str]
     margin: Array
     rest: Array
     dynamic: NDArray[np.bool_]
     error: list[str]
+    distance: Array
     numerical: float = np.nan
 
     @classmethod
@@ -60,7 +78,26 @@ class Judged:
             np.concatenate([p.rest for p in parts]),
             np.concatenate([p.dynamic for p in parts]),
             [e for p in parts for e in p.error],
+            np.concatenate([p.distance for p in parts]),
         )
+
+    @classmethod
+    def failed(cls, error: str, distance: float) -> Judged:
+        """One sample that could not be judged."""
+        nothing = np.full(1, np.nan)
+        return cls([""], nothing, nothing.copy(), np.zeros(1, dtype=bool), [error], np.full(1, distance))
+
+    def stored(self) -> dict[str, Any]:
+        """As what JSON holds; no digit is lost."""
+        arrays = {name: getattr(self, name).tolist() for name in ("margin", "rest", "dynamic", "distance")}
+        return {"verdict": [str(v) for v in self.verdict], "error": self.error, **arrays}
+
+    @classmethod
+    def restored(cls, stored: Mapping[str, Any]) -> Judged:
+        """From what `stored` gave."""
+        margin, rest, distance = (np.array(stored[n], dtype=float) for n in ("margin", "rest", "distance"))
+        dynamic = np.array(stored["dynamic"], dtype=bool)
+        return cls(list(stored["verdict"]), margin, rest, dynamic, list(stored["error"]), distance)
 
 
 def judge(
@@ -112,7 +149,8 @@ def judge(
                 fresh &= draw.axes[:, 0] <= encounter.height  # clear of the ground at any attitude
                 friction[fresh], decided[fresh] = close[fresh], sharper[fresh]
     dynamic = decided == UNDECIDED
-    out = Judged([""] * n, np.full(n, np.nan), friction[:, 0].copy(), dynamic, [""] * n)
+    distance = np.full(n, passage.distance)
+    out = Judged([""] * n, np.full(n, np.nan), friction[:, 0].copy(), dynamic, [""] * n, distance)
     for i in (int(k) for k in np.flatnonzero(~dynamic)):
         intact = decided[i] == INTACT
         out.verdict[i] = Verdict.INTACT if intact else Verdict.NOT_IN_EQUILIBRIUM

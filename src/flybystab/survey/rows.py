@@ -73,13 +73,16 @@ def body_row(passage: Passage, settings: Settings) -> Row:
     }
 
 
-def sampled_row(row: Row, passage: Passage, orbits: Spread, draw: Draws, result: Judged) -> Row:
+def sampled_row(row: Row, orbits: Spread, draw: Draws, result: Judged) -> Row:
     """The row of the catalogue body with what happens to the samples."""
     counts = Counter(result.verdict)
     judged = len(draw.rho) - counts[""]
     stands = judged - counts[Verdict.NOT_IN_EQUILIBRIUM]
     yielded = sum(counts[v] for v in YIELDED)
     low, high = wilson(yielded, stands)
+    sigma = orbits.sigma
+    if orbits.clones is not None and np.isnan(sigma):
+        sigma = orbits.clones.sigma(result.distance)
     row = row | {
         "samples": judged,
         "samples_dynamic": int(result.dynamic.sum()),
@@ -87,11 +90,9 @@ def sampled_row(row: Row, passage: Passage, orbits: Spread, draw: Draws, result:
         "p_yield": yielded / stands if stands else np.nan,
         "p_yield_low": low,
         "p_yield_high": high,
-        "distance_sigma": orbits.sigma / 1000.0,
-        "contributors": contributors(
-            inputs(draw) | {"distance": orbits.distances(passage, len(draw.rho))}, result.margin
-        ),
-        "drawn": "; ".join((*draw.drawn, *(("orbit",) if orbits.passages else ()))),
+        "distance_sigma": sigma / 1000.0,
+        "contributors": contributors(inputs(draw) | {"distance": result.distance}, result.margin),
+        "drawn": "; ".join((*draw.drawn, *(("orbit",) if orbits.clones else ()))),
         "assumed": "; ".join(filter(None, (row["assumed"], orbits.note))),
     }
     failures = [e for e in result.error if e]
@@ -105,10 +106,9 @@ def _rise(most: float, rest: float) -> float:
     return most - rest if np.isfinite(rest) else np.nan
 
 
-def sample_rows(passage: Passage, orbits: Spread, attitudes: Attitudes, result: Judged) -> Iterator[Row]:
+def sample_rows(passage: Passage, attitudes: Attitudes, result: Judged) -> Iterator[Row]:
     """Rows of the samples of one encounter."""
     draw = attitudes.draws
-    distances = orbits.distances(passage, len(draw.rho))
     for i in range(len(draw.rho)):
         pole = attitudes.pole(i)
         yield {
@@ -116,7 +116,7 @@ def sample_rows(passage: Passage, orbits: Spread, attitudes: Attitudes, result: 
             "planet": passage.planet,
             "jd_tdb": float(passage.time.tdb.jd),
             "sample": i,
-            "distance": float(distances[i]) / AU,
+            "distance": float(result.distance[i]) / AU,
             **{f"semi_axis_{x}": float(a) for x, a in zip("abc", draw.axes[i], strict=True)},
             "density": float(draw.rho[i]),
             "spin_period": float(draw.period[i]) / 3600.0,

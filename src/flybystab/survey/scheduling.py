@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from dataclasses import dataclass
 from itertools import islice
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 from flybystab.errors import WorkersLost
 from flybystab.survey.catalogue import Asteroid
@@ -43,8 +43,34 @@ class _Piece(NamedTuple):
     """Where the answer of a call for a part belongs."""
 
     asteroid: _Asteroid
+    number: int
     passage: Begun
     first: int
+
+
+class Parts(Protocol):
+    """Keeps the parts of asteroids that take long."""
+
+    def add(self, asteroid: int, passage: int, first: int, judged: Judged) -> None:
+        """Keep a part: samples from `first` on of one of the asteroid's passages."""
+
+    def of(self, asteroid: int) -> Sequence[Mapping[str, Any]]:
+        """Parts of an asteroid that were kept before, with ``passage``, ``first`` and what `Judged.stored` gave."""
+
+
+class Here(Executor):
+    """Computes at once, in the caller."""
+
+    _max_workers = 1
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """The answer, in a future that is done."""
+        future: Future[Any] = Future()
+        try:
+            future.set_result(fn(*args, **kwargs))
+        except Exception as error:
+            future.set_exception(error)
+        return future
 
 
 def scheduled(
@@ -58,6 +84,7 @@ def scheduled(
     window: int,
     block: int,
     report: Callable[[float], None] | None = None,
+    parts: Parts | None = None,
 ) -> Iterator[tuple[int, Rows]]:
     """Rows of the asteroids at the positions `todo`, as they are done: (position, rows).
 
@@ -73,6 +100,8 @@ def scheduled(
         Samples by the dynamics in one part (:func:`flybystab.survey.tasks.begun`).
     report : callable, optional
         Called after every part with what is done of the asteroids in work, as a number of asteroids.
+    parts : Parts, optional
+        Keeps parts that are done, and has those of an earlier run.
 
     Raises
     ------
@@ -114,6 +143,8 @@ def scheduled(
                 if isinstance(call, _Piece):
                     call.passage.take(call.first, answer)
                     asteroid = call.asteroid
+                    if parts is not None:
+                        parts.add(asteroid.position, call.number, call.first, answer)
                     asteroid.open -= not call.passage.left
                     asteroid.done += len(answer.verdict)
                     begun[asteroid.position] = asteroid.done / asteroid.samples
@@ -124,9 +155,13 @@ def scheduled(
                         report(sum(begun.values()))
                     continue
                 for i, work in zip(call, answer, strict=True):
-                    left = [w for w in work if isinstance(w, Begun)]
+                    for part in () if parts is None else parts.of(i):
+                        found = work[part["passage"]] if part["passage"] < len(work) else None
+                        if isinstance(found, Begun):
+                            found.take_stored([part])
+                    left = [(n, w) for n, w in enumerate(work) if isinstance(w, Begun) and w.left]
                     if left:
-                        samples = sum(w.left for w in left)
+                        samples = sum(w.left for _, w in left)
                         waiting.append(_pieces(_Asteroid(i, work, len(left), samples), left))
                     else:
                         yield i, joined(work, settings)
@@ -135,10 +170,10 @@ def scheduled(
             future.cancel()
 
 
-def _pieces(asteroid: _Asteroid, left: Sequence[Begun]) -> Iterator[tuple[_Piece, Part]]:
-    for passage in left:
-        for first, part in passage.parts():
-            yield _Piece(asteroid, passage, first), part
+def _pieces(asteroid: _Asteroid, left: Sequence[tuple[int, Begun]]) -> Iterator[tuple[_Piece, Part]]:
+    for number, passage in left:
+        for first, part in list(passage.parts()):
+            yield _Piece(asteroid, number, passage, first), part
 
 
 def _positions(call: list[int] | _Piece) -> list[int]:

@@ -15,7 +15,7 @@ import time as clock
 from collections import Counter
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -31,17 +31,18 @@ from flybystab.sky.ephemeris import ephemeris
 from flybystab.survey.catalogue import Asteroid
 from flybystab.survey.columns import COLUMNS, SAMPLE_COLUMNS
 from flybystab.survey.journal import Journal
+from flybystab.survey.judging import Judged
 from flybystab.survey.outputs import Outputs
 from flybystab.survey.passages import Finder, passages
 from flybystab.survey.population import Population
 from flybystab.survey.progress import Progress
 from flybystab.survey.results import Column, table_of
 from flybystab.survey.rows import Row
-from flybystab.survey.scheduling import scheduled, window_of
+from flybystab.survey.scheduling import Here, Parts, scheduled, window_of
 from flybystab.survey.selection import listed
 from flybystab.survey.settings import Settings, settings
 from flybystab.survey.table_files import check_output
-from flybystab.survey.tasks import Rows, begin, block_of, joined
+from flybystab.survey.tasks import Rows, block_of
 
 
 class Screening:
@@ -100,6 +101,7 @@ class Screening:
         window: int | None = None,
         block: int | None = None,
         report: Callable[[float], None] | None = None,
+        parts: Parts | None = None,
     ) -> Iterator[tuple[int, Rows]]:
         """Results of the asteroids that are not in `skip`, as they are done: (position, result).
 
@@ -115,12 +117,12 @@ class Screening:
             Samples by the dynamics in one call of a worker. The rows do not depend on it.
         report : callable, optional
             Called with what is done of the asteroids in work, as a number of asteroids.
+        parts : Parts, optional
+            Keeps parts of asteroids that take long, and has those of an earlier run.
         """
         todo = (i for i in range(len(self.asteroids)) if i not in skip)
         if executor is None:
-            for i in todo:
-                yield i, joined(begin(self.asteroids[i], self.settings, self.finder), self.settings)
-            return
+            executor, window = Here(), 1
         yield from scheduled(
             self.asteroids,
             todo,
@@ -131,6 +133,7 @@ class Screening:
             window=window or window_of(executor),
             block=block or block_of(self.settings.samples),
             report=report,
+            parts=parts,
         )
 
     def run(
@@ -218,7 +221,8 @@ class Screening:
                 outputs = Outputs(journal, tables, self.meta())
                 outputs.follow()
             tell()
-            for i, result in self.results(executor, skip=journal, chunk=chunk, report=tell):
+            kept = _Kept(journal, writing)
+            for i, result in self.results(executor, skip=journal, chunk=chunk, report=tell, parts=kept):
                 with writing():
                     journal.add(i, result)
                     outputs.follow(i, result)
@@ -236,6 +240,20 @@ class Screening:
             raise
         journal.close(remove=True)
         return state()
+
+
+class _Kept:
+    """The parts of asteroids in work, in the journal."""
+
+    def __init__(self, journal: Journal, writing: Callable[[], AbstractContextManager[None]]) -> None:
+        self._journal, self._writing = journal, writing
+
+    def add(self, asteroid: int, passage: int, first: int, judged: Judged) -> None:
+        with self._writing():
+            self._journal.add_part(asteroid, passage, first, judged.stored())
+
+    def of(self, asteroid: int) -> list[dict[str, Any]]:
+        return self._journal.parts(asteroid)
 
 
 def screen(

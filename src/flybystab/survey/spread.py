@@ -2,7 +2,8 @@
 
 Where the covariance with its correlations is known and the distance is uncertain enough to matter, sample k
 meets the planet on clone k, followed with all forces: no linearisation. Elsewhere all samples share the
-nominal passage, and the row says why.
+nominal passage, and the row says why. A few clones tell which of the two it is; the others are drawn and followed
+where their samples are judged.
 """
 
 from __future__ import annotations
@@ -11,15 +12,18 @@ from typing import NamedTuple
 
 import astropy.units as u
 import numpy as np
+from astropy.time import Time
 from numpy.typing import NDArray
 
 from flybystab.errors import FlybystabError
-from flybystab.sky.distribution import EncounterDistribution, encounter_distribution
+from flybystab.sky.distribution import clone_passages, encounter_distribution
 from flybystab.sky.encounter import far_enough
 from flybystab.sky.orbit import later
 from flybystab.sky.planets import planet
 from flybystab.survey.draws import identity, stream
 from flybystab.survey.passages import Passage
+
+Array = NDArray[np.float64]
 
 #: Five sigma of the distance matter beyond this share of it: the tide then changes by three times as much.
 MATTERS = 1e-3
@@ -31,32 +35,72 @@ _PROBES = 16
 _SEARCH = 30.0 * u.d
 
 
+class Clones(NamedTuple):
+    """The clones of an asteroid at one passage, drawn and followed when they are asked for.
+
+    Attributes
+    ----------
+    passage : Passage
+        Of the nominal orbit.
+    time : Time
+        Its closest approach.
+    within : float
+        Largest distance of a passage, m. A clone that does not come near is judged there.
+    samples, key : int
+        Number of all clones, and seed: clone k depends on the key and k alone.
+    """
+
+    passage: Passage
+    time: Time
+    within: float
+    samples: int
+    key: int
+
+    def passages(self, first: int, last: int) -> list[Passage]:
+        """The passages of clones `first` to ``last - 1``; those of one clone do not depend on the others."""
+        p = self.passage
+        clones = p.asteroid.orbit.clones(self.samples, self.key, first=first, last=last)
+        offset, distance, v_inf = clone_passages(
+            clones, p.planet, self.time, search=_SEARCH, within=self.within * u.m, threads=1
+        )
+        out = []
+        for k, orbit in enumerate(clones):
+            if np.isfinite(distance[k]):
+                time = later(self.time, float(offset[k]))
+                out.append(
+                    Passage(p.asteroid, p.planet, time, float(distance[k]), float(v_inf[k]), orbit=orbit)
+                )
+            else:
+                far = self.within, p.v_inf
+                out.append(Passage(p.asteroid, p.planet, self.time, *far, orbit=orbit, missed=True))
+        return out
+
+    def sigma(self, distance: Array) -> float:
+        """1-sigma of the distances of the samples, m, without the clones that do not come near."""
+        near = distance[distance < self.within]
+        return float(near.std(ddof=1)) if len(near) > 1 else np.nan
+
+
 class Spread(NamedTuple):
     """The orbit's part in the samples of a passage.
 
     Attributes
     ----------
-    passages : list of Passage or None
-        One a sample; None where all samples share the nominal one.
+    clones : Clones or None
+        One a sample; None where all samples share the nominal passage.
     sigma : float
-        1-sigma of the distance, m; nan where nothing is known.
+        1-sigma of the distance, m; nan where nothing is known, or where only all clones can tell.
     note : str
         Why the orbit is not drawn, for a reader; empty where it is, or where its error is too small to matter.
     """
 
-    passages: list[Passage] | None
+    clones: Clones | None
     sigma: float
     note: str
 
-    def distances(self, passage: Passage, samples: int) -> NDArray[np.float64]:
-        """Distance of each sample's passage, m."""
-        if self.passages is None:
-            return np.full(samples, passage.distance)
-        return np.array([p.distance for p in self.passages])
-
 
 def spread(passage: Passage, samples: int, seed: int) -> Spread:
-    """The passages of the samples of one passage.
+    """Whether the samples of a passage have orbits of their own, and which.
 
     Parameters
     ----------
@@ -76,43 +120,26 @@ def spread(passage: Passage, samples: int, seed: int) -> Spread:
     body = planet(passage.planet)
     key = int(stream(seed, "orbit", identity(asteroid)).integers(2**62))
     within = max(1.5 * passage.distance, far_enough(body))
-
-    def found(n: int) -> EncounterDistribution:
-        return encounter_distribution(
+    try:
+        few = encounter_distribution(
             asteroid.orbit,
             body.name,
             passage.time,
-            n=n,
+            n=min(samples, _PROBES),
             seed=key,
             search=_SEARCH,
             within=within * u.m,
             threads=1,
         )
-
-    try:
-        few = found(min(samples, _PROBES))
-        linear = few.linear
-        if linear is not None and linear.nonlinearity < LINEAR:
-            sigma = linear.distance_sigma
-        elif few.found.sum() > 1:
-            sigma = few.distance_sigma
-        else:
-            sigma = np.inf * u.km
-        if 5.0 * sigma.to_value(u.m) < MATTERS * passage.distance:
-            return Spread(None, float(sigma.to_value(u.m)), "")
-        all_ = few if samples <= _PROBES else found(samples)
     except FlybystabError as error:
         return Spread(None, np.nan, f"orbit without errors ({type(error).__name__}: {error})")
-    out = []
-    for k in range(samples):
-        here = bool(all_.found[k])
-        # A clone that does not come near is judged at the edge of the search.
-        distance = float(all_.distance[k].to_value(u.m)) if here else within
-        v_inf = float(all_.v_inf[k].to_value(u.m / u.s)) if here else passage.v_inf
-        time = later(all_.time, float(all_.time_offset[k].to_value(u.s))) if here else all_.time
-        out.append(
-            Passage(asteroid, passage.planet, time, distance, v_inf, orbit=all_.clones[k], missed=not here)
-        )
-    if not np.isfinite(sigma.to_value(u.m)):
-        sigma = all_.distance_sigma if all_.found.sum() > 1 else np.nan * u.m
-    return Spread(out, float(sigma.to_value(u.m)), "")
+    linear = few.linear
+    if linear is not None and linear.nonlinearity < LINEAR:
+        sigma = float(linear.distance_sigma.to_value(u.m))
+    elif few.found.sum() > 1:
+        sigma = float(few.distance_sigma.to_value(u.m))
+    else:
+        sigma = np.nan
+    if 5.0 * sigma < MATTERS * passage.distance:
+        return Spread(None, sigma, "")
+    return Spread(Clones(passage, few.time, within, samples, key), sigma, "")

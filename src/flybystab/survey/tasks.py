@@ -1,24 +1,26 @@
 """Units of work of a screening: an asteroid, and parts of the samples of a passage that takes long.
 
 A worker begins an asteroid: it finds the passages, judges the catalogue body and, in each passage, a few samples. The
-other samples are judged at once where the bound decides, and left in parts for all workers where the dynamics has to:
-one asteroid in one deep passage keeps every core busy. A sample depends on the seed, the asteroid and its own number
-(:mod:`flybystab.survey.draws`), so that the rows are the same however the samples are split.
+other samples are judged at once where the bound decides, and left in parts for all workers where the dynamics has to,
+or where each has an orbit of its own to be followed: one asteroid in one passage keeps every core busy. A sample
+depends on the seed, the asteroid and its own number (:mod:`flybystab.survey.draws`), so that the rows are the same
+however the samples are split.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 from flybystab.errors import FlybystabError
 from flybystab.survey.catalogue import Asteroid
 from flybystab.survey.draws import Attitudes, draws
 from flybystab.survey.judging import Judged, judge, judge_each
-from flybystab.survey.passages import Finder, Passage, passages
+from flybystab.survey.passages import Finder, Passage
 from flybystab.survey.rows import Row, body_row, failed_row, sample_rows, sampled_row
 from flybystab.survey.settings import Settings
-from flybystab.survey.spread import Spread, spread
+from flybystab.survey.spread import Clones, Spread, spread
 
 #: ``rows`` of encounters, and ``samples`` where they are kept.
 Rows = dict[str, list[Row]]
@@ -26,8 +28,9 @@ Rows = dict[str, list[Row]]
 _PROBE = 8
 #: Least and largest number of samples that one part gives to the dynamics, and of parts between the two.
 _BLOCK, _LARGEST, _PARTS = 16, 256, 64
-#: A sample that the bound decides costs about this share of one that the dynamics decides.
-_BOUND = 1 / 64
+#: A sample that the bound decides costs about this share of one that the dynamics decides; the same on an orbit of its
+#: own.
+_BOUND, _FOLLOWED = 1 / 64, 1 / 16
 
 
 def block_of(samples: int) -> int:
@@ -42,14 +45,17 @@ class Part:
     Attributes
     ----------
     passage : Passage
-    clones : list of Passage or None
-        One a sample, where each has an orbit of its own.
+    clones : Clones or None
+        Where each sample has an orbit of its own.
+    first : int
+        Number of the first of these samples.
     attitudes : Attitudes
         Of these samples, with their bodies.
     """
 
     passage: Passage
-    clones: list[Passage] | None
+    clones: Clones | None
+    first: int
     attitudes: Attitudes
 
     def judged(self, settings: Settings) -> Judged:
@@ -57,7 +63,21 @@ class Part:
         given = self.attitudes.draws, self.attitudes, settings.material
         if self.clones is None:
             return judge(self.passage, *given, tolerance=settings.tolerance)
-        return judge_each(self.clones, *given, tolerance=settings.tolerance)
+        n = len(self.attitudes.uniform)
+        try:
+            followed = self.clones.passages(self.first, self.first + n)
+        except FlybystabError:  # one of them: it is found, whatever part it is in, by itself
+            return Judged.joined([self._one(self.clones, k, settings) for k in range(n)])
+        return judge_each(followed, *given, tolerance=settings.tolerance)
+
+    def _one(self, clones: Clones, k: int, settings: Settings) -> Judged:
+        """Verdict on the k-th of the samples alone."""
+        try:
+            followed = clones.passages(self.first + k, self.first + k + 1)
+        except FlybystabError as error:
+            return Judged.failed(f"{type(error).__name__}: {error}", clones.within)
+        one = self.attitudes.part(k, k + 1)
+        return judge_each(followed, one.draws, one, settings.material, tolerance=settings.tolerance)
 
 
 @dataclass
@@ -99,36 +119,40 @@ class Begun:
 
     def part(self, first: int, last: int) -> Part:
         """Samples `first` to ``last - 1``."""
-        clones = self.orbits.passages
-        return Part(
-            self.passage,
-            None if clones is None else clones[first:last],
-            self.attitudes.part(first, last),
-        )
+        return Part(self.passage, self.orbits.clones, first, self.attitudes.part(first, last))
 
     def parts(self) -> Iterator[tuple[int, Part]]:
-        """What is left after the first samples: parts with the numbers of their first samples."""
-        last = len(self.attitudes.uniform)
-        for k in range(last - self.left, last, self.size):
-            yield k, self.part(k, min(k + self.size, last))
+        """What is not judged yet: parts with the numbers of their first samples."""
+        ends = [*sorted(self.judged), len(self.attitudes.uniform)]
+        for begin, end in zip([0, *(k + len(self.judged[k].verdict) for k in ends[:-1])], ends, strict=True):
+            for k in range(begin, end, self.size):
+                yield k, self.part(k, min(k + self.size, end))
+
+    def take_stored(self, stored: Sequence[Mapping[str, Any]]) -> None:
+        """Keep what an earlier run has judged, as of :meth:`flybystab.survey.journal.Journal.parts`."""
+        for part in stored:
+            first, judged = int(part["first"]), Judged.restored(part)
+            last = first + len(judged.verdict)
+            if all(last <= k or first >= k + len(j.verdict) for k, j in self.judged.items()):
+                self.take(first, judged)
 
     def rows(self, settings: Settings) -> Rows:
         """The rows, when all samples are judged."""
         result = Judged.joined([self.judged[first] for first in sorted(self.judged)])
-        row = sampled_row(self.row, self.passage, self.orbits, self.attitudes.draws, result)
-        kept = sample_rows(self.passage, self.orbits, self.attitudes, result) if settings.keep_samples else ()
+        row = sampled_row(self.row, self.orbits, self.attitudes.draws, result)
+        kept = sample_rows(self.passage, self.attitudes, result) if settings.keep_samples else ()
         return {"rows": [row], "samples": list(kept)}
 
 
-def begun(passage: Passage, settings: Settings, block: int | None = None) -> Rows | Begun:
+def begun(passage: Passage, settings: Settings, block: int) -> Rows | Begun:
     """The rows of a passage, or what is left of it.
 
     Parameters
     ----------
     passage : Passage
     settings : Settings
-    block : int, optional
-        Samples by the dynamics in one part; None does everything here.
+    block : int
+        Samples by the dynamics in one part.
     """
     row = body_row(passage, settings)
     n = settings.samples
@@ -137,20 +161,18 @@ def begun(passage: Passage, settings: Settings, block: int | None = None) -> Row
     draw = draws(passage.asteroid, n, settings.seed, settings.population)
     attitudes = Attitudes.at(passage.asteroid, draw, settings.seed, *passage.key)
     work = Begun(passage, row, spread(passage, n, settings.seed), attitudes)
-    probe = n if block is None else min(n, block, _PROBE)
+    probe = min(n, block, _PROBE)
     first = work.take(0, work.part(0, probe).judged(settings))
-    if block is not None and work.left:
-        heavy = probe if work.orbits.passages is not None else int(first.dynamic.sum())
-        work.size = max(1, int(block / max(heavy / probe, _BOUND)))
+    if work.left:
+        least = _BOUND if work.orbits.clones is None else _FOLLOWED
+        work.size = max(1, int(block / max(first.dynamic.mean(), least)))
         if work.left > work.size:
             return work
         work.take(probe, work.part(probe, n).judged(settings))
     return work.rows(settings)
 
 
-def begin(
-    asteroid: Asteroid, settings: Settings, finder: Finder = passages, block: int | None = None
-) -> list[Rows | Begun]:
+def begin(asteroid: Asteroid, settings: Settings, finder: Finder, block: int) -> list[Rows | Begun]:
     """An asteroid's passages, each as its rows or as what is left of it. What fails is a row that says why."""
     try:
         found = finder(asteroid, settings)
