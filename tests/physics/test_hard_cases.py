@@ -308,6 +308,33 @@ def test_the_first_end_of_dispersed_motion_is_the_one_that_counts(beyond):
     assert [what for what, _ in log] == ([CONTACT] if beyond > 0.0 else [])
 
 
+@pytest.mark.parametrize(("q", "bounces"), [(1.520, 3), (1.522, 3), (1.523, 2)])
+def test_contact_lost_in_a_dip_of_the_pressure(q, bounces):
+    """For seconds the pressure falls to nothing (beyond q = 1.5225, nearly): seen at any tolerance, in any step.
+
+    The dilatancy fades meanwhile, and no step straddles the kink where that begins: answers are as good as the
+    tolerance. To rest the flow goes along a face of the section.
+    """
+    body = Body(
+        [891, 823, 766] * u.m,
+        1874 * u.kg / u.m**3,
+        spin=[0, 0, -2.0 * np.pi / (5.038 * 3600)] * u.rad / u.s,
+        material=material(35.37, dilatancy=1.0, yield_surface="mohr-coulomb"),
+    )
+    e = earth(q, 8.13)
+    attitude = Rotation.from_euler("zxz", [42, 121, 128], degrees=True).as_matrix()
+    tight = carried(body, e.t_start, e.t_stop, e.tide, attitude, tolerance=1e-12)
+    assert [x[0] for x in tight.events] == ["onset", *bounces * ["loss of contact", "contact"], "arrest"]
+    for tolerance in (1e-5, 1e-6, 1e-7, 1e-8, 1e-9):
+        p = carried(body, e.t_start, e.t_stop, e.tide, attitude, tolerance=tolerance)
+        assert [x[0] for x in p.events] == [x[0] for x in tight.events]
+        np.testing.assert_allclose(axes_of(p.shape), axes_of(tight.shape), rtol=tolerance)
+        late = [abs(x[1] - y[1]) for x, y in zip(p.events, tight.events, strict=True)]
+        assert max(late) < 1e4 * tolerance
+        # D comes to rest normal to a face of the section, to the last
+        assert p.events[-1][2] == pytest.approx(tight.events[-1][2], abs=1e-3)
+
+
 def test_frictionless_impulse_is_the_closed_form():
     """beta = 0 and no friction: L += -(tr L/tr S^-1) S^-1."""
     from flybystab.core.contact import SLIDING, friction_impulse

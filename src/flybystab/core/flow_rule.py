@@ -18,6 +18,12 @@ Array = NDArray[np.float64]
 
 
 @kernel
+def fade(par: Array) -> float:
+    """``V/V0`` where the dilatancy begins to fade."""
+    return par[EXPANSION] - 0.1 * (par[EXPANSION] - 1.0)
+
+
+@kernel
 def dilatancy(volume: float, par: Array) -> tuple[float, float]:
     """``beta`` and ``d beta/dV`` at ``V/V0``: constant, then faded to zero where the material is loosest.
 
@@ -27,7 +33,7 @@ def dilatancy(volume: float, par: Array) -> tuple[float, float]:
     """
     beta = par[BETA]
     end = par[EXPANSION]
-    begin = end - 0.1 * (end - 1.0)
+    begin = fade(par)
     if beta == 0.0 or volume <= begin:
         return beta, 0.0
     if volume >= end:

@@ -30,11 +30,17 @@ Array = NDArray[np.float64]
 
 
 @kernel
+def _left(reason: int, y: Array, lost: float, limit: float, ws: Workspace) -> float:
+    """What is left to CONTACT, at the squared volume `lost`, or to BEYOND, at the axis ratio `limit` squared."""
+    return determinant(y[0:6]) - lost if reason == CONTACT else limit * limit - axis_ratio2(y, ws)
+
+
+@kernel
 def _end(regime: int, y: Array, lost: float, limit: float, ws: Workspace) -> int:
-    """CONTACT below the squared volume `lost`, BEYOND past the axis ratio `limit`, or DONE."""
-    if regime == DISPERSED and determinant(y[0:6]) < lost:
+    """The end that a state has passed: CONTACT, BEYOND, or DONE if none."""
+    if regime == DISPERSED and _left(CONTACT, y, lost, limit, ws) < 0.0:
         return CONTACT
-    return BEYOND if axis_ratio2(y, ws) > limit * limit else DONE
+    return BEYOND if _left(BEYOND, y, lost, limit, ws) < 0.0 else DONE
 
 
 @kernel
@@ -117,7 +123,16 @@ def follow_free(
                     low = mid
             explicit_at(high, y, N_FULL, ws.dense, ws.ys)
             reason = _end(regime, ws.ys, lost, limit, ws)
-            explicit_step(regime, t, y, N_FULL, high * h, par, tide, ws.work, k, ws.scale, ws.y1)
+            # Steps to the root, which the interpolant of a long step has less well than the step, by its slope.
+            near = high * (1.0 - 1e-3)
+            left = _left(reason, ws.ys, lost, limit, ws)
+            explicit_at(near, y, N_FULL, ws.dense, ws.ys)
+            slope = (left - _left(reason, ws.ys, lost, limit, ws)) / (high - near)
+            for turn in range(3):
+                explicit_step(regime, t, y, N_FULL, high * h, par, tide, ws.work, k, ws.scale, ws.y1)
+                if turn < 2 and slope < 0.0:
+                    late = _left(reason, ws.y1, lost, limit, ws) / slope
+                    high -= min(1e-3 * high, max(-1e-3 * high, late))
             copy(ws.y1, y, N_FULL)
             record(t + high * h, regime, y, par, 0.0, 0.0, 0.0, ws, hist, count)
             return reason, t + high * h

@@ -139,6 +139,17 @@ def beyond_face(sin_phi: float, det: float) -> float:
 
 
 @kernel
+def onto_face(sin_phi: float, det: float) -> tuple[float, float, float]:
+    """Coefficients of ``u`` and ``u^2 - 1/3`` in the normal of a Mohr-Coulomb face nearest to a unit deviator ``u``.
+
+    With the determinant of that normal.
+    """
+    s3 = min(1.0 - 5e-13, max(5e-13 - 1.0, -3.0 * SQRT6 * det))
+    a, b = _turned(np.arcsin(s3) / 3.0, s3, np.sqrt(1.0 - s3 * s3), -beyond_face(sin_phi, det))
+    return a, b, np.sin(3.0 * np.arctan(sin_phi / SQRT3)) / (3.0 * SQRT6)
+
+
+@kernel
 def normal(code: int, sin_phi: float, det: float) -> tuple[float, float, float, float, float]:
     """Stress on the yield section whose outward normal is a unit deviator ``u`` of determinant `det`.
 

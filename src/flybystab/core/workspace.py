@@ -54,7 +54,8 @@ class Workspace(NamedTuple):
     stress: Array
     sample: Array
     spare: Array
-    mark: Array  # largest mobilised friction, its time; step size; code of the event nearest in flow
+    mark: Array  # largest mobilised friction, its time; step size; in flow: code of the event nearest, volume ahead
+    ends: Array  # flow: event functions at the samples of a step, and last
 
 
 @kernel
@@ -81,7 +82,8 @@ def workspace() -> Workspace:
         np.zeros(6),
         np.zeros((2, N_SAMPLE + 1)),
         np.zeros(42),
-        np.zeros(4),
+        np.zeros(5),
+        np.zeros((4, N_SAMPLE + 2)),
     )
 
 
@@ -103,6 +105,7 @@ def borrowed_workspace(ws: Workspace) -> Workspace:
         borrowed(ws.sample),
         borrowed(ws.spare),
         borrowed(ws.mark),
+        borrowed(ws.ends),
     )
 
 
