@@ -22,6 +22,7 @@ from scipy.spatial.transform import Rotation
 from flybystab.aggregate.body import Material
 from flybystab.constants import G
 from flybystab.core.passage import passage
+from flybystab.core.quick import INTACT, NOT_IN_EQUILIBRIUM, quick_margins, tide_size
 from flybystab.errors import FlybystabError
 from flybystab.sky.encounter import Encounter
 from flybystab.sky.planets import planet
@@ -29,7 +30,6 @@ from flybystab.survey.catalogue import catalogue
 from flybystab.survey.draws import Attitudes, draws
 from flybystab.survey.judging import judge
 from flybystab.survey.passages import passages
-from flybystab.survey.quick import INTACT, NOT_IN_EQUILIBRIUM, quick_margins, tide_size
 from flybystab.survey.settings import settings
 
 PLANETS = ("earth", "moon", "venus", "mars", "mercury", "jupiter")

@@ -1,5 +1,7 @@
 """Odds of survival from the uncertainty of an orbit."""
 
+from dataclasses import replace
+
 import astropy.units as u
 import numpy as np
 import pytest
@@ -37,6 +39,9 @@ def uncertain():
 def test_each_clone_meets_its_own_fate(uncertain):
     """The same as one flyby on the real orbit of that clone, at that attitude."""
     found = fs.survival(PILE, uncertain, attitude=np.eye(3))
+    exact = fs.survival(PILE, uncertain, attitude=np.eye(3), quick=False)
+    assert np.array_equal(found.verdict, exact.verdict)
+    assert not exact.bounded.any()
     assert np.array_equal(found.verdict == "IMPACT", uncertain.impact)
     assert uncertain.impact.any()
     assert (found.verdict[~uncertain.impact] == "INTACT").any()
@@ -49,7 +54,21 @@ def test_each_clone_meets_its_own_fate(uncertain):
         )  # fmt: skip
         one = fs.flyby(PILE, encounter, fs.periapsis_axes(encounter) @ np.eye(3), error=False, history=False)
         assert found.verdict[k] == one.verdict
-        assert found.margin[k].to_value(u.deg) == pytest.approx(one.margin.to_value(u.deg), abs=0.3)
+        assert exact.margin[k].to_value(u.deg) == pytest.approx(one.margin.to_value(u.deg), abs=0.3)
+
+
+@pytest.mark.parametrize("miss", [25_000.0, 60_000.0, 200_000.0])
+def test_what_the_bound_decides_is_what_the_dynamics_says(miss):
+    """The same verdicts, and no margin above the exact one, over attitudes; most distant clones need no dynamics."""
+    spread = passing((miss, 3000.0), (0.15 * miss, 1000.0), n=30)
+    found, exact = (fs.survival(PILE, spread, seed=1, quick=q) for q in (True, False))
+    assert np.array_equal(found.verdict, exact.verdict)
+    sure = found.bounded
+    assert (found.verdict[sure] == "INTACT").all()
+    assert np.all(found.margin[sure] <= exact.margin[sure] + 1e-6 * u.deg)
+    assert np.array_equal(found.margin[~sure], exact.margin[~sure], equal_nan=True)
+    assert sure.mean() == {25_000.0: 0.0, 200_000.0: 1.0}.get(miss, pytest.approx(0.5, abs=0.499))
+    assert found.probabilities == exact.probabilities
 
 
 def test_probabilities_have_intervals_and_add_up(uncertain):
@@ -78,8 +97,10 @@ def test_a_known_orbit_gives_one_answer():
 
 def test_failures_widen_the_interval():
     verdict = np.array(["INTACT"] * 6 + ["FAILED"] * 2 + [str(Verdict.IMPACT)] * 2)
-    some = Survival(verdict, np.ones(10, dtype=bool), np.zeros(10) * u.deg, np.full(10, ""))
-    clean = Survival(np.where(verdict == "FAILED", "IMPACT", verdict), some.near, some.margin, some.failure)
+    some = Survival(
+        verdict, np.ones(10, dtype=bool), np.zeros(10) * u.deg, np.full(10, ""), np.zeros(10, dtype=bool)
+    )
+    clean = replace(some, verdict=np.where(verdict == "FAILED", "IMPACT", verdict))
     assert some.probability()[0] == 0.6
     assert some.probability()[1] == clean.probability()[1]
     assert some.probability()[2] > clean.probability()[2]

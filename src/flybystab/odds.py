@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from flybystab.aggregate.body import Body, Material
+from flybystab.core.quick import INTACT, quick_margins
 from flybystab.errors import InvalidInput
 from flybystab.many import flyby_many
 from flybystab.outcome import Verdict
@@ -35,15 +36,19 @@ class Survival:
     near : ndarray of bool, shape (n,)
         Clones that do come near.
     margin : Quantity, shape (n,)
-        Friction angle of the material less the one mobilised; nan where nothing was followed.
+        Friction angle of the material less the one mobilised, a lower limit to it where `bounded`; nan for clones that
+        do not come near and for impacts.
     failure : ndarray of str, shape (n,)
         Why a body could not be followed; its verdict is ``FAILED``.
+    bounded : ndarray of bool, shape (n,)
+        Clones whose tide is too small, whatever the attitude, to make the body yield: ``INTACT`` without the dynamics.
     """
 
     verdict: NDArray[np.str_]
     near: NDArray[np.bool_]
     margin: Quantity
     failure: NDArray[np.str_]
+    bounded: NDArray[np.bool_]
 
     def __len__(self) -> int:
         return len(self.verdict)
@@ -82,11 +87,13 @@ def survival(
     material: Material | None = None,
     tolerance: float = 1e-6,
     workers: int | None = None,
+    quick: bool = True,
 ) -> Survival:
     """Odds of the verdicts on a body whose orbit is uncertain.
 
     Each clone meets the planet on its own two-body path through closest approach (which has the tide of the
-    real one to about 1e-4 of its peak near the planet), with the body at an attitude of its own.
+    real one to about 1e-4 of its peak near the planet), with the body at an attitude of its own. Where a bound on the
+    stress (:mod:`flybystab.core.quick`) proves that the body cannot yield there, that decides.
 
     Parameters
     ----------
@@ -102,6 +109,8 @@ def survival(
         Instead of the body's own.
     tolerance, workers
         As in :func:`flybystab.flyby_many`.
+    quick : bool
+        Whether the bound may decide. The verdicts are the same without it, and every margin is exact.
     """
     n = len(distribution)
     bodies, rotations = spin_states(body, n, seed, material)
@@ -116,13 +125,43 @@ def survival(
     failure = np.full(n, "", dtype="U200")
     rows = np.flatnonzero(distribution.found & ~distribution.impact)
     speeds = np.nan_to_num(distribution.v_inf)
+    bounded = np.zeros(n, dtype=bool)
+    if quick:
+        for k in map(int, rows):
+            least = _bound(bodies[k], distribution, k, float(speeds[k].to_value(u.m / u.s)))
+            bounded[k] = least is not None
+            margin[k] = np.nan if least is None else least
+        rows = rows[~bounded[rows]]
     turns = [_periapsis_axes(distribution, int(k)) @ rotations[k] for k in rows]
     encounters = [
         Encounter.hyperbolic(distribution.planet, distribution.distance[k], speeds[k]) for k in rows
     ]
     table = flyby_many([bodies[k] for k in rows], encounters, turns, tolerance=tolerance, workers=workers)
     verdict[rows], margin[rows], failure[rows] = table.verdict, table.margin.to_value(u.deg), table.failure
-    return Survival(verdict, distribution.found, margin * u.deg, failure)
+    return Survival(verdict, distribution.found, margin * u.deg, failure, bounded)
+
+
+def _bound(body: Body, distribution: EncounterDistribution, k: int, speed: float) -> float | None:
+    """Least margin (deg) of a body on the two-body path of clone `k` at any attitude; None where it may yield or touch.
+
+    The tide of a point mass has the norm ``sqrt6 GM/r^3``; its integral over a whole hyperbola of semi-latus rectum
+    p and angular momentum h is ``sqrt6 GM 2 (nu + e sin nu)/(h p)``, nu the true anomaly of the asymptote.
+    """
+    planet, q = distribution.planet, float(distribution.distance[k].to_value(u.m))
+    if q - planet.impact_distance < body.axes[0]:
+        return None
+    e = 1.0 + q * speed * speed / planet.gm
+    p = q * (1.0 + e)
+    nu = np.arccos(-1.0 / e)
+    norm = 1.001 * np.sqrt(6.0) * planet.gm
+    m = body.material
+    friction, verdict = np.empty((1, 2)), np.zeros(1, dtype=np.int64)
+    quick_margins(
+        body.axes[None], np.array([body.rho]), body.omega[None], np.array([m.phi]), np.array([m.c_pa]),
+        m.surface_code, norm / q**3, norm * 2.0 * (nu + e * np.sin(nu)) / (np.sqrt(planet.gm * p) * p),
+        friction, verdict,
+    )  # fmt: skip
+    return float(np.rad2deg(m.phi - friction[0, 1])) if verdict[0] == INTACT else None
 
 
 def _periapsis_axes(distribution: EncounterDistribution, k: int) -> NDArray[np.float64]:

@@ -10,7 +10,7 @@ def refuse(self):
     raise PermissionError("read-only")
 
 caching._CacheLocator.ensure_cache_path = refuse  # neither the package's directory nor the user's can be written
-import flybystab.flybys, flybystab.sky.reboundry, flybystab.survey.quick
+import flybystab.flybys, flybystab.sky.reboundry, flybystab.core.quick
 from flybystab.core import jit
 
 @jit.kernel

@@ -12,9 +12,9 @@ import pytest
 from numba import njit
 from numba.core import event
 
+from flybystab.core import quick
 from flybystab.face import compiling
 from flybystab.face.cli import COMMANDS, main
-from flybystab.survey import quick
 from flybystab.survey.population import Population
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"

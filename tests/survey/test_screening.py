@@ -13,6 +13,7 @@ from scripted import NAMES, SPAN, day, screening, three
 
 from flybystab.aggregate.body import Material
 from flybystab.constants import AU, R_EARTH
+from flybystab.core.quick import tide_size
 from flybystab.errors import InvalidInput, OutOfSpan, OutputFailed, UnknownName
 from flybystab.sky.encounter import Encounter, usual_start
 from flybystab.sky.planets import planet
@@ -24,7 +25,6 @@ from flybystab.survey.judging import contributors, judge, wilson
 from flybystab.survey.passages import Passage
 from flybystab.survey.population import Population
 from flybystab.survey.progress import ProgressBar
-from flybystab.survey.quick import tide_size
 from flybystab.survey.results import read_results
 from flybystab.survey.screening import Screening, screen
 from flybystab.survey.settings import settings
@@ -248,7 +248,9 @@ def test_a_run_stopped_inside_an_asteroid_goes_on_with_its_parts(tmp_path, monke
     kept = [len(json.loads(line)["verdict"]) for line in journal.read_bytes().splitlines()[1:]]
     assert sum(kept) > 60
     assert read_results(out).meta["complete"] is False
-    journal.write_bytes(journal.read_bytes() + b'{"task": 0, "passage": 2, "fir')  # killed in the middle of a line
+    journal.write_bytes(
+        journal.read_bytes() + b'{"task": 0, "passage": 2, "fir'
+    )  # killed in the middle of a line
     judged.clear()
     run.run(out, samples_output=samples[1])
     assert sum(judged) == every - sum(kept)

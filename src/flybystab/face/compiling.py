@@ -37,7 +37,7 @@ def announce(stream: TextIO) -> Announcement:
 
 def announce_elsewhere(stream: TextIO) -> None:
     """Say at once that kernels will be compiled, in other processes, if the cache has none of a screening's."""
-    from flybystab.survey.quick import quick_margins
+    from flybystab.core.quick import quick_margins
 
     folder = quick_margins.stats.cache_path
     if folder is not None and not any(Path(folder).glob("quick.quick_margins-*.nbi")):

@@ -22,13 +22,13 @@ from astropy.units import Quantity
 from flybystab.aggregate.body import Body, Material
 from flybystab.constants import G
 from flybystab.core.passage import passage
+from flybystab.core.quick import quick_margins, tide_size
 from flybystab.errors import InvalidInput
 from flybystab.sky.encounter import Encounter
 from flybystab.sky.finder import find_encounters
 from flybystab.survey.attitude import attitude_matrix, isotropic_direction
 from flybystab.survey.catalogue import Asteroid
 from flybystab.survey.draws import identity, stream
-from flybystab.survey.quick import quick_margins, tide_size
 from flybystab.units import to_si, whole
 
 _TOLERANCE = 1e-7

@@ -13,13 +13,13 @@ from scipy.stats import rankdata
 
 from flybystab.aggregate.body import Material
 from flybystab.attitudes import periapsis_axes
+from flybystab.core.quick import INTACT, UNDECIDED, quick_margins
 from flybystab.errors import FlybystabError
 from flybystab.flybys import LOOSER
 from flybystab.many import flyby_many
 from flybystab.outcome import Verdict
 from flybystab.survey.draws import Attitudes, Draws
 from flybystab.survey.passages import Passage
-from flybystab.survey.quick import INTACT, UNDECIDED, quick_margins
 
 Array = NDArray[np.float64]
 

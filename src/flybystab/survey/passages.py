@@ -10,12 +10,12 @@ import numpy as np
 from astropy.time import Time
 
 from flybystab.constants import AU
+from flybystab.core.quick import tide_size
 from flybystab.errors import NoEncounter
 from flybystab.sky.encounter import SETTLE, Encounter, far_enough, usual_start
 from flybystab.sky.orbit import Orbit
 from flybystab.sky.planets import PLANETS, planet
 from flybystab.survey.catalogue import Asteroid
-from flybystab.survey.quick import tide_size
 from flybystab.survey.settings import Settings
 
 #: Nearer to the Earth than this (m) the Moon cannot be bounded without knowing where it is.

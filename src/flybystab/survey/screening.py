@@ -1,7 +1,7 @@
 """Many bodies through many encounters: which passages could reshape which asteroids, and how likely.
 
 Each asteroid is one task (:mod:`flybystab.survey.tasks`). Its encounters are found; at each one the catalogue body
-and the samples of :mod:`flybystab.survey.population` meet the tide. What the bound of :mod:`flybystab.survey.quick`
+and the samples of :mod:`flybystab.survey.population` meet the tide. What the bound of :mod:`flybystab.core.quick`
 decides is decided by it, the rest by the dynamics (:mod:`flybystab.survey.judging`), split over the workers where
 there is much of it. Tasks share nothing, and their random numbers depend on the seed, the asteroid and the sample
 only, so that any executor gives the same rows.

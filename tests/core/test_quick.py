@@ -9,13 +9,13 @@ import pytest
 
 from flybystab.aggregate.body import Material
 from flybystab.constants import GM_EARTH, R_EARTH, G
+from flybystab.core.quick import INTACT, NOT_IN_EQUILIBRIUM, UNDECIDED, quick_margins, tide_size
 from flybystab.core.statics import demand, rigid_stress
 from flybystab.sky.encounter import Encounter
 from flybystab.survey.catalogue import Asteroid
 from flybystab.survey.draws import Attitudes, draws
 from flybystab.survey.judging import judge as judged
 from flybystab.survey.passages import passages
-from flybystab.survey.quick import INTACT, NOT_IN_EQUILIBRIUM, UNDECIDED, quick_margins, tide_size
 from flybystab.survey.settings import settings
 
 honesty = runpy.run_path(str(Path(__file__).resolve().parents[2] / "benchmarks" / "honesty.py"))
