@@ -66,10 +66,10 @@ def apophis(folder: Path = DATA) -> list[tuple[str, str, float, float, float]]:
     models: list[tuple[str, tuple[str, ...] | None]] = [
         ("Sun, Venus, Earth, Moon, Mars, Jupiter", inner),
         ("all point masses", points),
-        ("... + Sun 1PN", (*points, "sun 1PN")),
-        ("... + Earth J2", (*points, "sun 1PN", "earth J2")),
-        ("... + Sun J2", (*points, "sun 1PN", "earth J2", "sun J2")),
-        ("... + A1, A2", (*points, "sun 1PN", "earth J2", "sun J2", "non-gravitational")),
+        ("... + 1PN", (*points, "1PN")),
+        ("... + Earth J2", (*points, "1PN", "earth J2")),
+        ("... + Sun J2", (*points, "1PN", "earth J2", "sun J2")),
+        ("... + A1, A2", (*points, "1PN", "earth J2", "sun J2", "non-gravitational")),
         ("every known force", FORCES),
         ("default (0.1 km)", None),
     ]

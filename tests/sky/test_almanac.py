@@ -17,7 +17,7 @@ from flybystab.sky.forces import FORCES, NonGravitational, acceleration, model
 
 @kernel
 def places_at(book, t, out):
-    places = Places(np.empty(16), np.empty(24), np.empty(48))
+    places = Places(np.empty(16), np.empty(24), np.empty(48), np.empty(48))
     find_places(book, t, True, places)
     gather(places, out[:10])
     for j in range(3):

@@ -46,7 +46,9 @@ def empty_room() -> Room:
 def borrowed_room(room: Room) -> Room:
     """The same room without reference counts, for use inside a kernel that has it as an argument."""
     p = room.places
-    return Room(borrowed(room.k), Places(borrowed(p.fast), borrowed(p.slow), borrowed(p.belt)))
+    return Room(
+        borrowed(room.k), Places(borrowed(p.fast), borrowed(p.slow), borrowed(p.belt), borrowed(p.heavy))
+    )
 
 
 @summing_kernel

@@ -15,9 +15,23 @@ from numpy.typing import NDArray
 from flybystab.constants import C_LIGHT
 from flybystab.core.jit import borrowed, kernel, pasted_kernel
 from flybystab.sky import forces as table
-from flybystab.sky.almanac import GRID, N_BELT, N_FAST, N_SLOW, SLOT, Almanac, Places, almanac, find_places
+from flybystab.sky.almanac import (
+    GRID,
+    HEAVY,
+    N_BELT,
+    N_FAST,
+    N_HEAVY,
+    N_SLOW,
+    SLOT,
+    Almanac,
+    Places,
+    almanac,
+    find_heavy,
+    find_places,
+)
 from flybystab.sky.ephemeris import BODIES, Window
 from flybystab.sky.forces import core, fade, model, push
+from flybystab.sky.relativity import of_source
 
 Array = NDArray[np.float64]
 
@@ -36,7 +50,9 @@ class Field(NamedTuple):
         Bodies with J2: slot (plus 8 on the slow grid), strength ``3/2 J2 GM a^2`` (m5/s2), pole, square of the
         radius of the core (m2).
     gm_pn : float
-        GM of the Sun for its 1PN term, zero without.
+        GM of the Sun if there is relativity, else zero.
+    heavy : ndarray, shape (2, 4)
+        GM in use of ``HEAVY`` and square of the radius of the core, where there is no relativity.
     head, data, gm : ndarray
         The ephemeris itself, for places to the last digit.
     """
@@ -50,6 +66,7 @@ class Field(NamedTuple):
     nothing: Array
     flat: Array
     gm_pn: float
+    heavy: Array
     head: Array
     data: Array
     gm: Array
@@ -86,6 +103,7 @@ def field(window: Window, forces: Iterable[str]) -> Field:
         np.zeros(N_BELT),
         np.array(rows).reshape(-1, 6),
         float(window.gm[0]) if flat_model[2] != 0.0 else 0.0,
+        np.array([used[: len(BODIES)], inner])[:, [BODIES.index(name) for name in HEAVY]],
         window.head,
         window.data,
         window.gm,
@@ -95,7 +113,7 @@ def field(window: Window, forces: Iterable[str]) -> Field:
 @kernel
 def empty_places() -> Places:
     """Room for the places of all bodies."""
-    return Places(np.zeros(4 * N_FAST), np.zeros(3 * N_SLOW), np.zeros(3 * N_BELT))
+    return Places(np.zeros(4 * N_FAST), np.zeros(3 * N_SLOW), np.zeros(3 * N_BELT), np.zeros(12 * N_HEAVY))
 
 
 @kernel
@@ -103,7 +121,7 @@ def borrowed_field(f: Field) -> Field:
     """The same field without reference counts, for use inside a kernel that has it as an argument."""
     b = f.book
     return Field(
-        Almanac(borrowed(b.when), borrowed(b.fast), borrowed(b.slow), borrowed(b.belt)),
+        Almanac(borrowed(b.when), borrowed(b.fast), borrowed(b.slow), borrowed(b.belt), borrowed(b.heavy)),
         borrowed(f.gm_fast),
         borrowed(f.gm_slow),
         borrowed(f.gm_belt),
@@ -112,6 +130,7 @@ def borrowed_field(f: Field) -> Field:
         borrowed(f.nothing),
         borrowed(f.flat),
         f.gm_pn,
+        borrowed(f.heavy),
         borrowed(f.head),
         borrowed(f.data),
         borrowed(f.gm),
@@ -121,11 +140,12 @@ def borrowed_field(f: Field) -> Field:
 @pasted_kernel
 def _pull(
     p: Array, slots: int, gm: Array, inner: Array, x: float, y: float, z: float
-) -> tuple[float, float, float, int]:
-    """Newton's pull of one grid, m/s2, and how many bodies the asteroid is inside of (left out)."""
+) -> tuple[float, float, float, float, int]:
+    """Newton's pull of one grid (m/s2), its potential (m2/s2), and in how many bodies the asteroid is (left out)."""
     ax = 0.0
     ay = 0.0
     az = 0.0
+    potential = 0.0
     inside = 0
     for i in range(slots):
         dx = p[i] - x
@@ -138,7 +158,8 @@ def _pull(
         ax += c * dx
         ay += c * dy
         az += c * dz
-    return ax, ay, az, inside
+        potential += c * r2
+    return ax, ay, az, potential, inside
 
 
 @kernel
@@ -175,13 +196,15 @@ def rate(field: Field, law: Array, t: float, y: Array, places: Places, out: Arra
     find_places(field.book, t, belt, places)
     fast, slow = places.fast, places.slow
     px, py, pz, vx, vy, vz = y[0], y[1], y[2], y[3], y[4], y[5]
-    ax, ay, az, n = _pull(fast, 4, field.gm_fast, field.inner_fast, px, py, pz)
-    bx, by, bz, m = _pull(slow, 8, field.gm_slow, field.inner_slow, px, py, pz)
+    ax, ay, az, potential, n = _pull(fast, 4, field.gm_fast, field.inner_fast, px, py, pz)
+    bx, by, bz, other, m = _pull(slow, 8, field.gm_slow, field.inner_slow, px, py, pz)
     ax += bx
     ay += by
     az += bz
+    potential += other
+    gx, gy, gz = ax, ay, az
     if belt:
-        bx, by, bz, _ = _pull(places.belt, 16, field.gm_belt, field.nothing, px, py, pz)
+        bx, by, bz, _, _ = _pull(places.belt, 16, field.gm_belt, field.nothing, px, py, pz)
         ax += bx
         ay += by
         az += bz
@@ -202,20 +225,50 @@ def rate(field: Field, law: Array, t: float, y: Array, places: Places, out: Arra
         ay += a * dy + b * row[3]
         az += a * dz + b * row[4]
     if field.gm_pn != 0.0:
-        dx = px - slow[0]
-        dy = py - slow[8]
-        dz = pz - slow[16]
-        ux = vx - fast[12]
-        uy = vy - fast[13]
-        uz = vz - fast[14]
-        r2 = dx * dx + dy * dy + dz * dz
-        r = np.sqrt(r2)
-        c = field.gm_pn / (C_LIGHT * C_LIGHT * r2 * r)
-        a = c * (4.0 * field.gm_pn / r - (ux * ux + uy * uy + uz * uz))
-        b = 4.0 * c * (dx * ux + dy * uy + dz * uz)
-        ax += a * dx + b * ux
-        ay += a * dy + b * uy
-        az += a * dz + b * uz
+        find_heavy(field.book, t, places)
+        q = places.heavy
+        ex, ey, ez = of_source(
+            field.gm_pn,
+            px - slow[0],
+            py - slow[8],
+            pz - slow[16],
+            fast[12],
+            fast[13],
+            fast[14],
+            q[40],
+            q[41],
+            q[42],
+            q[43],
+            vx,
+            vy,
+            vz,
+        )
+        for i in range(4):
+            dx, dy, dz = px - q[i], py - q[4 + i], pz - q[8 + i]
+            bx, by, bz = of_source(
+                0.0 if dx * dx + dy * dy + dz * dz < field.heavy[1, i] else field.heavy[0, i],
+                dx,
+                dy,
+                dz,
+                q[12 + i],
+                q[16 + i],
+                q[20 + i],
+                q[24 + i],
+                q[28 + i],
+                q[32 + i],
+                q[36 + i],
+                vx,
+                vy,
+                vz,
+            )
+            ex += bx
+            ey += by
+            ez += bz
+        a = vx * vx + vy * vy + vz * vz - 4.0 * potential
+        b = -4.0 * (gx * vx + gy * vy + gz * vz)
+        ax += (a * gx + b * vx + ex) / (C_LIGHT * C_LIGHT)
+        ay += (a * gy + b * vy + ey) / (C_LIGHT * C_LIGHT)
+        az += (a * gz + b * vz + ez) / (C_LIGHT * C_LIGHT)
     out[0], out[1], out[2], out[3], out[4], out[5] = vx, vy, vz, ax, ay, az
     if n + m > 0:
         _pull_inside(fast, 4, field.gm_fast, field.inner_fast, y, out)

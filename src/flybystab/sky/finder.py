@@ -77,7 +77,7 @@ def find_encounters(
     ephemeris : str or Ephemeris, optional
         ``"de421"``, ``"de440"``; the best installed by default.
     error : Quantity
-        Displacement that counts: of the point masses and the Sun's 1PN an asteroid is given those that can move
+        Displacement that counts: of the point masses and 1PN an asteroid is given those that can move
         it by more than a tenth of this before the end of the span; J2 of Sun, Earth and `planets` and its own
         A1, A2, A3 always.
     tolerance : float, optional

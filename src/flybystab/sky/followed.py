@@ -221,7 +221,7 @@ def _around(
     track = panel_track(_relative_to(flight, window, index, zero), t_in - zero, end - zero, tau)
 
     sources, kept, dropped = chosen_sources(track, window, index, body, zero, t_in, stop, 0.1 * accuracy / q)
-    axis = np.array(body.pole)
+    axis = np.array(body.pole_at(window.epoch))
 
     def tide(t: Array) -> Array:
         return tide_of(track, window, index, body, axis, zero, t, sources)

@@ -3,9 +3,8 @@
 The asteroid is massless; Sun, planets and Moon move on the ephemeris. Barycentric ICRF, m, s. Formulas:
 
 - point masses, Newton; inside 0.9 radii a smooth core, so that a plunge (an impact) stays finite;
-- Sun 1PN: ``GM/(c^2 r^3) [(4 GM/r - v^2) r + 4 (r.v) v]``, r and v from the Sun (Schwarzschild, harmonic
-  coordinates; Will 1993, Moyer 2003);
-- J2: ``-3/2 J2 GM a^2/r^5 [(1 - 5 s^2) r + 2 (r.p) p]``, ``s = r.p/r``, p the pole at J2000;
+- 1PN: :mod:`flybystab.sky.relativity`;
+- J2: ``-3/2 J2 GM a^2/r^5 [(1 - 5 s^2) r + 2 (r.p) p]``, ``s = r.p/r``, p the pole, the Earth's of date;
 - non-gravitational: ``g(r) (A1 er + A2 et + A3 en)`` with ``g = (1 au/r)^2`` for an asteroid and the
   water-ice law of Marsden, Sekanina & Yeomans 1973 for a comet.
 
@@ -20,18 +19,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from flybystab.constants import AU, C_LIGHT, DAY
+from flybystab.constants import AU, DAY
 from flybystab.core.jit import kernel
 from flybystab.errors import UnknownName
 from flybystab.sky.ephemeris import BELT, BELT_GM, BODIES, Window, series_position, series_state
 from flybystab.sky.planets import PLANETS
+from flybystab.sky.relativity import IS_SOURCE, one_pn
 
 Array = NDArray[np.float64]
 
 #: Every force the package knows, in the order in which their accelerations are reported.
 FORCES = (
     *(f"{name} point mass" for name in (*BODIES, *BELT)),
-    "sun 1PN",
+    "1PN",
     *(f"{name} J2" for name in BODIES),
     "non-gravitational",
 )
@@ -102,8 +102,8 @@ def model(window: Window, forces: Iterable[str], nongrav: NonGravitational | Non
         if f"{name} J2" in chosen:
             out[3] = 1.0
             strength = 1.5 * body.j2 * window.gm[i] * body.radius**2
-            out[_FLAT + 4 * i : _FLAT + 4 * i + 4] = strength, *body.pole
-    out[2] = float("sun 1PN" in chosen)
+            out[_FLAT + 4 * i : _FLAT + 4 * i + 4] = strength, *body.pole_at(window.epoch)
+    out[2] = float("1PN" in chosen)
     for i, name in enumerate(BELT, N_BODIES):
         if f"{name} point mass" in chosen:
             out[_USED + i] = BELT_GM[name]
@@ -115,23 +115,23 @@ def model(window: Window, forces: Iterable[str], nongrav: NonGravitational | Non
 
 
 @kernel
-def bodies(model: Array, t: float, out: Array, sun_rate: Array) -> None:
-    """Write the positions (m) of bodies at ``t`` into ``out[26, 3]``, and the Sun's velocity (m/s).
+def bodies(model: Array, t: float, out: Array, rates: Array) -> None:
+    """Write the positions (m) of bodies at ``t`` into ``out[26, 3]``, velocities (m/s) of ``SOURCES`` into ``rates``.
 
-    Massive asteroids that are not in use are left out.
+    Massive asteroids that are not in use are left out, and velocities that no force asks for.
     """
     head = model[_HEAD:_GM].reshape((26, 5))
     data = model[_DATA:]
-    if model[2] != 0.0 or model[4] != 0.0:
-        state = np.empty(6)
-        series_state(head, data, 0, t, state)
-        for j in range(3):
-            out[0, j] = state[j]
-            sun_rate[j] = state[3 + j]
-    else:
-        series_position(head, data, 0, t, out[0])
-    for i in range(1, 10):
-        series_position(head, data, i, t, out[i])
+    state = np.empty(6)
+    for i in range(10):
+        if (model[2] != 0.0 and IS_SOURCE[i]) or (model[4] != 0.0 and i == 0):
+            series_state(head, data, i, t, state)
+            for j in range(3):
+                out[i, j] = state[j]
+                rates[i, j] = state[3 + j]
+        else:
+            series_position(head, data, i, t, out[i])
+    # The Earth's velocity stays that of its barycentre with the Moon, 12 m/s off: the terms with it are small.
     for j in range(3):
         far = out[4, j]
         out[4, j] = out[3, j] + far
@@ -141,20 +141,6 @@ def bodies(model: Array, t: float, out: Array, sun_rate: Array) -> None:
             series_position(head, data, i, t, out[i])
             for j in range(3):
                 out[i, j] += out[0, j]
-
-
-@kernel
-def one_pn(gm: float, r: Array, v: Array, out: Array) -> None:
-    """Add the Schwarzschild 1PN acceleration (m/s2) at ``r`` (m), ``v`` (m/s) from the mass to ``out[3]``."""
-    r2 = r[0] * r[0] + r[1] * r[1] + r[2] * r[2]
-    d = np.sqrt(r2)
-    v2 = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
-    rv = r[0] * v[0] + r[1] * v[1] + r[2] * v[2]
-    c = gm / (C_LIGHT * C_LIGHT * r2 * d)
-    a = c * (4.0 * gm / d - v2)
-    b = 4.0 * c * rv
-    for j in range(3):
-        out[j] += a * r[j] + b * v[j]
 
 
 @kernel
@@ -216,9 +202,10 @@ def fade(s: float) -> float:
 
 
 @kernel
-def acceleration_among(model: Array, places: Array, sun_rate: Array, x: Array, v: Array, out: Array) -> None:
+def acceleration_among(model: Array, places: Array, rates: Array, x: Array, v: Array, out: Array) -> None:
     """Write into ``out[3]`` the acceleration (m/s2) at ``x`` (m), ``v`` (m/s); bodies at ``places`` (m)."""
-    ax = ay = az = 0.0
+    ax = ay = az = potential = 0.0
+    g = np.zeros(3)
     for i in range(26):
         gm = model[_USED + i]
         if gm == 0.0:
@@ -232,6 +219,11 @@ def acceleration_among(model: Array, places: Array, sun_rate: Array, x: Array, v
         ax += c * dx
         ay += c * dy
         az += c * dz
+        if i < 10 and r2 > inner * inner:
+            g[0] += c * dx
+            g[1] += c * dy
+            g[2] += c * dz
+            potential += c * r2
     out[0] = ax
     out[1] = ay
     out[2] = az
@@ -245,25 +237,25 @@ def acceleration_among(model: Array, places: Array, sun_rate: Array, x: Array, v
                     d[j] = x[j] - places[i, j]
                     r2 += d[j] * d[j]
                 oblateness(model[p] * fade(r2 / model[_INNER + i] ** 2), model[p + 1 : p + 4], d, out)
-    if model[2] != 0.0 or model[4] != 0.0:
+    if model[2] != 0.0:
+        gms, used, inners = model[_GM : _GM + 10], model[_USED : _USED + 10], model[_INNER : _INNER + 10]
+        one_pn(gms, used, inners, places, rates, g, potential, x, v, out)
+    if model[4] != 0.0:
         r = np.empty(3)
         w = np.empty(3)
         for j in range(3):
             r[j] = x[j] - places[0, j]
-            w[j] = v[j] - sun_rate[j]
-        if model[2] != 0.0:
-            one_pn(model[_GM], r, w, out)
-        if model[4] != 0.0:
-            push(model[6:14], r, w, out)
+            w[j] = v[j] - rates[0, j]
+        push(model[6:14], r, w, out)
 
 
 @kernel
 def acceleration(model: Array, t: float, x: Array, v: Array, out: Array) -> None:
     """Write into ``out[3]`` the acceleration (m/s2) at ``t`` (s), ``x`` (m), ``v`` (m/s)."""
     places = np.empty((26, 3))
-    sun_rate = np.zeros(3)
-    bodies(model, t, places, sun_rate)
-    acceleration_among(model, places, sun_rate, x, v, out)
+    rates = np.zeros((10, 3))
+    bodies(model, t, places, rates)
+    acceleration_among(model, places, rates, x, v, out)
 
 
 def shares(window: Window, t: Array, states: Array, nongrav: NonGravitational | None) -> dict[str, float]:
@@ -293,11 +285,12 @@ def shares(window: Window, t: Array, states: Array, nongrav: NonGravitational | 
 def _sizes(model: Array, t: Array, states: Array, out: Array) -> None:
     """Write the size (m/s2) of each force of ``FORCES`` at each point of a track into ``out[n, forces]``."""
     places = np.empty((26, 3))
-    rate = np.zeros(3)
+    rates = np.zeros((10, 3))
     a = np.empty(3)
+    g = np.empty(3)
     d = np.empty(3)
     for n in range(t.size):
-        bodies(model, t[n], places, rate)
+        bodies(model, t[n], places, rates)
         for i in range(26):
             r2 = 0.0
             for j in range(3):
@@ -310,9 +303,26 @@ def _sizes(model: Array, t: Array, states: Array, out: Array) -> None:
             oblateness(model[_FLAT + 4 * i], model[_FLAT + 4 * i + 1 : _FLAT + 4 * i + 4], d, a)
             out[n, _J2 + i] = np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2)
         r = states[n, :3] - places[0]
-        w = states[n, 3:] - rate
+        w = states[n, 3:] - rates[0]
         a[:] = 0.0
-        one_pn(model[_GM], r, w, a)
+        potential = 0.0
+        for i in range(10):
+            potential += model[_GM + i] / np.sqrt(np.sum((states[n, :3] - places[i]) ** 2))
+        for j in range(3):
+            g[j] = -model[_GM] * r[j] / np.sum(r * r) ** 1.5
+        gms = model[_GM : _GM + 10]
+        one_pn(
+            gms,
+            gms,
+            model[_INNER : _INNER + 10],
+            places,
+            rates,
+            g,
+            potential,
+            states[n, :3],
+            states[n, 3:],
+            a,
+        )
         out[n, _PN] = np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2)
         a[:] = 0.0
         if model[4] != 0.0:

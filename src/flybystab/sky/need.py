@@ -24,7 +24,7 @@ NAMES = (
     *(f"{name} point mass" for name in (*FAST, *SLOW)),
     *[None] * (N_SLOW - len(SLOW)),
     *(f"{name} point mass" for name in BELT),
-    "sun 1PN",
+    "1PN",
 )
 _POINTS = 32
 
@@ -107,7 +107,7 @@ def reduced(field: Field, share: Array, least: float, always: Array) -> Field:
         when[2, 2] = 0.0
     book = field.book
     return Field(
-        Almanac(when, book.fast, book.slow, book.belt),
+        Almanac(when, book.fast, book.slow, book.belt, book.heavy),
         fast,
         slow,
         belt,
@@ -116,6 +116,7 @@ def reduced(field: Field, share: Array, least: float, always: Array) -> Field:
         field.nothing,
         field.flat,
         field.gm_pn if share[N_SHARES - 1] >= least else 0.0,
+        field.heavy,
         field.head,
         field.data,
         field.gm,

@@ -317,13 +317,13 @@ def heliocentric(orbit: Orbit, ephemeris: str | Ephemeris | None = None) -> Arra
 
 
 def default_forces(orbit: Orbit, *bodies: str) -> tuple[str, ...]:
-    """All point masses, Sun 1PN, J2 of Sun, Earth and `bodies`, and A1, A2, A3 if the orbit has them."""
+    """All point masses, 1PN, J2 of Sun, Earth and `bodies`, and A1, A2, A3 if the orbit has them."""
     flat = {f"{name} J2" for name in ("sun", "earth", *bodies)}
     return tuple(
         name
         for name in FORCES
         if name.endswith("point mass")
-        or name == "sun 1PN"
+        or name == "1PN"
         or name in flat
         or (name == "non-gravitational" and any(orbit.nongrav.a))
     )

@@ -23,6 +23,7 @@ from dataclasses import dataclass
 
 import astropy.units as u
 import numpy as np
+from astropy.time import Time
 from astropy.units import Quantity
 
 from flybystab.constants import AU, GM_EARTH, R_EARTH
@@ -72,6 +73,22 @@ class Planet:
         if distance < self.radius:
             return "surface"
         return "atmosphere" if distance < self.impact_distance else None
+
+    def pole_at(self, time: Time) -> tuple[float, float, float]:
+        """Unit vector of the rotation pole, ICRF.
+
+        The Earth's moves by 0.56 deg a century (IAU 2006 precession, Capitaine et al. 2003: X = 2004.19" T - 0.43" T^2,
+        Y = -22.41" T^2, nutation of 9" left out): after the 2029 passage of Apophis that is 3 km within a year. The
+        others' stay, to 0.1 deg a century.
+        """
+        if self.name != "earth":
+            return self.pole
+        t = (time.tdb.jd - 2451545.0) / 36525.0
+        x, y = (
+            np.radians((2004.191898 * t - 0.4297829 * t * t) / 3600.0),
+            np.radians(-22.4072747 * t * t / 3600.0),
+        )
+        return float(x), float(y), float(np.sqrt(1.0 - x * x - y * y))
 
     def __repr__(self) -> str:
         return f"<Planet {self.name}, radius {self.radius / 1e3:.0f} km>"
