@@ -13,7 +13,7 @@ from flybystab.aggregate.body import YIELD_SURFACES, Body
 from flybystab.attitudes import attitude_matrix, periapsis_axes
 from flybystab.core.outcome import principal_axes
 from flybystab.core.passage import REGIMES
-from flybystab.core.rheology import required_friction
+from flybystab.core.rheology import required_frictions
 from flybystab.errors import InvalidInput, NotConverged
 from flybystab.flyby_results import FlybyError, FlybyResult, History
 from flybystab.outcome import letter_of
@@ -205,12 +205,7 @@ def _history(h: dict[str, Array] | None, encounter: Encounter, body: Body) -> Hi
     if h is None:
         return None
     m = body.material
-    required = np.array(
-        [
-            required_friction(m.surface_code, m.c_pa, s, p, d)
-            for s, p, d in zip(h["deviator"], h["pressure"], h["determinant"], strict=True)
-        ]
-    )
+    required = required_frictions(m.surface_code, m.c_pa, h["deviator"], h["pressure"], h["determinant"])
     return History(
         time=(h["time"] - encounter.t_start) * u.s,
         time_from_periapsis=h["time"] * u.s,

@@ -296,6 +296,15 @@ def required_friction(code: int, cohesion: float, s: float, p: float, det: float
 
 
 @kernel
+def required_frictions(code: int, cohesion: float, s: Array, p: Array, det: Array) -> Array:
+    """`required_friction` of each of a row of stresses."""
+    out = np.empty(len(s))
+    for i in range(len(s)):
+        out[i] = required_friction(code, cohesion, s[i], p[i], det[i])
+    return out
+
+
+@kernel
 def _bears(code: int, phi: float, cohesion: float, s: float, p: float, det: float) -> bool:
     g = slope_over_sine(code, np.sin(phi), det)
     return s <= g * (p * np.sin(phi) + cohesion * np.cos(phi))
