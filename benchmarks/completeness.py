@@ -26,8 +26,8 @@ from astropy.table import QTable
 from astropy.time import Time
 
 from flybystab.sky.finder import find_encounters
-from flybystab.survey.asteroid import Asteroid, key_of
-from flybystab.survey.catalogue import catalogue
+from flybystab.survey.asteroid import Asteroid
+from flybystab.survey.catalogue import catalogue, key_of
 
 DATA = Path(os.environ.get("FLYBYSTAB_SHARED", Path(__file__).resolve().parents[1] / "../shared")) / "data"
 SPAN = Time("1950-01-01", scale="tdb"), Time("2050-01-01", scale="tdb")

@@ -1,7 +1,4 @@
-"""One asteroid of a catalogue: its body and its orbit, each value with its source.
-
-A value that nobody measured is flagged as assumed. The columns are explained in ``data/README.md``.
-"""
+"""One asteroid of a catalogue: its body and its orbit, built from its record."""
 
 from __future__ import annotations
 
@@ -9,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
-from types import MappingProxyType
 from typing import TYPE_CHECKING, Any
 
 import astropy.units as u
@@ -21,6 +17,7 @@ from flybystab.aggregate.body import Body, Material
 from flybystab.errors import InvalidInput
 from flybystab.survey.attitude import attitude_matrix, ecliptic_direction, free_spin, tumbling_state
 from flybystab.survey.covariances import embedded_covariance
+from flybystab.survey.record import BODILY, ORBIT, ORBIT_SI, ORBITAL, SHAPE, Record
 
 if TYPE_CHECKING:
     from flybystab.sky.covariance import Covariance
@@ -28,63 +25,6 @@ if TYPE_CHECKING:
 
 #: Version of the embedded table: the date of its newest source.
 CATALOGUE_DATE = "2026-07"
-
-_LENGTH = ("semi_axis_a_m", "semi_axis_b_m", "semi_axis_c_m", "diameter_m")
-_HOURS = ("spin_period_h", "precession_period_h", "rotation_period_h")
-_ANGLES = ("i_deg", "node_deg", "peri_deg", "M_deg")
-
-#: Unit of every numeric column.
-UNITS: Mapping[str, u.UnitBase] = MappingProxyType(
-    dict.fromkeys(_LENGTH, u.m)
-    | {c[:-2] + "_sigma_m": u.m for c in _LENGTH}
-    | dict.fromkeys(_HOURS, u.h)
-    | {c[:-2] + "_sigma_h": u.h for c in _HOURS}
-    | {"density_kg_m3": u.kg / u.m**3, "density_sigma_kg_m3": u.kg / u.m**3}
-    | dict.fromkeys(("pole_ecl_lon_deg", "pole_ecl_lat_deg", *_ANGLES), u.deg)
-    | {"sigma_" + c: u.deg for c in _ANGLES}
-    | {"H_mag": u.mag, "amplitude_mag": u.mag, "epoch_jd_tdb": u.d, "a_au": u.au, "sigma_a_au": u.au}
-    | dict.fromkeys(("A1_au_d2", "A2_au_d2", "A3_au_d2"), u.au / u.d**2)
-    | dict.fromkeys(
-        ("e", "sigma_e", "inertia_a_over_c", "inertia_b_over_c", "condition_code"), u.dimensionless_unscaled
-    )
-)
-
-#: Text columns.
-TEXTS = (
-    *(
-        "number",
-        "name",
-        "designation",
-        "aliases",
-        "orbit_class",
-        "pha",
-        "taxonomic_class",
-        "taxonomic_source",
-    ),
-    *("binary", "shape_kind", "semi_axes_source", "diameter_source", "spin_state", "spin_source"),
-    *("amplitude_source", "pole_source", "tumbling_mode", "tumbling_source", "density_assumed"),
-    *("density_source", "frame", "sigma_source", "nongrav_source", "orbit_solution"),
-    *("condition_code_source", "orbit_source", "assumed", "unchecked", "notes"),
-)
-
-_ORBIT = ("epoch_jd_tdb", "a_au", "e", "i_deg", "node_deg", "peri_deg", "M_deg")
-_ORBIT_SI = np.array([UNITS[c].si.scale for c in _ORBIT[1:]])
-#: Columns of an orbit: kept as they are when a row is completed from another.
-_ORBITAL = frozenset(
-    {*_ORBIT, "A1_au_d2", "A2_au_d2", "A3_au_d2", "frame", "sigma_source", "nongrav_source"}
-    | {"sigma_" + c for c in _ORBIT[1:]}
-    | {"orbit_solution", "orbit_source", "condition_code", "condition_code_source"}
-)
-#: Columns that belong together: taken from the completing row as a whole.
-_BODILY = frozenset(
-    c for c in (*UNITS, *TEXTS) if c.startswith(("semi_axis", "semi_axes", "diameter", "spin_"))
-)
-_SHAPE = ("semi_axis_a_m", "semi_axis_b_m", "semi_axis_c_m")
-
-
-def key_of(name: object) -> str:
-    """A name as it is compared: no case, no spaces, no brackets."""
-    return "".join(c for c in str(name).casefold() if not c.isspace() and c not in "()_")
 
 
 @lru_cache(maxsize=64)
@@ -95,7 +35,7 @@ def _day(jd: float) -> Time:
 
 
 @dataclass(frozen=True, eq=False)
-class Asteroid:
+class Asteroid(Record):
     """One asteroid: a row of a catalogue, with its body and its orbit built on request.
 
     Attributes
@@ -153,90 +93,6 @@ class Asteroid:
     def __repr__(self) -> str:
         return f"<Asteroid {self.label}>"
 
-    @property
-    def name(self) -> str:
-        """Name, or designation where there is none."""
-        return self.row.get("name") or self.row.get("designation") or self.row.get("number") or "unnamed"
-
-    @property
-    def number(self) -> int | None:
-        """IAU number."""
-        text = self.row.get("number", "")
-        return int(text) if text.isdigit() else None
-
-    @property
-    def designation(self) -> str:
-        """Principal designation."""
-        return self.row.get("designation", "")
-
-    @property
-    def label(self) -> str:
-        """Number and name, as astronomers write them."""
-        return self.name if self.number is None else f"({self.number}) {self.name}"
-
-    @cached_property
-    def names(self) -> tuple[str, ...]:
-        """Everything it can be found by."""
-        row = self.row
-        found = [row.get("name", ""), row.get("number", ""), row.get("designation", "")]
-        found += row.get("aliases", "").split(";")
-        found += [
-            f"{self.number} {n}" for n in (row.get("name"), row.get("designation")) if self.number and n
-        ]
-        return tuple(dict.fromkeys(n.strip() for n in found if n and n.strip()))
-
-    @cached_property
-    def assumed(self) -> tuple[str, ...]:
-        """Columns whose values nobody measured."""
-        return tuple(c for c in self.row.get("assumed", "").split(";") if c)
-
-    @cached_property
-    def measured(self) -> tuple[str, ...]:
-        """Numeric columns with a measured value."""
-        return tuple(c for c in UNITS if self.row.get(c) and c not in self.assumed)
-
-    @cached_property
-    def sources(self) -> Mapping[str, str]:
-        """Where each group of values comes from, e.g. ``sources["density"]``."""
-        found = {c.removesuffix("_source"): v for c, v in self.row.items() if c.endswith("_source") and v}
-        return MappingProxyType(found)
-
-    @cached_property
-    def record(self) -> Mapping[str, Any]:
-        """The whole row: a Quantity where the column has a unit, text otherwise, None where unknown."""
-        return MappingProxyType(
-            {
-                c: (self.quantity(c) if self.row.get(c) else None) if c in UNITS else self.row.get(c, "")
-                for c in (*TEXTS, *UNITS)
-            }
-        )
-
-    def quantity(self, column: str) -> Quantity:
-        """Value of a numeric column with its unit.
-
-        Raises
-        ------
-        InvalidInput
-            The cell is empty or not a finite number.
-        """
-        return self._number(column) * UNITS[column]
-
-    def _number(self, column: str) -> float:
-        text = self.row.get(column, "")
-        if not text:
-            raise InvalidInput(column, "(empty)", f"a value for {self.label} in {self.file}")
-        try:
-            value = float(text)
-        except ValueError:
-            value = np.nan
-        if not np.isfinite(value):
-            raise InvalidInput(column, text, f"a finite number for {self.label} in {self.file}")
-        return value
-
-    def knows(self, *columns: str) -> bool:
-        """Whether all these columns have a value."""
-        return all(self.row.get(c) for c in columns)
-
     def completed(self, other: Asteroid) -> Asteroid:
         """The same asteroid; what its row does not know of its body and names is taken from another row."""
         row = dict(self.row)
@@ -244,7 +100,7 @@ class Asteroid:
             row["name"] = other.row["name"]
         # A size or a period from elsewhere would not fit the shape and the spin state that go with it.
         for c, v in other.row.items():
-            if c not in _ORBITAL and (not row.get(c) or c in _BODILY):
+            if c not in ORBITAL and (not row.get(c) or c in BODILY):
                 row[c] = v
         return replace(self, row=row)
 
@@ -264,7 +120,7 @@ class Asteroid:
         from flybystab.sky.orbit import Orbit
 
         epoch = self.epoch
-        elements = [self._number(c) * unit for c, unit in zip(_ORBIT[1:], _ORBIT_SI.tolist(), strict=True)]
+        elements = [self._number(c) * unit for c, unit in zip(ORBIT[1:], ORBIT_SI.tolist(), strict=True)]
         a1, a2, a3 = (
             au_per_day2(self._number(c)) if self.row.get(c) else 0.0
             for c in ("A1_au_d2", "A2_au_d2", "A3_au_d2")
@@ -277,17 +133,17 @@ class Asteroid:
             return self.covariance
         if self.file.startswith("embedded") and (known := embedded_covariance(self.row.get("number", ""))):
             return known
-        sigmas = tuple("sigma_" + c for c in _ORBIT[1:])
+        sigmas = tuple("sigma_" + c for c in ORBIT[1:])
         if not self.knows(*sigmas):
             return None
         from flybystab.sky.covariance import SETS, Covariance
 
-        sigma = np.array([self._number(c) for c in sigmas]) * _ORBIT_SI
+        sigma = np.array([self._number(c) for c in sigmas]) * ORBIT_SI
         source = self.row.get("sigma_source") or self.row.get("orbit_source") or self.file
         return Covariance(
             epoch,
             SETS["keplerian"],
-            np.array([self._number(c) for c in _ORBIT[1:]]) * _ORBIT_SI,
+            np.array([self._number(c) for c in ORBIT[1:]]) * ORBIT_SI,
             np.diag(sigma**2),
             f"1-sigmas without correlations, {source}",
             correlated=False,
@@ -301,7 +157,7 @@ class Asteroid:
     @property
     def semi_axes(self) -> Quantity:
         """Semi-axes ``a >= b >= c``, m."""
-        return np.array([self._number(c) for c in _SHAPE]) * u.m
+        return np.array([self._number(c) for c in SHAPE]) * u.m
 
     @cached_property
     def body(self) -> Body:
@@ -386,7 +242,7 @@ class Asteroid:
     def assumptions(self) -> tuple[str, ...]:
         """What a reader must know before taking the body for measured, in words."""
         out = []
-        if any(c in self.assumed for c in _SHAPE):
+        if any(c in self.assumed for c in SHAPE):
             out.append("shape from size and lightcurve amplitude")
         if "density_kg_m3" in self.assumed:
             out.append("density")

@@ -17,8 +17,9 @@ import numpy as np
 from astropy.table import QTable
 
 from flybystab.errors import InvalidInput, UnknownName
-from flybystab.survey.asteroid import CATALOGUE_DATE, TEXTS, UNITS, Asteroid, key_of
+from flybystab.survey.asteroid import CATALOGUE_DATE, Asteroid
 from flybystab.survey.formats import from_mpc, from_neocc, from_sbdb, from_sbdb_answer, kind_of
+from flybystab.survey.record import TEXTS, UNITS, key_of
 
 __all__ = ["CATALOGUE_DATE", "TEXTS", "UNITS", "Asteroid", "catalogue", "catalogue_table", "find", "key_of"]
 
