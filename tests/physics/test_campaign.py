@@ -28,4 +28,4 @@ def test_error_estimate_covers_the_true_error():
     """208 random encounters with flow, the four yield surfaces, volume-preserving and associative."""
     shares = campaign["coverage"](26, 11, 1e-7, 1e-10)
     assert len(shares) == 4
-    assert all(share >= 0.95 for share in shares.values())
+    assert all(share >= 0.97 for share in shares.values())

@@ -152,8 +152,8 @@ def follow_rigid(
     cohesion = par[COHESION] * np.sqrt(par[S1] * par[S2] * par[S3])
     record(t, RIGID, y, par, p, norm, det, ws, hist, count)
     # A step never spans more of the change of variable of the tide than its panels resolve, and less of it for a
-    # smaller tolerance: else runs of different tolerance would share their steps, and their errors.
-    reach = 0.4 * (1e3 * tol) ** 0.05
+    # smaller tolerance, as steps of order 8 are smaller: else the run that measures the error would share it.
+    reach = min(0.4, 0.225 * (1e8 * tol) ** 0.125)
     touched = False
     f = ws.sample
     f[0, N_SAMPLE] = _onset(excess, p, norm, det, par, ws.stress)
