@@ -20,6 +20,7 @@ TABLES = {
     "integrators": "python benchmarks/campaign.py integrators",
     "many": "flybystab bench many",
     "memory": "python benchmarks/screen.py memory",
+    "orbit_errors": "python benchmarks/orbit_errors.py",
     "other_planets": "python benchmarks/encounters.py planets",
     "outcomes": "python benchmarks/piles.py map",
     "screen": "flybystab bench screen",

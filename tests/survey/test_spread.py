@@ -102,7 +102,10 @@ def test_what_is_not_known_of_an_orbit_is_said():
     (row,) = screen([bare], *SPAN, within=0.01 * u.au, samples=4)
     assert "1-sigmas without correlations" in row["assumed"]
     assert np.isnan(row["distance_sigma"])
-    none = Asteroid({k: v for k, v in bare.row.items() if not k.startswith("sigma_")}, file="mine.csv")
+    row = {k: v for k, v in bare.row.items() if not k.startswith("sigma_")}
+    (row_by_u,) = screen([Asteroid(row, file="mine.csv")], *SPAN, within=0.01 * u.au, samples=4)
+    assert "by the U of its elements" in row_by_u["assumed"]
+    none = Asteroid(row | {"condition_code": ""}, file="mine.csv")
     (row,) = screen([none], *SPAN, within=0.01 * u.au, samples=4)
     assert "no covariance" in row["assumed"]
 

@@ -61,6 +61,8 @@ class Covariance:
     correlated : bool
         False where only the 1-sigmas are known: the matrix is diagonal for want of better, and an encounter
         mapped with it can be wrong by a large factor, mostly too uncertain.
+    caveat : str
+        What to say of errors by it where it is no published covariance; "without correlations" by default.
     """
 
     epoch: Time
@@ -69,8 +71,11 @@ class Covariance:
     matrix: Array
     source: str = ""
     correlated: bool = True
+    caveat: str = ""
 
     def __post_init__(self) -> None:
+        if not (self.correlated or self.caveat):
+            object.__setattr__(self, "caveat", "without correlations")
         n = len(self.names)
         orbital = {name for name in self.names if name not in PUSHES}
         if len(set(self.names)) != n or not any(orbital == set(s) for s in SETS.values()):
@@ -224,6 +229,6 @@ class Covariance:
         return self.states(parameters) - self.states(self.values[None, :]), self.pushes(parameters)
 
     def __repr__(self) -> str:
-        kind = "" if self.correlated else ", without correlations"
+        kind = f", {self.caveat}" if self.caveat else ""
         when = f"{self.epoch.tdb.iso[:10]} TDB"
         return f"<Covariance of {', '.join(self.names)} at {when}, {self.source or 'no source'}{kind}>"

@@ -91,9 +91,7 @@ def neighbour(orbit: Orbit, time: Time, ephemeris: str | Ephemeris | None = None
     weight = np.linalg.svd(ends[0] - ends[1])[0][:, 0]
     states, pushes = covariance.deviations((covariance.values + covariance.factor @ weight)[None])
     beside = deviated(there, covariance.epoch, states, pushes, "neighbour", ephemeris)[0]
-    label = "one sigma in the direction least known" + (
-        "" if covariance.correlated else ", without correlations"
-    )
+    label = "one sigma in the direction least known" + (f", {covariance.caveat}" if covariance.caveat else "")
     return Neighbour(beside, float(np.linalg.norm(states[0, :3])), label)
 
 

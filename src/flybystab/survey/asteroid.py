@@ -114,7 +114,7 @@ class Asteroid(Record):
         """The orbit, from the elements of the row with every digit, and A1, A2, A3 (zero where not known).
 
         Its covariance is the asteroid's own; else the one embedded for it; else the diagonal of the row's
-        1-sigmas, marked as uncorrelated; else None.
+        1-sigmas, marked as uncorrelated; else what digits and U say (:mod:`flybystab.survey.orbit_errors`); else None.
         """
         from flybystab.sky.forces import NonGravitational, au_per_day2
         from flybystab.sky.orbit import Orbit
@@ -135,7 +135,9 @@ class Asteroid(Record):
             return known
         sigmas = tuple("sigma_" + c for c in ORBIT[1:])
         if not self.knows(*sigmas):
-            return None
+            from flybystab.survey.orbit_errors import error_of
+
+            return error_of(self.row, epoch)
         from flybystab.sky.covariance import SETS, Covariance
 
         sigma = np.array([self._number(c) for c in sigmas]) * ORBIT_SI

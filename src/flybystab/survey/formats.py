@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from datetime import date
 from typing import TYPE_CHECKING, Any
 
 from flybystab.errors import InvalidInput
@@ -42,6 +43,8 @@ _SBDB = {
     "orbit_id": "orbit_solution",
     "condition_code": "condition_code",
 }
+#: Gauss's constant, deg/d at 1 au.
+_GAUSS = 0.98560766860142
 _MPC = {
     "number": "number",
     "principal_desig": "designation",
@@ -95,10 +98,28 @@ def from_mpc(row: Mapping[str, str], file: str) -> dict[str, str]:
     out["aliases"] = ";".join(a.strip() for a in row.get("other_desigs", "").replace("|", ";").split(";"))
     # TT and TDB differ by less than 2 ms.
     out["epoch_jd_tdb"] = row["epoch_jd_tt"]
+    out["observed_jd"] = _middle(row.get("arc", ""), row.get("last_obs", ""))
+    try:  # the mean motion has more digits of the axis than the axis
+        axis = (_GAUSS / float(row["n_deg_d"])) ** (2.0 / 3.0)
+        if abs(axis - float(row["a_au"])) < 1e-7:
+            out["a_au"] = repr(axis)
+    except (KeyError, ValueError, ZeroDivisionError):
+        pass
     out["pha"] = {"1": "Y", "0": "N"}.get(row.get("pha_flag", ""), "")
     if not out.get("condition_code", "").isdigit():
         out["condition_code"] = ""
     return out | {"frame": FRAME, "orbit_source": f"MPC ({file})"}
+
+
+def _middle(arc: str, last: str) -> str:
+    """Julian date of the middle of an arc ("1893-2026", or "13 d" before the last observation); nothing if unknown."""
+    try:
+        if arc.endswith("d"):
+            return repr(date.fromisoformat(last).toordinal() + 1721424.5 - 0.5 * float(arc.split()[0]))
+        first, _, final = arc.partition("-")
+        return repr(2451545.0 + 365.25 * (0.5 * (int(first) + int(final)) - 1999.5))
+    except ValueError:
+        return ""
 
 
 def from_neocc(text: str, file: str) -> tuple[dict[str, str], Covariance | None]:

@@ -116,7 +116,8 @@ def spread(passage: Passage, samples: int, seed: int) -> Spread:
     if covariance is None:
         return Spread(None, np.nan, "orbit without errors (no covariance)")
     if not covariance.correlated:
-        return Spread(None, np.nan, "orbit without errors (1-sigmas without correlations)")
+        known = "1-sigmas" if covariance.caveat == "without correlations" else "errors known"
+        return Spread(None, np.nan, f"orbit without errors ({known} {covariance.caveat})")
     body = planet(passage.planet)
     key = int(stream(seed, "orbit", identity(asteroid)).integers(2**62))
     within = max(1.5 * passage.distance, far_enough(body))

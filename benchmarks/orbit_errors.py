@@ -1,0 +1,143 @@
+"""What digits and U of a catalogue say of its orbits, held against later and better orbits, as tables.
+
+Usage: ``python benchmarks/orbit_errors.py [runoff] [digits]``. Reference data are read from ``../shared/data`` (or
+``$FLYBYSTAB_SHARED/data``); nothing is downloaded.
+"""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from astropy.time import Time
+from numpy.typing import NDArray
+
+from flybystab.constants import AU, YEAR
+from flybystab.sky.dop853 import empty_room
+from flybystab.sky.ephemeris import Window, ephemeris
+from flybystab.sky.field import field
+from flybystab.sky.forces import FORCES
+from flybystab.sky.growth import carry
+from flybystab.sky.orbit import Orbit, later, seconds
+from flybystab.sky.predictability import neighbour
+from flybystab.survey.asteroid import Asteroid
+from flybystab.survey.catalogue import catalogue
+from flybystab.survey.draws import identity
+from flybystab.survey.orbit_errors import runoff as sigma_of_code
+
+DATA = Path(os.environ.get("FLYBYSTAB_SHARED", Path(__file__).resolve().parents[1] / "../shared")) / "data"
+NEW, OLD, MPC = "nea_sbdb_fullprec_2026-07", "nea_sbdb_fullprec_2020-09", "nea_mpc_2026-02"
+#: Where orbits are compared: the epoch of JPL's orbits of 2026.
+MEETING = Time(2461200.5, format="jd", scale="tdb")
+
+
+def read(name: str) -> dict[str, Asteroid]:
+    """Asteroids of one of the tables."""
+    return {identity(a): a for a in catalogue(DATA / f"{name}.csv.gz")}
+
+
+def places(orbits: Sequence[Orbit], time: Time, window: Window) -> NDArray[np.float64]:
+    """Barycentric places, shape (n, 3), m, with all point masses and 1PN."""
+    forces = field(window, [n for n in FORCES if n.endswith("point mass") or n == "1PN"])
+    room, out = empty_room(), np.full((len(orbits), 1, 6), np.nan)
+    for i, orbit in enumerate(orbits):
+        push = orbit.nongrav
+        law = np.array([*push.a, *push.constants]) if any(push.a) else np.zeros(8)
+        start = seconds(orbit.epoch, window.epoch)
+        carry(
+            forces,
+            law,
+            start,
+            orbit.barycentric(window),
+            np.array([seconds(time, window.epoch)]),
+            1e-13,
+            room,
+            out[i],
+        )
+    return out[:, 0, :3]
+
+
+def runoff() -> list[str]:
+    """JPL's orbits of 2020 against those of 2026, by the code that JPL gave them in 2020 (that of the MPC, U)."""
+    old, new = read(OLD), read(NEW)
+    keys = [
+        k
+        for k, a in old.items()
+        if k in new
+        and a.row.get("condition_code", "").isdigit()
+        and abs(seconds(a.epoch, MEETING)) < 7.0 * YEAR
+    ]
+    keys = [k for k in keys if abs(seconds(new[k].epoch, MEETING)) < 2.0 * YEAR]
+    # code 0 has most of the rows: one in ten of them
+    well = [k for k in keys if old[k].row["condition_code"] == "0"][::10]
+    keys = [k for k in keys if old[k].row["condition_code"] != "0"] + well
+    window = ephemeris("de440").window(MEETING, -8.0 * YEAR, 2.0 * YEAR)
+    gap = places([old[k].orbit for k in keys], later(MEETING, 1.0), window)
+    gap -= places([new[k].orbit for k in keys], later(MEETING, 1.0), window)
+    axes = np.array([float(old[k].row["a_au"]) * AU for k in keys])
+    spans = np.array([-seconds(old[k].epoch, MEETING) for k in keys])
+    rate = np.linalg.norm(gap, axis=1) / axes / spans
+    code = np.array([int(old[k].row["condition_code"]) for k in keys])
+    unit = np.degrees(1.0) * 3600.0 * 10.0 * YEAR
+    out = [
+        "JPL's orbits of 2020-09 at the epoch of those of 2026-07: distance over semi-major axis, arcsec in ten years",
+        "code orbits    sigma   median     68 %     95 %  within sigma  2 sigma",
+    ]
+    ratio = np.array([r / (sigma_of_code(int(c)) / 3.0) for r, c in zip(rate, code, strict=True)])
+    for c in [*range(10), None]:
+        here = np.isfinite(rate) & (code == c if c is not None else code >= 0)
+        shares = f"{100 * np.mean(ratio[here] < 1.0):11.0f} % {100 * np.mean(ratio[here] < 2.0):6.0f} %"
+        if c is None:
+            out.append(f" all {here.sum():6d} {'':35s} {shares}")
+        elif here.any():
+            measured = np.percentile(rate[here] * unit, [50, 68, 95])
+            numbers = " ".join(f"{x:8.3g}" for x in (sigma_of_code(c) / 3.0 * unit, *measured))
+            out.append(f"{c:4d} {here.sum():6d} {numbers} {shares}")
+    return out
+
+
+def digits() -> list[str]:
+    """Orbits of the MPC against JPL's, by U, in sigma of what digits and U say along the direction least known."""
+    mpc, new = read(MPC), read(NEW)
+    keys = [k for k in mpc if k in new and mpc[k].orbit.covariance is not None]
+    keys = [k for k in keys if abs(seconds(new[k].epoch, MEETING)) < 2.0 * YEAR]
+    well = [k for k in keys if mpc[k].row["condition_code"] == "0"][::6]
+    keys = [k for k in keys if mpc[k].row["condition_code"] != "0"] + well
+    code = np.array([int(mpc[k].row["condition_code"] or 9) for k in keys])
+    window = ephemeris("de440").window(MEETING, -11.0 * YEAR, 11.0 * YEAR)
+    out = [
+        "Orbits of the MPC of 2026-02 against JPL's of 2026-07 (km), and what digits and U say (one sigma)",
+        "  years  U    orbits      sigma     median       95 %  within sigma  2 sigma  3 sigma",
+    ]
+    for years in (0.0, 10.0, -10.0):
+        time = later(MEETING, years * YEAR + 1.0)
+        ours = places([mpc[k].orbit for k in keys], time, window)
+        gap = np.linalg.norm(places([new[k].orbit for k in keys], time, window) - ours, axis=1)
+        beside = [neighbour(mpc[k].orbit, time, "de440").orbit for k in keys]
+        sigma = np.linalg.norm(places(beside, time, window) - ours, axis=1)
+        for label, some in (("0", [0]), ("1-2", [1, 2]), ("3-5", [3, 4, 5]), ("6-9", [6, 7, 8, 9])):
+            here = np.isin(code, some) & np.isfinite(gap) & np.isfinite(sigma)
+            r = gap[here] / sigma[here]
+            shares = " ".join(f"{100 * np.mean(r < n):6.0f} %" for n in (1, 2, 3))
+            sizes = np.median(sigma[here]), np.median(gap[here]), np.percentile(gap[here], 95)
+            typical = " ".join(f"{x / 1e3:10.4g}" for x in sizes)
+            out.append(f"{years:7.0f}  {label:4s} {here.sum():6d} {typical} {shares}")
+    return out
+
+
+def main(arguments: list[str]) -> int:
+    """Print the tables that were asked for, by default all."""
+    known = {"runoff": runoff, "digits": digits}
+    for name in arguments or list(known):
+        if name not in known:
+            print(f"no table {name!r}: there are {', '.join(known)}", file=sys.stderr)
+            return 2
+        print("\n".join(known[name]()) + "\n")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))
