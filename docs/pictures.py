@@ -40,7 +40,7 @@ figure = Figure(figsize=(6.0, 6.0), layout="constrained")
 target_plot(figure.subplots(), target_map(PILE, 8 * u.km / u.s, np.linspace(1.1, 3.2, 11) * fs.R_earth, 32))
 save("target_map.png", figure)
 
-figure = Figure(figsize=(6.4, 4.8), layout="constrained")
+figure = Figure(figsize=(7.2, 3.2), layout="constrained")
 result = fs.flyby(PILE, fs.Encounter.hyperbolic("earth", 2.0 * fs.R_earth, 5 * u.km / u.s))
 scene_plot(figure.add_subplot(projection="3d"), result)
 save("scene.png", figure)

@@ -236,6 +236,12 @@ def wall(name):
     return f"{float(seconds):.0f} s on {jobs} worker{'s' if jobs != '1' else ''}"
 
 
+def laws():
+    """The population, one law a line, by its keys in a TOML file."""
+    rows = "\n".join(f"| `{key}` | {law} |" for key, law in Population().stated().items())
+    return f"| input | law |\n| --- | --- |\n{rows}"
+
+
 def main():
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
@@ -263,7 +269,9 @@ JD 2461200.5) and the embedded catalogue, ephemeris {full["ephemeris"][0]}. Each
 *P(yield)*: share of the samples that can exist and then flow or hit the planet, with its Wilson interval.
 *Follows most*: inputs whose ranks the margin follows, with rank correlations.
 
-Drawn from: {"; ".join(f"{k} {v}" for k, v in Population().stated().items())}.
+What is not known is drawn from these laws ([what is drawn](screening.md#what-is-drawn)):
+
+{laws()}
 
 ## Embedded catalogue, 2026 to 2050
 

@@ -15,6 +15,7 @@ from numba.core import event
 from flybystab.core import quick
 from flybystab.face import compiling
 from flybystab.face.cli import COMMANDS, main
+from flybystab.survey.catalogue import Asteroid
 from flybystab.survey.population import Population
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
@@ -423,3 +424,38 @@ def test_compiling_in_workers_is_said_beforehand(monkeypatch, tmp_path):
     monkeypatch.setattr(quick, "quick_margins", empty)
     compiling.announce_elsewhere(stream)
     assert stream.getvalue() == compiling.WORDS
+
+
+def test_an_asteroid_of_my_own_file(capsys, tmp_path):
+    file = tmp_path / "mine.csv"
+    file.write_text(
+        "name,epoch_jd_tdb,a_au,e,i_deg,node_deg,peri_deg,M_deg,semi_axis_a_m,semi_axis_b_m,semi_axis_c_m,"
+        "density_kg_m3,spin_period_h\n"
+        "Mine,2461000.5,0.9223803173917017,0.1911663355386932,3.340958441017069,203.8996515621043,"
+        "126.6728325163065,312.8054663584516,200,160,150,1800,12\n"
+    )
+    status, out, err = run(capsys, "flyby", "mine", "--catalogue", str(file), "--attitudes", "2", "--json")
+    assert status == 0, err
+    found = json.loads(out)
+    assert found["encounter"]["time_tdb"].startswith("2029-04-13")
+    assert found["verdict"] == "INTACT"
+    status, _, err = run(capsys, "stability", "yours", "--catalogue", str(file))
+    assert status == 1
+    assert f"unknown asteroid 'yours' ({file} has 1)" in err
+    status, _, err = run(capsys, "stability", "yours")
+    assert "others are read from a file" in err
+
+
+def test_a_screening_of_a_body_that_cannot_be_says_so(capsys, tmp_path):
+    """A density in g/cm3 is no verdict, and a missing document no traceback."""
+    file = tmp_path / "mine.csv"
+    row = dict(Asteroid.from_catalogue("Apophis").row) | {"density_kg_m3": "2.6"}
+    file.write_text(",".join(row) + "\n" + ",".join(f'"{v}"' for v in row.values()) + "\n")
+    dates = "--from", "2029-04-01", "--to", "2029-05-01"
+    status, out, _ = run(capsys, "screen", str(file), *dates, "--output", str(tmp_path / "x.ecsv"))
+    assert status == 0
+    assert "1 encounter, 1 not computed" in out
+    assert "density_kg_m3 = 2.6: expected a value in [50, 25000] for (99942) Apophis" in out
+    status, _, err = run(capsys, "cite", str(tmp_path / "none.json"))
+    assert (status, err.count("\n")) == (1, 1)
+    assert "expected a readable JSON document (No such file" in err

@@ -278,3 +278,38 @@ def test_the_script_rebuilds_the_embedded_file(tmp_path):
         capture_output=True,
     )
     assert out.read_bytes() == (REPO / "data" / "asteroids.csv").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("column", "value", "expected"),
+    [
+        ("density_kg_m3", "-2600", "in [50, 25000]"),
+        ("density_kg_m3", "2.6", "in [50, 25000]"),  # g/cm3
+        ("semi_axis_a_m", "0", "in [0.05, 5e+06]"),
+        ("spin_period_h", "-30", "in [0.0001, 100000]"),
+        ("e", "-0.1", "in [0, inf]"),
+        ("sigma_a_au", "-1e-9", "in [0, inf]"),
+        ("a_au", "nan", "a finite number"),
+    ],
+)
+def test_a_value_that_cannot_be_is_refused_with_its_row(column, value, expected):
+    apophis = Asteroid.from_catalogue("Apophis")
+    bad = Asteroid(dict(apophis.row) | {column: value}, file="mine.csv")
+    with pytest.raises(InvalidInput, match=column) as error:
+        bad.quantity(column)
+    assert expected in str(error.value)
+    assert "(99942) Apophis in mine.csv" in str(error.value)
+
+
+def test_every_embedded_value_is_within_its_limits():
+    for a in catalogue():
+        for column in UNITS:
+            if a.row.get(column):
+                a.quantity(column)
+
+
+def test_other_separators_are_named(tmp_path):
+    file = tmp_path / "semi.csv"
+    file.write_text("name;a_au\nX;1.2\n")
+    with pytest.raises(InvalidInput, match="commas between the columns"):
+        catalogue(file)

@@ -322,7 +322,7 @@ def _history_picture(r: FlybyResult) -> str:
 
 
 def _scene_picture(r: FlybyResult) -> str:
-    figure = _blank(6.4, 4.8)
+    figure = _blank(7.2, 3.2)
     scene_plot(figure.add_subplot(projection="3d"), r)
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=130)  # thousands of facets: smaller as pixels

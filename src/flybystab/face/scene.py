@@ -80,17 +80,22 @@ def scene_plot(
         shape = turn @ history.shape[row].to_value(u.m**2) @ turn.T * (magnification / 1e6) ** 2
         body = surface(shape) + place[:, None, None]
         axes.plot_surface(*body, color=REGIMES[str(history.regime[row])], **_SOLID)
-    axes.set_xlabel("x (1000 km)", labelpad=2)
-    axes.set_ylabel("y (1000 km)", labelpad=16)
+    axes.set_xlabel("x (1000 km)", labelpad=-4)
+    axes.set_ylabel("y (1000 km)", labelpad=8)
     axes.set_zticks([])
     name = encounter.planet.name.capitalize()
     axes.set_title(
         f"{name} to scale, body {magnification:,.0f} times larger; grey rigid, orange flowing", fontsize=9
     )
     limits = np.array([getattr(axes, f"get_{n}lim")() for n in "xyz"])
-    axes.set_box_aspect(np.ptp(limits, axis=1), zoom=1.05)
+    # The scene is wide, the square that matplotlib draws it in is as high as the figure: it may reach out to the sides.
+    room, (width, height) = axes.get_position(original=True), axes.figure.get_size_inches()
+    axes.set_box_aspect(np.ptp(limits, axis=1), zoom=0.85 * room.width * width / (room.height * height))
+    axes.set_in_layout(False)
+    for artist in (*axes.collections, *axes.lines):
+        artist.set_clip_on(False)
     axes.locator_params(axis="x", nbins=4)
-    axes.view_init(elev=60, azim=-30)
+    axes.view_init(elev=50, azim=-10)
     return axes
 
 

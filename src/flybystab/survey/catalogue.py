@@ -36,7 +36,9 @@ def find(asteroids: Sequence[Asteroid], name: str | int, where: str) -> Asteroid
     near = get_close_matches(wanted, index, n=8, cutoff=0.6)
     near += [k for k in index if len(wanted) >= 3 and wanted in k]
     suggestions = list(dict.fromkeys(index[k].name for k in near))[:5]
-    raise UnknownName("asteroid", str(name), suggestions, f"({where} has {len(asteroids)})")
+    known = f"({where} has {len(asteroids)}"
+    known += "; others are read from a file)" if where == "the embedded catalogue" else ")"
+    raise UnknownName("asteroid", str(name), suggestions, known)
 
 
 def _read(text: str, file: str) -> tuple[Asteroid, ...]:
@@ -47,6 +49,8 @@ def _read(text: str, file: str) -> tuple[Asteroid, ...]:
     for c in columns if not kind else ():
         if c not in UNITS and c not in TEXTS:
             known = [*TEXTS, *UNITS]
+            if ";" in c or "\t" in c:
+                raise InvalidInput("columns", c, f"commas between the columns of {file}")
             raise UnknownName("column", c, get_close_matches(c, known, cutoff=0.6), f"(in {file})")
     if not kind and not {"name", "designation", "number"} & set(columns):
         raise InvalidInput("columns", columns, f"at least one of name, designation, number in {file}")

@@ -71,6 +71,16 @@ BODILY = frozenset(
 SHAPE = ("semi_axis_a_m", "semi_axis_b_m", "semi_axis_c_m")
 
 
+#: Smallest and largest value that a cell may have: what is beyond is a slip, mostly of the unit.
+LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType(
+    dict.fromkeys(_LENGTH, (0.05, 5e6))
+    | dict.fromkeys(_HOURS, (1e-4, 1e5))
+    | {c: (0.0, np.inf) for c in UNITS if "sigma" in c}
+    | {"density_kg_m3": (50.0, 25_000.0), "e": (0.0, np.inf), "amplitude_mag": (0.0, 5.0)}
+    | {"i_deg": (0.0, 180.0), "pole_ecl_lat_deg": (-90.0, 90.0)}
+)
+
+
 def key_of(name: object) -> str:
     """A name as it is compared: no case, no spaces, no brackets."""
     return "".join(c for c in str(name).casefold() if not c.isspace() and c not in "()_")
@@ -154,7 +164,7 @@ class Record:
         Raises
         ------
         InvalidInput
-            The cell is empty or not a finite number.
+            The cell is empty, not a finite number, or out of its :data:`LIMITS`.
         """
         return self._number(column) * UNITS[column]
 
@@ -166,8 +176,13 @@ class Record:
             value = float(text)
         except ValueError:
             value = np.nan
+        low, high = LIMITS.get(column, (-np.inf, np.inf))
         if not np.isfinite(value):
             raise InvalidInput(column, text, f"a finite number for {self.label} in {self.file}")
+        if not low <= value <= high:
+            raise InvalidInput(
+                column, text, f"a value in [{low:g}, {high:g}] for {self.label} in {self.file}"
+            )
         return value
 
     def knows(self, *columns: str) -> bool:

@@ -28,9 +28,13 @@ def listed(asteroids: str | Path | Sequence[Asteroid | str | int | Path] | None)
         else:
             found.append(Asteroid.from_catalogue(a))
     if not found:
-        raise InvalidInput("asteroids", asteroids, "at least one asteroid")
+        raise InvalidInput(
+            "asteroids", ", ".join(map(str, asteroids)) or "none", "at least one row with an asteroid"
+        )
     keys = Counter(identity(a) for a in found)
     twice = [k for k, n in keys.items() if n > 1]
     if twice:
-        raise InvalidInput("asteroids", ", ".join(twice), "every asteroid once")
+        raise InvalidInput(
+            "asteroids", ", ".join(twice), "every asteroid once, by number, designation or name"
+        )
     return tuple(found)

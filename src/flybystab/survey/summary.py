@@ -77,7 +77,10 @@ class Summary:
 
     def text(self) -> str:
         """A few lines for a terminal."""
-        lines = [f"{self.rows} encounters" + (f", {self.failed} not computed" if self.failed else "")]
+        lines = [
+            f"{self.rows} encounter{'s' * (self.rows != 1)}"
+            + (f", {self.failed} not computed" if self.failed else "")
+        ]
         if not self.meta.get("complete", True):
             lines[0] += " (unfinished run)"
         lines += [f"  {name}: {n}" for name, n in self.verdicts.items()]

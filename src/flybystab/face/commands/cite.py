@@ -41,5 +41,7 @@ def _result(path: str | None) -> Any:
 
     try:
         return json.loads(Path(path).read_text(encoding="utf-8-sig"))
+    except OSError as reason:
+        raise InvalidInput("file", path, f"a readable JSON document ({reason.strerror})") from None
     except ValueError as reason:
         raise InvalidInput("file", path, f"a JSON document ({reason})") from None

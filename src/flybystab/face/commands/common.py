@@ -92,11 +92,34 @@ def material_of(options: argparse.Namespace) -> Any:
     )
 
 
+def catalogue_argument(sub: argparse.ArgumentParser) -> None:
+    """Add the file that an asteroid is looked up in."""
+    sub.add_argument(
+        "--catalogue",
+        metavar="FILE",
+        help="look the name up in this file (own CSV, JPL SBDB, MPC, NEOCC .ke1), not in the embedded catalogue",
+    )
+
+
+def asteroid_named(options: argparse.Namespace) -> Any:
+    """The asteroid named, of the embedded catalogue or of the file given."""
+    from pathlib import Path
+
+    from flybystab.survey.asteroid import Asteroid
+    from flybystab.survey.catalogue import find
+    from flybystab.survey.selection import listed
+
+    file = getattr(options, "catalogue", None)
+    return (
+        Asteroid.from_catalogue(options.name)
+        if file is None
+        else find(listed(Path(file)), options.name, file)
+    )
+
+
 def asteroid_of(options: argparse.Namespace) -> Any:
     """The asteroid named, with the material asked for."""
-    from flybystab.survey.asteroid import Asteroid
-
-    return Asteroid.from_catalogue(options.name, material=material_of(options))
+    return asteroid_named(options).with_material(material_of(options))
 
 
 def check_picture(path: str | None, endings: tuple[str, ...] = FIGURES) -> None:

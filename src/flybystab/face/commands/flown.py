@@ -5,7 +5,13 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from flybystab.face.commands.common import OTHER_SURFACES, asteroid_of, material_arguments, tdb
+from flybystab.face.commands.common import (
+    OTHER_SURFACES,
+    asteroid_of,
+    catalogue_argument,
+    material_arguments,
+    tdb,
+)
 
 #: Span searched for the closest encounter when no date is given: inside every supported ephemeris.
 SPAN = ("2000-01-01", "2050-01-01")
@@ -14,6 +20,7 @@ SPAN = ("2000-01-01", "2050-01-01")
 def passage_arguments(sub: argparse.ArgumentParser) -> None:
     """Add the asteroid, its encounter, its material, and the sample of attitudes."""
     sub.add_argument("name", help="number, name or designation in the embedded catalogue")
+    catalogue_argument(sub)
     sub.add_argument(
         "--date", help=f"near the encounter, TDB; the closest one of {SPAN[0]} to {SPAN[1]} if left out"
     )

@@ -6,6 +6,8 @@ import argparse
 from typing import Any
 
 from flybystab.face.commands.common import (
+    asteroid_named,
+    catalogue_argument,
     check_picture,
     figure_argument,
     show,
@@ -21,6 +23,7 @@ EXAMPLE = "flybystab infer Toutatis --output toutatis.png"
 def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     sub.add_argument("name", help="number, name or designation")
+    catalogue_argument(sub)
     span_arguments(sub, "1950-01-01", "2026-01-01")
     sub.add_argument("--attitudes", type=int, default=32, metavar="N", help="tried in every passage (32)")
     sub.add_argument("--seed", type=int, default=0, help="fixes the attitudes (0)")
@@ -34,11 +37,10 @@ def run(options: argparse.Namespace) -> None:
 
     from flybystab.face.document import table_document
     from flybystab.face.plotting_survey import inference_figure
-    from flybystab.survey.asteroid import Asteroid
     from flybystab.survey.inference import infer, survived
 
     check_picture(options.output)
-    asteroid = Asteroid.from_catalogue(options.name)
+    asteroid = asteroid_named(options)
     passages = survived(
         asteroid,
         tdb(options.start, "--from"),

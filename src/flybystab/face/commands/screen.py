@@ -38,7 +38,9 @@ def arguments(sub: argparse.ArgumentParser) -> None:
     sub.add_argument("--population-default", action="store_true", help="print the default as TOML, and stop")
     sub.add_argument("--jobs", type=int, default=1, metavar="N", help="processes (1)")
     sub.add_argument("--dask", metavar="ADDRESS", help="a dask scheduler instead of processes")
-    sub.add_argument("--output", default="screening.ecsv", metavar="FILE", help="table, .ecsv or .parquet")
+    sub.add_argument(
+        "--output", default="screening.ecsv", metavar="FILE", help="table, .ecsv or .parquet (screening.ecsv)"
+    )
     sub.add_argument(
         "--overwrite", action="store_true", help="replace finished tables (an unfinished run goes on without)"
     )
@@ -101,7 +103,10 @@ def run(options: argparse.Namespace) -> None:
     show(
         options,
         lambda: table_document(read_results(output)),
-        lambda: [summary(output).text(), f"table      {output}"],
+        lambda: [
+            summary(output).text(),
+            f"table      {output} (flybystab show {output} --output {output.with_suffix('.png')} draws it)",
+        ],
     )
 
 

@@ -6,7 +6,14 @@ import argparse
 
 from flybystab import __version__
 from flybystab.errors import WrongUsage
-from flybystab.face.commands.common import asteroid_of, check_table, material_arguments, material_of, show
+from flybystab.face.commands.common import (
+    asteroid_of,
+    catalogue_argument,
+    check_table,
+    material_arguments,
+    material_of,
+    show,
+)
 
 HELP = "equilibrium and stability of an asteroid on its own, or of a whole catalogue"
 EXAMPLE = "flybystab stability Anteros --friction 30"
@@ -15,6 +22,7 @@ EXAMPLE = "flybystab stability Anteros --friction 30"
 def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     sub.add_argument("name", nargs="?", help="number, name or designation; with --all a catalogue file")
+    catalogue_argument(sub)
     sub.add_argument(
         "--all",
         action="store_true",
