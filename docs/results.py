@@ -49,7 +49,7 @@ RUNS = {
 }
 #: Asteroids of passages to know that the other screenings do not have, by table.
 OTHERS = {MPC: ("2002 MN", "2008 TC3", "2019 OK"), NEW: ("2014 HQ124",)}
-#: Passages that a reader may look for: name, month, and the name in the table where that is another one.
+#: Passages that a reader may look for: name and month.
 FAMOUS = [
     ("Apophis", "2029-04"),
     ("Toutatis", "2004-09"),
@@ -62,7 +62,7 @@ FAMOUS = [
     ("2019 OK", "2019-07"),
     ("Florence", "2017-09"),
     ("2014 HQ124", "2014-06"),
-    ("1999 AN10", "2027-08", "137108"),
+    ("1999 AN10", "2027-08"),
     ("1997 XF11", "2028-10"),
     ("2001 WN5", "2028-06"),
 ]
@@ -162,16 +162,15 @@ def reshaped(table):
 def famous(*tables):
     """The passages to know, each from the first table that has it."""
     text = ""
-    for name, month, *other in FAMOUS:
-        known = other[0] if other else name
+    for name, month in FAMOUS:
         for table in tables:
             same = [
                 k
                 for k in range(len(table))
-                if table["asteroid"][k] == known and table["time_tdb"][k].startswith(month)
+                if table["asteroid"][k] == name and table["time_tdb"][k].startswith(month)
             ]
             if same:
-                body = passages(table, same).replace(f"| {known} |", f"| {name} |").split("\n")
+                body = passages(table, same).split("\n")
                 text += "\n".join(body[:3] if not text else body[2:3]) + "\n"
                 break
         else:
@@ -188,7 +187,7 @@ def against_cneos(table, data):
     ):
         with gzip.open(data / file, "rt", encoding="utf-8") as stream:
             known |= {(r["des"], r["cd_tdb"][:4]): f"{r[column]} {unit}" for r in csv.DictReader(stream)}
-    months = {name: month for name, month, *_ in FAMOUS}
+    months = dict(FAMOUS)
     words = []
     for row in table:
         name = str(row["asteroid"])

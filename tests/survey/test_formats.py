@@ -50,6 +50,27 @@ def test_sbdb_query(tmp_path):
     assert same is b
 
 
+def test_a_number_alone_is_shown_as_people_know_it(tmp_path):
+    """Name, else designation, else the number; found by each of them."""
+    path = tmp_path / "q.csv"
+    path.write_text(
+        "pdes,name,epoch,e,a,i,om,w,ma\n"
+        "153958,,2461200.5,.45,1.7,4.6,144,197,72\n"
+        "433,,2461200.5,.22,1.46,10.8,304,178,310\n"
+        "9999999,,2461200.5,.22,1.46,10.8,304,178,310\n"
+    )
+    rows = catalogue(path)
+    assert [a.name for a in rows] == ["2002 AM31", "Eros", "9999999"]
+    assert [a.number for a in rows] == [153958, 433, 9999999]
+    assert rows[0].label == "(153958) 2002 AM31"
+    for name in ("153958", 153958, "2002 AM31", "2002am31"):
+        assert Asteroid.from_file(path, name).number == 153958
+    assert Asteroid.from_file(path, 9999999).designation == ""
+    neocc = tmp_path / "a.ke1"
+    neocc.write_text(KE1.replace("2024YR4", "99942"))
+    assert catalogue(neocc)[0].label == "(99942) Apophis"
+
+
 def test_neocc_orbit(tmp_path):
     path = tmp_path / "yr4.ke1"
     path.write_text(KE1)

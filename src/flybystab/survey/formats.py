@@ -13,6 +13,7 @@ from datetime import date
 from typing import TYPE_CHECKING, Any
 
 from flybystab.errors import InvalidInput
+from flybystab.survey.names import names_of
 
 if TYPE_CHECKING:
     from flybystab.sky.covariance import Covariance
@@ -76,9 +77,10 @@ def from_sbdb(row: Mapping[str, str], file: str) -> dict[str, str]:
     key = row["pdes"].strip()
     full = row.get("full_name", "")
     designation = full.partition("(")[2].rstrip(") ") if "(" in full else ""
+    known = names_of(key)
     out["number"] = key if key.isdigit() else ""
-    out["designation"] = designation or ("" if key.isdigit() else key)
-    out["name"] = row.get("name", "").strip() or out["designation"] or key
+    out["designation"] = designation or (known[1] if key.isdigit() else key)
+    out["name"] = row.get("name", "").strip() or known[0] or out["designation"] or key
     out["pha"] = {"True": "Y", "False": "N"}.get(row.get("pha", ""), row.get("pha", ""))
     taxonomy = row.get("spec_B") or row.get("spec_T")
     if taxonomy:
@@ -153,9 +155,10 @@ def from_neocc(text: str, file: str) -> tuple[dict[str, str], Covariance | None]
     out = dict(zip(("a_au", "e", "i_deg", "node_deg", "peri_deg", "M_deg"), kep, strict=True))
     if designation.isdigit():
         out["number"] = designation
+        name, out["designation"] = names_of(designation)
     else:
-        out["designation"] = f"{designation[:4]} {designation[4:]}".strip()
-    out["name"] = out.get("designation", designation)
+        name, out["designation"] = "", f"{designation[:4]} {designation[4:]}".strip()
+    out["name"] = name or out["designation"] or designation
     # TT and TDB differ by less than 2 ms.
     out["epoch_jd_tdb"] = repr(day + 2400000.5)
     if "MAG" in words:
