@@ -140,7 +140,7 @@ def planar() -> None:
     e = scenes()[1][2]
     t0 = PILE.dynamical_time
     tide = TidePanels(e.tide.tau / t0, e.tide.start, e.tide.width, e.tide.coefficients * t0**2)
-    work = state.Buffers(np.zeros((state.N_WORK, 3, 3)), np.zeros((3, 6)))
+    work = state.empty_buffers()
     y, dy, s = (np.zeros(15) for _ in range(3))
     y[:3] = (PILE.axes / np.cbrt(np.prod(PILE.axes))) ** 2
     y[6:12] = components(0.05 * np.array([[1.0, 0.3, 0.0], [0.3, -0.4, 0.0], [0.0, 0.0, -0.6]]))

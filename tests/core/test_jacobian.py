@@ -46,7 +46,7 @@ def test_columns_are_central_differences(surface, dilatancy, part, cohesion, vol
     )
     par = parameters(np.array([1400.0, 850.0, 750.0]), 2000.0, np.deg2rad(35.0), cohesion, dilatancy, surface)
     par[state.PART] = PARTS.get(part, state.FACE)
-    work = state.Buffers(np.zeros((state.N_WORK, 3, 3)), np.zeros((3, 6)))
+    work = state.empty_buffers()
     t, y = 0.3, flow(11, volume)
 
     def rate(t, y):

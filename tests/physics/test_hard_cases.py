@@ -339,7 +339,7 @@ def test_frictionless_impulse_is_the_closed_form():
     """beta = 0 and no friction: L += -(tr L/tr S^-1) S^-1."""
     from flybystab.core.contact import SLIDING, friction_impulse
     from flybystab.core.passage import parameters
-    from flybystab.core.state import N_WORK, Buffers
+    from flybystab.core.state import empty_buffers
     from flybystab.core.tide import components
 
     rng = np.random.default_rng(4)
@@ -353,7 +353,7 @@ def test_frictionless_impulse_is_the_closed_form():
     y[12:15] = 0.5 * np.array(
         [big_l[2, 1] - big_l[1, 2], big_l[0, 2] - big_l[2, 0], big_l[1, 0] - big_l[0, 1]]
     )
-    work = Buffers(np.zeros((N_WORK, 3, 3)), np.zeros((3, 6)))
+    work = empty_buffers()
     did = friction_impulse(
         y, par, 0.0, np.zeros(6), work, np.zeros((15, 15)), np.zeros(15, dtype=np.int64), np.zeros(36)
     )

@@ -5,11 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flybystab.core.flow import axis_ratio2
+from flybystab.core.flow_ends import axis_ratio2
 from flybystab.core.ground import Ground, touches
 from flybystab.core.jit import kernel
 from flybystab.core.motion import rate
-from flybystab.core.state import DISPERSED, FLUID, N_FULL, W_SCRATCH
+from flybystab.core.state import DISPERSED, FLUID, N_FULL, PRESSURE
 from flybystab.core.steppers import explicit_at, explicit_dense, explicit_step
 from flybystab.core.tensors import determinant
 from flybystab.core.tide import TidePanels
@@ -72,7 +72,7 @@ def follow_free(
                 regime,
                 y,
                 par,
-                ws.work.m[W_SCRATCH, 1, 2] if regime == FLUID else 0.0,
+                ws.work.s[PRESSURE] if regime == FLUID else 0.0,
                 0.0,
                 0.0,
                 ws,
@@ -142,6 +142,6 @@ def follow_free(
         h *= min(5.0, max(0.3, 0.9 * error ** (-0.125))) if error > 0.0 else 5.0
         if tide.coefficients.shape[0] > 0:
             h = min(h, 0.4 * np.sqrt(t * t + tide.tau * tide.tau))
-    p = ws.work.m[W_SCRATCH, 1, 2] if regime == FLUID else 0.0
+    p = ws.work.s[PRESSURE] if regime == FLUID else 0.0
     record(t, regime, y, par, p, 0.0, 0.0, ws, hist, count)
     return TOUCH if touched else DONE, t

@@ -38,13 +38,15 @@ from flybystab.core.state import (
     J_UNIT,
     NORMAL,
     PART,
+    PLACE,
+    PRESSURE,
     SIN_PHI,
+    VOLUME,
     W_A,
     W_B,
     W_L,
     W_N,
     W_S,
-    W_SCRATCH,
     W_SINV,
     Buffers,
     gradient,
@@ -125,7 +127,7 @@ def flow_jacobian(
         work.m[J_PRODUCT],
         work.m[J_NORMAL],
     )
-    volume, pressure, place = work.m[W_SCRATCH, 1, 0], work.m[W_SCRATCH, 1, 2], work.m[W_SCRATCH, 2, 1]
+    volume, pressure, place = work.s[VOLUME], work.s[PRESSURE], work.s[PLACE]
     gradient(f0, rate)
     # the stress, and its slopes in det u
     unit = work.c[2]

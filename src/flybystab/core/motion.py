@@ -16,6 +16,7 @@ from flybystab.core.selfgravity import gravity_tensor
 from flybystab.core.state import (
     COHESION,
     COS_PHI,
+    DETERMINANT,
     FACE,
     FLOWING,
     FLUID,
@@ -24,14 +25,19 @@ from flybystab.core.state import (
     G3,
     NORMAL,
     PART,
+    PAST,
+    PLACE,
+    PRESSURE,
     RIGID,
     S1,
     S2,
     S3,
     SIN_PHI,
     SMOOTH,
+    STRENGTH,
     SURFACE,
     VISCOSITY,
+    VOLUME,
     W_A,
     W_B,
     W_FACE,
@@ -116,7 +122,7 @@ def field(t: float, y: Array, tide: TidePanels, work: Buffers) -> None:
     """Fill what depends on ``t`` and ``S`` only: ``S``, ``S^-1``, ``K_g + K_t``, volume; the tide in ``work.c[0]``."""
     unpack(y[0:6], work.m[W_S])
     det = inverse(y[0:6], work.m[W_SINV])
-    work.m[W_SCRATCH, 1, 0] = np.sqrt(det)
+    work.s[VOLUME] = np.sqrt(det)
     k = work.m[W_K]
     gravity_tensor(y[0:6], work.m[W_SINV], det, work.m[W_SCRATCH, 0], work.m[W_VECTORS], k)
     kt = work.c[0]
@@ -163,7 +169,7 @@ def deformation_rate(regime: int, y: Array, dy: Array, par: Array, work: Buffers
     dy[4] = a[0, 2] + a[2, 0]
     dy[5] = a[1, 2] + a[2, 1]
     sinv = work.m[W_SINV]
-    volume = work.m[W_SCRATCH, 1, 0]
+    volume = work.s[VOLUME]
     trace_sinv = sinv[0, 0] + sinv[1, 1] + sinv[2, 2]
     trace_d = d[0] + d[1] + d[2]
     trace_r = r[0, 0] + r[1, 1] + r[2, 2]
@@ -174,12 +180,12 @@ def deformation_rate(regime: int, y: Array, dy: Array, par: Array, work: Buffers
     strength = 0.0  # k P + k c: norm of the deviatoric stress
     if regime == FLOWING:
         norm, g, support, det = flow_stress(d, par, work.c[2], n)
-        work.m[W_SCRATCH, 2, 0] = det
+        work.s[DETERMINANT] = det
         part = int(par[PART])
         det_d = 0.0
         if part != SMOOTH:
             det_d = determinant(work.c[2])
-            work.m[W_SCRATCH, 2, 2] = beyond_face(par[SIN_PHI], det_d)
+            work.s[PAST] = beyond_face(par[SIN_PHI], det_d)
         sin = par[SIN_PHI]
         cohesive = par[COS_PHI] * par[COHESION] * volume
         beta, dbeta = dilatancy(volume, par)
@@ -215,7 +221,7 @@ def deformation_rate(regime: int, y: Array, dy: Array, par: Array, work: Buffers
                 for j in range(3):
                     r[i, j] -= share * xs[i, j]
             place = share / factor if factor != 0.0 else np.inf
-            work.m[W_SCRATCH, 2, 1] = place
+            work.s[PLACE] = place
             size = 0.0
             third = 0.0
             if factor != 0.0:
@@ -226,7 +232,7 @@ def deformation_rate(regime: int, y: Array, dy: Array, par: Array, work: Buffers
                 pack(x, unit)
                 _, size, third = deviator(unit, unit)
             g = size
-            work.m[W_SCRATCH, 2, 0] = third
+            work.s[DETERMINANT] = third
         else:
             pressure = numerator / denominator
             factor = sin * pressure + cohesive
@@ -246,8 +252,8 @@ def deformation_rate(regime: int, y: Array, dy: Array, par: Array, work: Buffers
             for j in range(3):
                 r[i, j] += pressure * sinv[i, j] - mu * b[i, j]
     set_gradient(r, dy)
-    work.m[W_SCRATCH, 1, 1] = strength
-    work.m[W_SCRATCH, 1, 2] = pressure
+    work.s[STRENGTH] = strength
+    work.s[PRESSURE] = pressure
     return denominator
 
 

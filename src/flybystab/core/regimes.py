@@ -36,6 +36,7 @@ from flybystab.core.rheology import flow_direction
 from flybystab.core.rigid import follow_rigid
 from flybystab.core.state import (
     COHESION,
+    DETERMINANT,
     DISPERSED,
     FLOWING,
     N_FULL,
@@ -269,7 +270,7 @@ def _follow(
             reason, t = follow_flow(t, t1, par, tide, ground, tol, limit, max_steps, ws, hist, count)
             volume = np.sqrt(determinant(ws.y[0:6]))
             if reason in (ARREST, JAM):
-                det = ws.work.m[W_SCRATCH, 2, 0]
+                det = ws.work.s[DETERMINANT]
                 stiffen(ws.y, par, ws)
                 log(reason, t, det, volume, events, count)
                 regime = RIGID

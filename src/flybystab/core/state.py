@@ -66,8 +66,6 @@ W_N = 5  # FLOWING: stress deviator over p sin(phi) + c cos(phi)
 W_A = 6
 W_B = 7
 W_VECTORS = 8
-# row 0: eigenvalues; row 1: V/V0, k P + kc, P; row 2: determinant of the unit stress deviator, place between the
-# corners of a face (0: extension, 1: compression), angle of D past the normal of the face
 W_SCRATCH = 9
 W_FACE = 10  # step from the extension to the compression corner
 # Scratch of `flybystab.core.jacobian`.
@@ -85,11 +83,28 @@ J_NORMAL = 21
 N_WORK = 22
 
 
+# Numbers of `Buffers.s` that `field` and the rates leave.
+VOLUME = 0  # V/V0
+STRENGTH = 1  # k P + k c
+PRESSURE = 2
+DETERMINANT = 3  # of the unit stress deviator
+PLACE = 4  # of the stress on a face, between the corners (0: extension, 1: compression)
+PAST = 5  # angle of D past the normal of the face, rad
+N_NUMBERS = 6
+
+
 class Buffers(NamedTuple):
-    """Scratch of the rates: matrices ``m[N_WORK, 3, 3]`` and components ``c[3, 6]``."""
+    """Scratch of the rates: matrices ``m[N_WORK, 3, 3]``, components ``c[3, 6]`` and numbers ``s[N_NUMBERS]``."""
 
     m: Array
     c: Array
+    s: Array
+
+
+@kernel
+def empty_buffers() -> Buffers:
+    """Fresh scratch."""
+    return Buffers(np.zeros((N_WORK, 3, 3)), np.zeros((3, 6)), np.zeros(N_NUMBERS))
 
 
 @kernel

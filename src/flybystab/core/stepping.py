@@ -22,7 +22,6 @@ from flybystab.core.rheology import normal
 from flybystab.core.state import (
     COHESION,
     N_FULL,
-    N_WORK,
     SIN_PHI,
     SURFACE,
     W_A,
@@ -31,6 +30,7 @@ from flybystab.core.state import (
     W_L,
     W_S,
     Buffers,
+    empty_buffers,
     gradient,
     set_gradient,
 )
@@ -95,7 +95,7 @@ def follow_steps(
     ``summary[4]`` gets the start of the first and the end of the last step that flowed (-1 if none), the
     number of steps that flowed, and the number without contact.
     """
-    work = Buffers(np.zeros((N_WORK, 3, 3)), np.zeros((3, 6)))
+    work = empty_buffers()
     jac = np.zeros((15, 15))
     pivots = np.zeros(15, dtype=np.int64)
     spare = np.zeros(36)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.core.jit import borrowed, code, kernel
-from flybystab.core.state import N_WORK, RIGID, W_SCRATCH, Buffers, to_fixed_frame
+from flybystab.core.state import RIGID, W_SCRATCH, Buffers, empty_buffers, to_fixed_frame
 from flybystab.core.steppers import N_STAGES
 
 Array = NDArray[np.float64]
@@ -69,7 +69,7 @@ def copy(a: Array, b: Array, n: int) -> None:
 def workspace() -> Workspace:
     """Fresh buffers."""
     return Workspace(
-        Buffers(np.zeros((N_WORK, 3, 3)), np.zeros((3, 6))),
+        empty_buffers(),
         np.zeros((N_STAGES, 15)),
         np.zeros((15, 16)),
         np.zeros((15, 15)),
@@ -91,7 +91,7 @@ def workspace() -> Workspace:
 def borrowed_workspace(ws: Workspace) -> Workspace:
     """The same buffers without reference counts, for use inside a kernel that has them as an argument."""
     return Workspace(
-        Buffers(borrowed(ws.work.m), borrowed(ws.work.c)),
+        Buffers(borrowed(ws.work.m), borrowed(ws.work.c), borrowed(ws.work.s)),
         borrowed(ws.k),
         borrowed(ws.jac),
         borrowed(ws.lu),

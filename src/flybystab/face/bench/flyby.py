@@ -20,7 +20,7 @@ from flybystab.aggregate.body import Body
 from flybystab.core import motion
 from flybystab.core.judgement import N_ANSWER
 from flybystab.core.passage import parameters, passage
-from flybystab.core.state import FLOWING, N_WORK, Buffers
+from flybystab.core.state import FLOWING, empty_buffers
 from flybystab.core.stepping import follow_steps
 from flybystab.core.tide import TidePanels, tensor
 from flybystab.rows import MAX_STEPS, buffers, judge_rows, one_row
@@ -122,7 +122,7 @@ def rows(figure: str | Path | None = None, repeat: int = 5) -> list[dict[str, An
     flowing = np.flatnonzero(history["regime"] == FLOWING)
     first, last = flowing[0], flowing[-1]
     start, stop = history["time"][first] / t0, history["time"][last] / t0
-    work = Buffers(np.zeros((N_WORK, 3, 3)), np.zeros((3, 6)))
+    work = empty_buffers()
 
     def numbers(i: int) -> Any:
         gradient = history["velocity_gradient"][i] * t0
