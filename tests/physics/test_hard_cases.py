@@ -18,6 +18,7 @@ from scenes import (
 from scipy.spatial.transform import Rotation
 
 from flybystab.aggregate.body import YIELD_SURFACES, Body
+from flybystab.attitudes import periapsis_axes
 from flybystab.core import state
 from flybystab.core.rheology import required_friction
 from flybystab.core.tide import tensor
@@ -333,6 +334,19 @@ def test_contact_lost_in_a_dip_of_the_pressure(q, bounces):
         assert max(late) < 1e4 * tolerance
         # D comes to rest normal to a face of the section, to the last
         assert p.events[-1][2] == pytest.approx(tight.events[-1][2], abs=1e-3)
+
+
+def test_looking_out_for_the_ground_changes_nothing():
+    """A body of 500 km that passes the planet just above its reach, with impacts, with and without a ground below it."""
+    body = Body(
+        [500, 492, 485] * u.km, 2550 * u.kg / u.m**3, 3.11 * u.h, material=material(30, dilatancy=1.0)
+    )
+    e = earth(1.12, 20.0)
+    p = carried(body, e.t_start, e.t_stop, e.tide, tolerance=1e-9)
+    assert [x[0] for x in p.events].count("contact") == 3
+    r = flyby(body, e, periapsis_axes(e), history=False, error=False, tolerance=1e-9)
+    assert r.verdict == "RESHAPED"
+    np.testing.assert_allclose(r.semi_axes.to_value(u.m), axes_of(p.shape), rtol=1e-9)
 
 
 def test_frictionless_impulse_is_the_closed_form():

@@ -106,7 +106,7 @@ def _gap(
         explicit_at(x, ws.y, N_FULL, ws.dense, ws.ys)
     else:
         implicit_at(x, ws.y, N_FULL, ws.dense, ws.y1, ws.ys)
-    n = ws.spare[39:42]
+    n = ws.spare[42:45]
     height = _direction(when, ground, n)
     return height - ground.unit * _reach(regime, ws.ys, par, n, ws.work.m[W_SCRATCH])
 
@@ -151,7 +151,7 @@ def touches(
     size = ground.unit * np.sqrt(size)
     if size < ground.least:
         return np.inf
-    n = ws.spare[39:42]
+    n = ws.spare[42:45]
     end = t + h
     lowest = min(max(0.0, t), end)
     if _direction(lowest, ground, n) >= size:

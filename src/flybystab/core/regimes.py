@@ -285,7 +285,9 @@ def _follow(
                 break
             log(CONTACT, t, 0.0, np.sqrt(determinant(ws.y[0:6])), events, count)
             par[PART] = SMOOTH
-            did = friction_impulse(ws.y, par, 0.0, ws.spare[36:], ws.work, ws.jac, ws.pivots, ws.spare)
+            offset = ws.spare[36:42]
+            offset[:] = 0.0
+            did = friction_impulse(ws.y, par, 0.0, offset, ws.work, ws.jac, ws.pivots, ws.spare)
             if did == FAILED:
                 reason = STUCK
                 break

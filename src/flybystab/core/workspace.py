@@ -53,7 +53,7 @@ class Workspace(NamedTuple):
     scale: Array
     stress: Array
     sample: Array
-    spare: Array
+    spare: Array  # 36 of an impulse, its 6 zeros, 3 of the ground; of a flow the first 30
     mark: Array  # largest mobilised friction, its time; step size; in flow: code of the event nearest, volume ahead
     ends: Array  # flow: event functions at the samples of a step, and last
 
@@ -81,7 +81,7 @@ def workspace() -> Workspace:
         np.ones(15),
         np.zeros(6),
         np.zeros((2, N_SAMPLE + 1)),
-        np.zeros(42),
+        np.zeros(45),
         np.zeros(5),
         np.zeros((4, N_SAMPLE + 2)),
     )
