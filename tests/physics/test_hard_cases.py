@@ -337,7 +337,7 @@ def test_contact_lost_in_a_dip_of_the_pressure(q, bounces):
 
 
 def test_looking_out_for_the_ground_changes_nothing():
-    """A body of 500 km that passes the planet just above its reach, with impacts, with and without a ground below it."""
+    """A body of 500 km that passes just above its reach, with impacts, with and without a ground below it."""
     body = Body(
         [500, 492, 485] * u.km, 2550 * u.kg / u.m**3, 3.11 * u.h, material=material(30, dilatancy=1.0)
     )
