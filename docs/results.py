@@ -261,12 +261,12 @@ def main():
 
 Made by `python docs/results.py` on orbits of {full["catalogue"][0].rsplit("/")[-1]} (JPL, epoch mostly
 JD 2461200.5) and the embedded catalogue, ephemeris {full["ephemeris"][0]}. Each passage: the catalogue body with
-35 deg of friction and no cohesion, and
-{SAMPLES} samples of what is not known, seed 0.
-*Margin*: friction angle less the largest mobilised;
-*passage adds*: what the passage adds to the angle mobilised at rest; both are bounds where the quick bound decides.
-*P(yield)*: share of the samples that can exist and then flow or hit the planet, with its Wilson interval.
-*Follows most*: inputs whose ranks the margin follows, with rank correlations.
+35 deg of friction and no cohesion, and {SAMPLES} samples of what is not known, seed 0. In the tables:
+
+- *margin*: friction angle less the largest mobilised;
+- *passage adds*: what the passage adds to the angle mobilised at rest; both are bounds where the quick bound decides;
+- *P(yield)*: share of the samples that can exist and then flow or hit the planet, with its Wilson interval;
+- *follows most*: inputs whose ranks the margin follows, with rank correlations.
 
 What is not known is drawn from these laws ([what is drawn](screening.md#what-is-drawn)):
 

@@ -109,3 +109,15 @@ def test_failures_widen_the_interval():
 def test_bad_arguments(uncertain):
     with pytest.raises(InvalidInput, match="attitude"):
         fs.survival(PILE, uncertain, attitude=np.eye(2))
+
+
+def test_what_is_no_distribution_and_no_body_is_named(uncertain):
+    encounter = fs.Encounter.hyperbolic("earth", 2.0 * fs.R_earth, 5 * u.km / u.s)
+    with pytest.raises(InvalidInput, match=r"distribution = .*what fs.encounter_distribution gives"):
+        fs.survival(PILE, encounter)
+    with pytest.raises(
+        InvalidInput, match=r"asteroid = PILE: expected a flybystab.Asteroid or a flybystab.Body"
+    ):
+        fs.survival("PILE", uncertain)
+    with pytest.raises(InvalidInput, match=r"of an asteroid: asteroid.body"):
+        fs.flyby(fs.Asteroid.from_catalogue("Apophis"), encounter)

@@ -83,7 +83,7 @@ def rigid_course(
         gives more of them (1e-10: about 12 per dynamical time near the planet).
     """
     if not isinstance(body, Body):
-        raise InvalidInput("body", body, "a flybystab.Body")
+        raise InvalidInput("body", body, "a flybystab.Body (of an asteroid: asteroid.body)")
     if not isinstance(encounter, Encounter):
         raise InvalidInput("encounter", encounter, "a flybystab.Encounter")
     rotation = periapsis_axes(encounter).T @ attitude_matrix(attitude)

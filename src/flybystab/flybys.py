@@ -71,7 +71,7 @@ def flyby(
         If the integrator cannot go on; the message says where.
     """
     if not isinstance(body, Body):
-        raise InvalidInput("body", body, "a flybystab.Body")
+        raise InvalidInput("body", body, "a flybystab.Body (of an asteroid: asteroid.body)")
     if not isinstance(encounter, Encounter):
         raise InvalidInput("encounter", encounter, "a flybystab.Encounter")
     tolerance, max_axis_ratio = step_tolerance(tolerance), axis_ratio(max_axis_ratio)

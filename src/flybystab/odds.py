@@ -112,6 +112,8 @@ def survival(
     quick : bool
         Whether the bound may decide. The verdicts are the same without it, and every margin is exact.
     """
+    if not isinstance(distribution, EncounterDistribution):
+        raise InvalidInput("distribution", distribution, "what fs.encounter_distribution gives")
     n = len(distribution)
     bodies, rotations = spin_states(body, n, seed, material)
     if attitude is not None:

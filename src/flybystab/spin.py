@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from flybystab.aggregate.body import Body, Material
 from flybystab.attitudes import periapsis_axes
+from flybystab.errors import InvalidInput
 from flybystab.many import flyby_many
 from flybystab.rows import TOLERANCE
 from flybystab.sky.encounter import Encounter
@@ -131,6 +132,8 @@ def spin_states(
         Whether the catalogue's pole counts.
     """
     n, seed = whole(n, "n", 1), whole(seed, "seed", 0)
+    if not isinstance(asteroid, Body) and not hasattr(asteroid, "body_with"):
+        raise InvalidInput("asteroid", asteroid, "a flybystab.Asteroid or a flybystab.Body")
     bodies, rotations = [], []
     for turn, phase, height, longitude in np.random.default_rng(seed).random((n, 4)):
         if isinstance(asteroid, Body):

@@ -397,3 +397,12 @@ def test_asteroids_travel_to_workers():
     assert b.row == a.row
     assert b.body.axes == pytest.approx(a.body.axes)
     assert pickle.loads(pickle.dumps(Population())) == Population()
+
+
+def test_one_name_is_an_asteroid_and_not_a_file():
+    (row,) = screen("Apophis", "2029-04-01", "2029-05-01", within=0.01 * u.au)
+    assert row["asteroid"] == "Apophis"
+    with pytest.raises(UnknownName, match="did you mean Apophis"):
+        screen("Apopis", "2029-04-01", "2029-05-01")
+    with pytest.raises(InvalidInput, match="readable CSV"):
+        screen("Apophis.csv", "2029-04-01", "2029-05-01")

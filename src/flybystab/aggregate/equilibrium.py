@@ -139,7 +139,7 @@ def equilibrium(body: Body, tide: Quantity | None = None) -> Equilibrium:
     Equilibrium
     """
     if not isinstance(body, Body):
-        raise InvalidInput("body", body, "a Body")
+        raise InvalidInput("body", body, "a flybystab.Body (of an asteroid: asteroid.body)")
     m = body.material
     c = stress_components(body, tide)
     p, s, det = invariants(c)

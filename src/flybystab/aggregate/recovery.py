@@ -140,7 +140,7 @@ def recovery_energy(
 
 def _dilatancy(body: Body, dilatancy: float | None) -> float:
     if not isinstance(body, Body):
-        raise InvalidInput("body", body, "a Body")
+        raise InvalidInput("body", body, "a flybystab.Body (of an asteroid: asteroid.body)")
     own = body.material.dilatancy if dilatancy is None else dilatancy
     return float(to_si(own, u.dimensionless_unscaled, "dilatancy", low=0.0, high=1.0))
 

@@ -186,7 +186,7 @@ def stability(body: Body, *, dilatancy: float | None = 1.0) -> Stability:
     Stability
     """
     if not isinstance(body, Body):
-        raise InvalidInput("body", body, "a Body")
+        raise InvalidInput("body", body, "a flybystab.Body (of an asteroid: asteroid.body)")
     m = body.material
     beta = m.dilatancy if dilatancy is None else dilatancy
     beta = to_si(beta, u.dimensionless_unscaled, "dilatancy", low=0.0, high=1.0)

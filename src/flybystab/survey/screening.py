@@ -276,7 +276,7 @@ def screen(
 
     Parameters
     ----------
-    asteroids : sequence of Asteroid, str or int, or a path, or None
+    asteroids : sequence of Asteroid, str or int, or a path or name, or None
         Asteroids, their names in the embedded catalogue, or paths of catalogue files (:func:`catalogue`); None
         for the embedded catalogue.
     start, stop : Time or str

@@ -17,7 +17,9 @@ def listed(asteroids: str | Path | Sequence[Asteroid | str | int | Path] | None)
     if asteroids is None:
         return catalogue()
     if isinstance(asteroids, str | Path):
-        asteroids = [Path(asteroids)]
+        path = Path(asteroids)
+        named = isinstance(asteroids, str) and not path.suffix and not path.exists()
+        asteroids = [str(asteroids) if named else path]
     found: list[Asteroid] = []
     for a in asteroids:
         if isinstance(a, Asteroid):
