@@ -1,21 +1,27 @@
 """Random flybys over the whole domain: does any hang, fail, gain energy, change its verdict, or miss its own error?
 
 python benchmarks/campaign.py stress [N [SEED]]       two tolerances, energy, verdicts; 1000 flybys, seed 1
+python benchmarks/campaign.py extremes [N [SEED]]     the same at the ends of every range, several at once; 1000, seed 4
 python benchmarks/campaign.py integrators [N [SEED]]  against the integrator that knows no events; 300, seed 2
 python benchmarks/campaign.py coverage [N [SEED]]     the error estimate against a run at 1e-11; 100 with flow of each
                                                       yield surface at dilatancy 0 and 1, seed 3
 
 `stress` and `integrators` draw semi-axes to 1 : 0.1 : 0.1, 1 m to 1000 km, 1000 to 4000 kg/m3, any spin up to 1.2 times
 the cohesionless limit of a sphere, any attitude; friction 0.1 to 60 deg, the four surfaces, dilatancy 0 to 1, cohesion
-or none, brittle or not; Earth at 1.01 to 5 radii with 0 to 20 km/s. Energy is checked where it can only fall: the
-plastic power along the flow, and the kinetic energy across every impulse and arrest.
+or none, brittle or not; Earth at 1.01 to 5 radii with 0 to 20 km/s. `extremes` takes each of these from a few values
+at or beside the ends: spheres, needles and discs, bodies at the limit of their equilibrium, friction 0 to 89 deg, a
+cohesion of next to nothing or of rock, 500 to 8000 kg/m3, orbits that graze, parabolas, 70 km/s, several planets and a
+made-up one. Energy is checked where it can only fall: the plastic power along the flow, and the kinetic energy across
+every impulse and arrest.
 """
 
 from __future__ import annotations
 
+import dataclasses
 import sys
 import time
 from collections import Counter
+from collections.abc import Callable
 from typing import Any
 
 import astropy.units as u
@@ -30,6 +36,9 @@ from flybystab.core.stepping import follow_steps
 from flybystab.core.tide import TidePanels, components, tensor
 from flybystab.outcome import bound_fraction, classed
 from flybystab.rows import Judged, judged
+from flybystab.sky.planets import planet
+
+Scene = tuple[fs.Body, fs.Encounter, np.ndarray]
 
 TOLERANCES = (1e-7, 1e-9)
 #: Axis ratio where the model is left: above that of the longest bodies drawn.
@@ -40,7 +49,7 @@ STEPS = 250
 SHORTER = 64
 
 
-def draw(rng: np.random.Generator) -> tuple[fs.Body, fs.Encounter, np.ndarray]:
+def draw(rng: np.random.Generator) -> Scene:
     """One body, encounter and attitude."""
     size = 10.0 ** rng.uniform(0.0, 6.0)
     b = rng.uniform(0.1, 1.0) if rng.random() < 0.5 else rng.uniform(0.5, 1.0)
@@ -77,12 +86,64 @@ def draw(rng: np.random.Generator) -> tuple[fs.Body, fs.Encounter, np.ndarray]:
     return body, encounter, Rotation.random(random_state=int(rng.integers(1 << 31))).as_matrix()
 
 
+def draw_extreme(rng: np.random.Generator) -> Scene:
+    """As `draw`, with everything at the ends of its range."""
+
+    def one_of(*values: Any) -> Any:
+        return values[int(rng.integers(len(values)))]
+
+    size = one_of(1.0, 100.0, 1e4, 1e6)
+    b, c = one_of(
+        (1.0, 1.0), (1.0, 1.0 - 1e-9), (1.0, 0.1), (0.1, 0.1), (0.1, 0.01), (0.999, 0.998), (0.6, 0.5)
+    )
+    rho = one_of(500.0, 2000.0, 8000.0)
+    phi = one_of(0.0, 1e-3, 0.1, 5.0, 35.0, 36.87, 60.0, 89.0)
+    strength = np.pi * G * rho**2 * size**2
+    material = fs.Material(
+        friction_angle=phi * u.deg,
+        cohesion=one_of(0.0, 0.0, 1e-9, 1.0, 1e6) * strength * u.Pa,
+        dilatancy=one_of(0.0, 1e-3, 0.999, 1.0),
+        yield_surface=str(rng.choice(YIELD_SURFACES)),
+        brittle=bool(rng.integers(2)),
+    )
+    axes = size * np.array([1.0, b, c]) * u.m
+    axis = one_of([0.0, 0.0, 1.0], [0.0, 0.0, -1.0], [1.0, 0.0, 0.0], rng.standard_normal(3))
+    rate = np.sqrt(4.0 / 3.0 * np.pi * G * rho) * np.asarray(axis) / np.linalg.norm(axis)
+
+    def spinning(share: float) -> fs.Body:
+        return fs.Body(
+            semi_axes=axes, density=rho * u.kg / u.m**3, spin=share * rate * u.rad / u.s, material=material
+        )
+
+    # the fastest spin that it bears, where it bears one
+    low, high = 0.0, 2.0
+    for _ in range(50):
+        mid = 0.5 * (low + high)
+        low, high = (mid, high) if fs.equilibrium(spinning(mid)).admissible else (low, mid)
+    body = spinning(one_of(0.0, 1e-6, low * (1.0 - 1e-9), low * 0.999, low * 0.5))
+    earth = planet("earth")
+    pebble = dataclasses.replace(
+        earth, name="pebble", gm=1e-6 * earth.gm, radius=1e-2 * earth.radius, atmosphere=0.0
+    )
+    name = one_of("earth", "earth", "earth", "jupiter", "sun", "moon", "venus", pebble)
+    surface = planet(name).impact_distance
+    q = one_of(0.999, 1.0 + 1e-6, 1.01, 1.02, 1.05, 1.3, 2.0, 6.0)
+    v = one_of(0.0, 1e-6, 0.01, 5.0, 70.0)
+    encounter = fs.Encounter.hyperbolic(name, q * surface * u.m, v * u.km / u.s)
+    return (
+        body,
+        encounter,
+        one_of(np.eye(3), Rotation.random(random_state=int(rng.integers(1 << 31))).as_matrix()),
+    )
+
+
 def said(body: fs.Body, encounter: fs.Encounter) -> str:
     """A scene in two lines."""
     m = body.material
     axes, spin = (" ".join(f"{x:.4g}" for x in v) for v in (body.axes, body.omega))
     return (
-        f"   {axes} m, {body.rho:.0f} kg/m3, spin {spin} rad/s, q {encounter.distance / fs.R_earth:.3f} R_E, "
+        f"   {axes} m, {body.rho:.0f} kg/m3, spin {spin} rad/s, {encounter.planet.name}, "
+        f"q {encounter.distance.to_value('m') / encounter.planet.radius:.4f} R, "
         f"v_inf {encounter.v_inf:.2f},\n   {m.yield_surface}, friction {np.rad2deg(m.phi):.2f} deg, "
         f"cohesion {m.c_pa:.3g} Pa{' (brittle)' if m.brittle else ''}, dilatancy {m.dilatancy:.3g}"
     )
@@ -121,7 +182,12 @@ def plastic_gain(found: Judged) -> float:
     return float(np.max(dilation - friction) / np.max((h["deviator"] + np.abs(h["pressure"]))[flow] * size))
 
 
-def stress(n: int, seed: int) -> Counter[str]:
+def extremes(n: int, seed: int) -> Counter[str]:
+    """`stress` with everything at the ends of its range."""
+    return stress(n, seed, draw_extreme)
+
+
+def stress(n: int, seed: int, draw: Callable[[np.random.Generator], Scene] = draw) -> Counter[str]:
     """Two tolerances of the default integrator."""
     rng = np.random.default_rng(seed)
     count: Counter[str] = Counter()
@@ -276,9 +342,7 @@ def integrators(n: int, seed: int) -> Counter[str]:
     return count
 
 
-def pile(
-    rng: np.random.Generator, surface: str, dilatancy: float
-) -> tuple[fs.Body, fs.Encounter, np.ndarray]:
+def pile(rng: np.random.Generator, surface: str, dilatancy: float) -> Scene:
     """A pile of ordinary shape, friction and spin on a passage that makes about half of them flow."""
     body = fs.Body(
         semi_axes=np.sort(rng.uniform(0.45, 1.0, 3))[::-1] * u.km,
@@ -342,7 +406,12 @@ def coverage(n: int, seed: int, tolerance: float = 1e-8, tight: float = 1e-11) -
     return shares
 
 
-COMMANDS = {"stress": (stress, 1000, 1), "integrators": (integrators, 300, 2), "coverage": (coverage, 100, 3)}
+COMMANDS = {
+    "stress": (stress, 1000, 1),
+    "extremes": (extremes, 1000, 4),
+    "integrators": (integrators, 300, 2),
+    "coverage": (coverage, 100, 3),
+}
 
 if __name__ == "__main__":
     words = sys.argv[1:]

@@ -10,15 +10,12 @@ from flybystab.core.flow_rule import fade
 from flybystab.core.ground import Ground, touches
 from flybystab.core.jacobian import flow_jacobian
 from flybystab.core.jit import kernel
-from flybystab.core.section import SLACK, choose_part, settle
+from flybystab.core.section import choose_part, settle
 from flybystab.core.state import (
     BETA,
     DETERMINANT,
-    FACE,
     FLOWING,
     N_FULL,
-    PART,
-    PAST,
     PRESSURE,
     STRENGTH,
 )
@@ -232,8 +229,7 @@ def follow_flow(
             health(t + h, ws.y1, f0, par, tide, limit2, ws)
         t = t1 if last else t + h
         copy(ws.y1, y, N_FULL)
-        if int(par[PART]) == FACE and abs(ws.work.s[PAST]) > SLACK:
-            settle(y, par, ws)
+        if settle(y, par, ws.scale[6], ws):
             health(t, y, f0, par, tide, limit2, ws)
         _, d, _ = deviator(y[6:12], ws.stress)
         if d < D_REST:

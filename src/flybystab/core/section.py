@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flybystab.core.flow_rule import dilatancy, dilation, isotropic
+from flybystab.core.flow_rule import dilatancy, dilation, flow_stress, isotropic
 from flybystab.core.jit import kernel
 from flybystab.core.motion import rate
 from flybystab.core.rheology import MOHR_COULOMB, corner, onto_face
@@ -61,18 +61,26 @@ def choose_part(t: float, y: Array, par: Array, tide: TidePanels, near: float, w
 
 
 @kernel
-def settle(y: Array, par: Array, ws: Workspace) -> None:
-    """Make ``D`` exactly normal to the face on which the stress is, ``|D'|`` and the flow rule kept.
+def settle(y: Array, par: Array, slack: float, ws: Workspace) -> bool:
+    """Undo what the errors of the steps have left of ``D`` against the flow rule; whether there was anything.
 
-    The flow on a face keeps what is not normal as it is, errors of the steps included, and ``|D|`` falls to nothing.
+    ``tr D`` becomes that of the rule where it is off by more than `slack`, and on a face ``D`` becomes normal to it.
+    Both are kept by the motion as they are, and ``|D'|`` falls to nothing.
     """
     unit, n = ws.stress, ws.work.m[W_N]
-    _, size, det = deviator(y[6:12], unit)
-    a, b, det = onto_face(par[SIN_PHI], det)
-    isotropic(a, b, unit, n)
-    _, _, support, _, _ = corner(par[SIN_PHI], det, False)
+    turned = int(par[PART]) == FACE and abs(ws.work.s[PAST]) > SLACK
+    if turned:
+        _, size, det = deviator(y[6:12], unit)
+        a, b, det = onto_face(par[SIN_PHI], det)
+        isotropic(a, b, unit, n)
+        pack(n, unit)
+        _, _, support, _, _ = corner(par[SIN_PHI], det, False)
+    else:
+        size, _, support, _ = flow_stress(y[6:12], par, unit, n)
     beta, _ = dilatancy(np.sqrt(determinant(y[0:6])), par)
-    mean = dilation(beta, size, support, par) / 3.0
-    pack(n, y[6:12])
+    trace = dilation(beta, size, support, par)
+    if not turned and abs(y[6] + y[7] + y[8] - trace) <= slack:
+        return False
     for i in range(6):
-        y[6 + i] = size * y[6 + i] + (mean if i < 3 else 0.0)
+        y[6 + i] = size * unit[i] + (trace / 3.0 if i < 3 else 0.0)
+    return True
