@@ -16,7 +16,8 @@ from flybystab.core.passage import REGIMES, event_log, unpacked_history
 from flybystab.core.workspace import N_EVENT, N_HISTORY
 from flybystab.errors import InvalidInput
 from flybystab.outcome import VERDICTS, Verdict
-from flybystab.sky.encounter import TAIL, Encounter
+from flybystab.sky.encounter import Encounter
+from flybystab.sky.extent import TAIL
 from flybystab.units import to_si
 
 Array = NDArray[np.float64]

@@ -15,7 +15,8 @@ from flybystab.aggregate.body import Material
 from flybystab.constants import AU, R_EARTH
 from flybystab.core.quick import tide_size
 from flybystab.errors import InvalidInput, OutOfSpan, OutputFailed, UnknownName
-from flybystab.sky.encounter import Encounter, usual_start
+from flybystab.sky.encounter import Encounter
+from flybystab.sky.extent import usual_start
 from flybystab.sky.planets import planet
 from flybystab.survey import table_files
 from flybystab.survey.catalogue import Asteroid

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from scipy.stats import binomtest
 
 from flybystab.errors import InvalidInput, NoEncounter
-from flybystab.sky.encounter import far_enough
 from flybystab.sky.ephemeris import Ephemeris
+from flybystab.sky.extent import far_enough
 from flybystab.sky.finder import find_encounters
 from flybystab.sky.linear_plane import LinearPlane, ellipse, linear_plane
 from flybystab.sky.orbit import Orbit, later

@@ -13,25 +13,18 @@ from astropy.time import Time
 from astropy.units import Quantity
 from numpy.typing import NDArray
 
-from flybystab.constants import AU, HOUR
 from flybystab.core.ground import Ground
-from flybystab.core.jit import kernel
-from flybystab.core.tide import TidePanels, tide_j2, tide_panels, tide_point
+from flybystab.core.tide import TidePanels, tide_panels
 from flybystab.errors import InvalidInput
 from flybystab.sky.b_plane import NORTH, checked, target_plane
 from flybystab.sky.ephemeris import BODIES, Ephemeris
-from flybystab.sky.kepler import states_at_times, time_at_distance
+from flybystab.sky.extent import SETTLE, far_enough
 from flybystab.sky.orbit import Orbit
-from flybystab.sky.planets import PLANETS, Planet, planet
+from flybystab.sky.planets import Planet, planet
 from flybystab.sky.predictability import Predictability
 from flybystab.units import brief, to_si
 
 Array = NDArray[np.float64]
-
-#: Time after the end of the encounter that the tide still covers, s: a body that flows can be followed.
-TAIL = 100.0 * HOUR
-#: Time to settle after an encounter, unless another is asked for, s.
-SETTLE = 4.0 * HOUR
 
 
 class Track(Protocol):
@@ -39,42 +32,6 @@ class Track(Protocol):
 
     def states(self, t: Array) -> Array:
         """Position (m) and velocity (m/s), shape (n, 6), at ``t`` s from closest approach, shape (n,)."""
-
-
-@dataclass(frozen=True)
-class KeplerTrack:
-    """Two-body motion in the xy plane with periapsis on +x and angular momentum on +z.
-
-    Attributes
-    ----------
-    gm : float
-        Gravitational parameter, m3/s2.
-    q : float
-        Periapsis distance, m.
-    f : float
-        Eccentricity - 1 = q v_inf^2 / gm.
-    """
-
-    gm: float
-    q: float
-    f: float
-
-    def states(self, t: Array) -> Array:
-        """Position (m) and velocity (m/s), shape (n, 6), at ``t`` s from periapsis, shape (n,)."""
-        s = states_at_times(self.gm, self.q, self.f, np.ascontiguousarray(t, dtype=float))
-        out = np.zeros((s.shape[0], 6))
-        out[:, [0, 1, 3, 4]] = s
-        return out
-
-
-@kernel
-def planet_tide(gm: float, j2: float, radius: float, pole: Array, position: Array, out: Array) -> None:
-    """Add to ``out[n, 6]`` the tide (s^-2) of a planet with J2 on a body ``position[n, 3]`` (m) from it."""
-    for i in range(position.shape[0]):
-        x, y, z = -position[i, 0], -position[i, 1], -position[i, 2]
-        tide_point(gm, x, y, z, out[i])
-        if j2 != 0.0:
-            tide_j2(gm, j2, radius, pole[0], pole[1], pole[2], x, y, z, out[i])
 
 
 @dataclass(frozen=True, eq=False)
@@ -275,42 +232,9 @@ class Encounter:
                 raise InvalidInput("start_distance", start_distance, f"more than the periapsis, {periapsis}")
         axis = _unit_vector(pole)
 
-        f = q * v * v / body.gm
-        speed = np.sqrt(body.gm * (2.0 + f) / q)
-        track = KeplerTrack(body.gm, q, f)
-        half = time_at_distance(body.gm, q, f, start)
-        level = body.impact_level(q)
-        entry = None
-        if level is not None:
-            entry = -float(time_at_distance(body.gm, q, f, min(body.impact_distance, start)))
+        from flybystab.sky.scripted import scripted
 
-        def tide(t: Array) -> Array:
-            out = np.zeros((t.size, 6))
-            planet_tide(body.gm, body.j2 if j2 else 0.0, body.radius, axis, track.states(t)[:, :3], out)
-            return out
-
-        stop = half + wait
-        panels, error = tide_panels(tide, -half, stop + TAIL, q / speed)
-        forces = ["orbit: two-body", f"tide: {body.name}"] + ([f"tide: {body.name} J2"] if j2 else [])
-        return cls(
-            planet=body,
-            time=None,
-            distance=(q * u.m).to(u.km),
-            v_inf=(v * u.m / u.s).to(u.km / u.s),
-            v_periapsis=(speed * u.m / u.s).to(u.km / u.s),
-            start_distance=(start * u.m).to(u.km),
-            impact=level is not None,
-            impact_level=level,
-            impact_time=entry,
-            frame="periapsis",
-            forces=tuple(forces),
-            left_out=_left_out(body, q, j2),
-            tide_error=error,
-            t_start=-float(half),
-            t_stop=float(stop),
-            tide=panels,
-            track=track,
-        )
+        return scripted(cls, body, q, v, start, wait, j2, axis)
 
     @classmethod
     def from_orbit(
@@ -403,38 +327,3 @@ def _unit_vector(pole: tuple[float, float, float]) -> Array:
     if not (np.isfinite(norm) and norm > 0.0 and axis.shape == (3,)):
         raise InvalidInput("pole", pole, "a direction: three finite numbers, not all zero")
     return axis / norm
-
-
-def _left_out(body: Planet, q: float, j2: bool) -> tuple[tuple[str, float], ...]:
-    """What a two-body encounter leaves out, each with its share at periapsis.
-
-    J2: at most 6 J2 (a/q)^2 of the tide (over the pole) and 3 J2 (a/q)^2 of the acceleration. A source GM'
-    at distance d: (GM'/GM) (q/d)^3 of both.
-    """
-    flat = body.j2 * (body.radius / q) ** 2
-    out = [("orbit: " + body.name + " J2", 3.0 * flat)]
-    if not j2:
-        out.append((f"{body.name} J2", 6.0 * flat))
-    if body.orbit_radius > 0.0:
-        out.append(("sun", PLANETS["sun"].gm / body.gm * (q / body.orbit_radius) ** 3))
-    pair = {"earth": "moon", "moon": "earth"}.get(body.name)
-    if pair is not None:
-        out.append((pair, PLANETS[pair].gm / body.gm * (q / 3.844e8) ** 3))
-    return tuple(out)
-
-
-def far_enough(body: Planet) -> float:
-    """Distance that still counts as an encounter, m."""
-    return min(20.0 * hill_radius(body), AU)
-
-
-def hill_radius(body: Planet) -> float:
-    """Hill radius ``d (GM / 3 GM_primary)^(1/3)``, m; the Moon's primary is the Earth."""
-    if body.name == "moon":
-        return float(3.844e8 * (body.gm / (3.0 * PLANETS["earth"].gm)) ** (1.0 / 3.0))
-    return float(body.orbit_radius * (body.gm / (3.0 * PLANETS["sun"].gm)) ** (1.0 / 3.0))
-
-
-def usual_start(body: Planet, q: float) -> float:
-    """Distance, m, at which an encounter with closest distance `q` (m) on a real orbit starts and ends."""
-    return max(10.0 * body.radius, 1.5 * q, min(10.0 * q, hill_radius(body)))

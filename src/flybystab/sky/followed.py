@@ -21,8 +21,9 @@ from flybystab.sky.approach import (
     periapsis_time,
     relative,
 )
-from flybystab.sky.encounter import TAIL, Encounter, usual_start
+from flybystab.sky.encounter import Encounter
 from flybystab.sky.ephemeris import BODIES, Ephemeris, Window
+from flybystab.sky.extent import TAIL, usual_start
 from flybystab.sky.forces import FORCES, model, shares
 from flybystab.sky.kepler import time_at_distance
 from flybystab.sky.orbit import Orbit, _ephemeris, later, seconds

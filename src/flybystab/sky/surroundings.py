@@ -6,13 +6,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.core.jit import kernel
-from flybystab.core.tide import tide_point
+from flybystab.core.tide import tide_j2, tide_point
 from flybystab.sky.approach import PanelTrack
-from flybystab.sky.encounter import planet_tide
 from flybystab.sky.ephemeris import BODIES, Window
 from flybystab.sky.planets import Planet
 
 Array = NDArray[np.float64]
+
+
+@kernel
+def planet_tide(gm: float, j2: float, radius: float, pole: Array, position: Array, out: Array) -> None:
+    """Add to ``out[n, 6]`` the tide (s^-2) of a planet with J2 on a body ``position[n, 3]`` (m) from it."""
+    for i in range(position.shape[0]):
+        x, y, z = -position[i, 0], -position[i, 1], -position[i, 2]
+        tide_point(gm, x, y, z, out[i])
+        if j2 != 0.0:
+            tide_j2(gm, j2, radius, pole[0], pole[1], pole[2], x, y, z, out[i])
 
 
 @kernel

@@ -12,7 +12,8 @@ from astropy.time import Time
 from flybystab.constants import AU
 from flybystab.core.quick import tide_size
 from flybystab.errors import NoEncounter
-from flybystab.sky.encounter import SETTLE, Encounter, far_enough, usual_start
+from flybystab.sky.encounter import Encounter
+from flybystab.sky.extent import SETTLE, far_enough, usual_start
 from flybystab.sky.orbit import Orbit
 from flybystab.sky.planets import PLANETS, planet
 from flybystab.survey.catalogue import Asteroid

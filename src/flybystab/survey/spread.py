@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from flybystab.errors import FlybystabError
 from flybystab.sky.distribution import clone_passages, encounter_distribution
-from flybystab.sky.encounter import far_enough
+from flybystab.sky.extent import far_enough
 from flybystab.sky.orbit import later
 from flybystab.sky.planets import planet
 from flybystab.survey.draws import identity, stream
