@@ -344,3 +344,14 @@ def test_apophis_after_2029_is_where_jpl_has_it(shared):
     before, after = orbits
     place, _ = before.at(after.epoch, ephemeris="de440")
     assert np.linalg.norm((place - after.position).to_value(u.km)) < 1.0
+
+
+def test_a_start_inside_a_planet_is_refused():
+    """Not an impact, and no search for one: the state cannot be an asteroid's."""
+    sunk = Orbit.from_state(EPOCH, [5000, 0, 0] * u.km, [0, 7.5, 0] * u.km / u.s, centre="earth", name="sunk")
+    with pytest.raises(InvalidInput, match=r"sunk at .* inside earth.*6478 km"):
+        find_encounters(sunk, EPOCH, later(EPOCH, 1e6))
+    with pytest.raises(InvalidInput, match="inside earth"):
+        Encounter.from_orbit(sunk, "earth", EPOCH)
+    above = Orbit.from_state(EPOCH, [7000, 0, 0] * u.km, [0, 7.5, 0] * u.km / u.s, centre="earth")
+    assert len(find_encounters(above, EPOCH, later(EPOCH, 86400.0))) > 10

@@ -3,13 +3,14 @@
 import astropy.units as u
 import numpy as np
 import pytest
+from astropy.coordinates import GCRS, ITRS, CartesianRepresentation
 from astropy.time import Time
 
 import flybystab as fs
 from flybystab.constants import AU, YEAR
 from flybystab.sky.elements import GM_SUN
 from flybystab.sky.kepler import two_body
-from flybystab.sky.orbit import heliocentric
+from flybystab.sky.orbit import heliocentric, later
 from flybystab.survey.asteroid import Asteroid
 from flybystab.survey.formats import from_mpc
 from flybystab.survey.orbit_errors import error_of, runoff
@@ -23,6 +24,10 @@ ROWS = {
     "2012-2013,2013-02-21",
     "Apophis": "99942,Apophis,2004 MN4,2461000.5,0.9223803,0.1911663,3.34096,203.89965,126.67283,312.80547,1.11259993,"
     "0,2004-2021,2021-05-20",
+    "2023 CX1": ",,2023 CX1,2459988.5,1.6854528,0.4551803,3.56508,323.83256,219.03655,346.26399,0.45043195,"
+    "5,0 d,2023-02-13",
+    "2024 BX1": ",,2024 BX1,2460329.5,1.3364558,0.3754714,7.29282,300.11837,243.65808,329.26447,0.63792872,"
+    "5,0 d,2024-01-21",
 }
 
 
@@ -60,18 +65,34 @@ def test_the_longitude_is_known_where_it_was_observed():
     seen = Time(float(row["observed_jd"]), format="jd", scale="tdb")
     assert 2012.9 < seen.jyear < 2013.1
     axis = float(row["a_au"]) * AU
-    states = [
-        covariance.states(v[None])[0]
-        for v in (covariance.values, covariance.values + covariance.sigma * SIGNS)
-    ]
+    (way,) = np.linalg.svd(covariance.matrix)[0][:, :1].T * np.sqrt(np.linalg.svd(covariance.matrix)[1][0])
     for years, share in ((0.0, 0.0), (10.0, 1.0), (-10.0, 1.0)):
         t = (seen - rock.epoch).to_value(u.s) + years * YEAR
-        gap = np.linalg.norm(np.subtract(*(two_body(GM_SUN, s, t)[:3] for s in states)))
-        assert gap == pytest.approx(share * axis * runoff(2) / 3.0 * 10.0 * YEAR, rel=0.2, abs=100e3)
+        gap = np.linalg.norm(
+            np.subtract(*(two_body(GM_SUN, covariance.values + k * way, t)[:3] for k in (0.0, 1.0)))
+        )
+        assert gap == pytest.approx(share * axis * runoff(2) / 3.0 * 10.0 * YEAR, rel=0.2, abs=1e3)
 
 
-#: Along the one direction that U leaves uncertain: a longer axis, hence a larger anomaly at a later epoch.
-SIGNS = np.array([-1.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+@pytest.mark.parametrize("name", ["2023 CX1", "2024 BX1"])
+def test_asteroids_on_their_way_to_the_earth_are_determined(name):
+    """Seen for hours before they fell, CX1 off Dieppe and BX1 near Berlin."""
+    rock = mpc(name)
+    passage = fs.Encounter.from_orbit(rock.orbit, "earth", rock.epoch, search=3 * u.d)
+    assert passage.impact
+    assert passage.predictability == "determined"
+    assert passage.displacement < 100 * u.km
+    when = later(passage.time, passage.impact_time).utc
+    place = GCRS(CartesianRepresentation(passage.position(passage.impact_time)[0] * u.m), obstime=when)
+    found = place.transform_to(ITRS(obstime=when)).earth_location.to_geodetic()
+    utc, lat, lon = FELL[name]
+    assert abs((when - Time(utc)).to_value(u.s)) < 20.0
+    assert abs(found.lat.deg - lat) < 0.3
+    assert abs(found.lon.deg - lon) < 1.0
+
+
+#: Where and when the fireballs were seen (IMO, Jenniskens 2023, Spurny et al. 2024), 20 to 80 km below.
+FELL = {"2023 CX1": ("2023-02-13 02:59:13", 49.95, 0.0), "2024 BX1": ("2024-01-21 00:32:40", 52.6, 12.4)}
 
 
 def test_duende_in_2003_is_not_determined():

@@ -28,10 +28,10 @@ from flybystab.sky.forces import FORCES
 from flybystab.sky.minima import WIDTH
 from flybystab.sky.need import N_SHARES, NAMES, reduced
 from flybystab.sky.orbit import Orbit, _ephemeris, default_forces, later, seconds
-from flybystab.sky.planets import PLANETS, planet
+from flybystab.sky.planets import PLANETS, Planet, planet
 from flybystab.sky.predictability import neighbour
 from flybystab.sky.threads import in_order
-from flybystab.sky.track import STALLED, search
+from flybystab.sky.track import INSIDE, STALLED, search
 from flybystab.units import to_si
 
 Array = NDArray[np.float64]
@@ -175,8 +175,10 @@ def find_encounters(
             i, n, status, reached = search(
                 *tables, t_start, t_stop, limits, floors, steps, least, always, shares[part], i, out
             )
+            name = rows[part][i][0] if i < size else ""
+            if status == INSIDE:
+                raise starts_inside(name, rows[part][i][1].epoch, PLANETS[BODIES[int(reached)]])
             if status == STALLED:
-                name = rows[part][i][0]
                 raise NotConverged(f"{name}: the step size collapsed at {later(middle, reached).iso} TDB")
             out[:n, 11] += part.start
             parts.append(out[:n].copy())
@@ -220,6 +222,14 @@ def find_encounters(
 
         add_growth(out, beside, laws, window, field_of, tolerances, workers)
     return out
+
+
+def starts_inside(name: str, epoch: Time, body: Planet) -> InvalidInput:
+    """The error of an orbit whose state at the epoch is below the surface or atmosphere of a body."""
+    what = f"{name or 'the orbit'} at {epoch.tdb.iso} TDB inside {body.name}"
+    return InvalidInput(
+        "orbit", what, f"a start more than {body.impact_distance / 1e3:.0f} km from its centre"
+    )
 
 
 def _epochs(rows: list[tuple[str, Orbit]], origin: Time) -> Array:

@@ -24,6 +24,7 @@ from flybystab.sky.approach import (
 from flybystab.sky.encounter import Encounter
 from flybystab.sky.ephemeris import BODIES, Ephemeris, Window
 from flybystab.sky.extent import TAIL, usual_start
+from flybystab.sky.finder import starts_inside
 from flybystab.sky.forces import FORCES, model, shares
 from flybystab.sky.kepler import time_at_distance
 from flybystab.sky.orbit import Orbit, _ephemeris, later, seconds
@@ -118,6 +119,9 @@ def followed(
     window = _ephemeris(ephemeris).window(
         near, min(*epochs, -reach), max(*epochs, reach + wait + TAIL + 10.0 * DAY)
     )
+    away = orbit.barycentric(window) - window.states(index, np.array([epoch]))[0]
+    if np.linalg.norm(away[:3]) < body.impact_distance:
+        raise starts_inside(orbit.name, orbit.epoch, body)
     everything = tuple(n for n in FORCES if n != "non-gravitational" or any(orbit.nongrav.a))
     first = _passage(orbit, window, index, forces or everything, reach, 1e-9)
     if first is None or first.distance > largest:

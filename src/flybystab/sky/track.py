@@ -21,8 +21,8 @@ from flybystab.sky.need import reduced, shares_along
 
 Array = NDArray[np.float64]
 
-#: How a search ends: ``out`` too small, step size collapsed.
-FULL, STALLED = 1, 2
+#: How a search ends: ``out`` too small, step size collapsed, start below the surface or atmosphere of a body.
+FULL, STALLED, INSIDE = 1, 2, 3
 
 
 @kernel
@@ -65,9 +65,9 @@ def track_encounters(
     int
         Number of rows.
     int
-        0 done; 1 `out` was too small; 2 the step size collapsed.
+        0 done; 1 `out` was too small; 2 the step size collapsed; 3 the start is inside a body.
     float
-        Time reached, s.
+        Time reached, s; for 3 the number of the body.
     """
     field = borrowed_field(field)
     k, places = borrowed_room(room)
@@ -82,6 +82,11 @@ def track_encounters(
     t = t0
     rate(field, law, t, y, places, k[0])
     gather(places, now)
+    for body in range(10):
+        if (y[0] - now[body, 0]) ** 2 + (y[1] - now[body, 1]) ** 2 + (y[2] - now[body, 2]) ** 2 < floors[
+            body
+        ] ** 2:
+            return n, INSIDE, float(body)
     while (t_end - t) * sign > 0.0:
         stop = t_quiet if (t_quiet - t) * sign > 0.0 else t_end
         t_new, h = advance(field, law, t, y, h, stop, tolerance, k, new, places)
@@ -170,9 +175,9 @@ def search(
     int
         Number of rows.
     int
-        0 done, 1 `out` was too small for the next asteroid, 2 its step size collapsed.
+        0 done, 1 `out` was too small for the next asteroid, 2 its step size collapsed, 3 it starts inside a body.
     float
-        Where it did, s.
+        Where it did, s; for 3 the number of the body.
     """
     n = 0
     room, spare_room, places = empty_room(), empty_room(), empty_places()

@@ -3,9 +3,9 @@
 The Minor Planet Center prints elements to the decimals of MPCORB and no errors. What it says of them is U, a class
 of the runoff in longitude after ten years (https://minorplanetcenter.net/iau/info/UValue.html), which it does not
 offer as a predictor for near-Earth asteroids. Here a third of the runoff in the middle of its class (three being the
-factor by which the MPC widens formal errors) counts as one sigma of the mean motion, with no error of longitude where
-the asteroid was observed. Held against later orbits that is about what it is called: 82 % of JPL's orbits of 2020
-were within one sigma and 91 % within two, and so were 50 to 90 and 76 to 97 % of the MPC's orbits, by U and date
+factor by which the MPC widens formal errors) counts as one sigma of the mean motion, of an asteroid that was where it
+was observed, in the middle of the arc. Held against later orbits that is about what it is called: 82 % of JPL's orbits
+of 2020 were within one sigma and 91 % within two
 (``python benchmarks/orbit_errors.py``).
 """
 
@@ -15,10 +15,14 @@ from collections.abc import Mapping
 
 import numpy as np
 from astropy.time import Time
+from numpy.typing import NDArray
 
 from flybystab.constants import AU, DAY, YEAR
 from flybystab.sky.covariance import SETS, Covariance
-from flybystab.sky.elements import GM_SUN
+from flybystab.sky.elements import GM_SUN, state_from_elements
+from flybystab.sky.kepler import two_body
+
+Array = NDArray[np.float64]
 
 #: Half a unit in the last decimal of MPCORB: a (by way of the mean motion, deg/d), e, i, node, peri, M (deg).
 _HALF_UNITS = {"n": 5e-9, "e": 5e-8, "angle": 5e-6}
@@ -41,37 +45,43 @@ def error_of(row: Mapping[str, str], epoch: Time) -> Covariance | None:
     epoch : Time
         Of its elements.
     """
-    axis, angle = float(row["a_au"]) * AU, np.radians(1.0)
-    values = [
-        axis,
-        float(row["e"]),
-        *(float(row[c]) * angle for c in ("i_deg", "node_deg", "peri_deg", "M_deg")),
-    ]
+    axis, ecc = float(row["a_au"]) * AU, float(row["e"])
     if axis <= 0.0:
         return None
+    one = np.radians(1.0)
+    angles = [float(row[c]) * one for c in ("i_deg", "node_deg", "peri_deg", "M_deg")]
+    elements = np.array([axis, ecc, *angles])
+    middle = _state(elements)
     motion = np.sqrt(GM_SUN / axis**3)
-    matrix = np.zeros((6, 6))
+    ways = []
     said = []
     if row.get("orbit_source", "").startswith("MPC ("):
-        half = np.array([0.0, _HALF_UNITS["e"], *[_HALF_UNITS["angle"] * angle] * 4])
-        half[0] = 2.0 / 3.0 * axis * _HALF_UNITS["n"] * angle / DAY / motion
-        matrix += np.diag(half**2 / 3.0)
+        half = np.array([0.0, _HALF_UNITS["e"], *[_HALF_UNITS["angle"] * one] * 4])
+        half[0] = 2.0 / 3.0 * axis * _HALF_UNITS["n"] * one / DAY / motion
+        ways += [_state(elements + way) - middle for way in np.diag(half / np.sqrt(3.0))]
         said.append("digits")
     if row.get("condition_code", "").isdigit():
+        ago = (epoch.tdb.jd - float(row.get("observed_jd") or epoch.tdb.jd)) * DAY
         drift = runoff(int(row["condition_code"])) / 3.0
-        since = (epoch.tdb.jd - float(row.get("observed_jd") or epoch.tdb.jd)) * DAY
-        way = np.array([-2.0 / 3.0 * axis * drift / motion, 0.0, 0.0, 0.0, 0.0, drift * since])
-        matrix += np.outer(way, way)
+        ways.append(_kicked(middle, axis, ago, -drift / motion) - middle)
         said.append("U")
     if not said:
         return None
-    source = f"{' and '.join(said)} of {row.get('orbit_source') or 'the row'}"
-    return Covariance(
-        epoch,
-        SETS["keplerian"],
-        np.array(values),
-        matrix,
-        source,
-        False,
-        f"by the {' and '.join(said)} of its elements",
-    )
+    words = " and ".join(said)
+    source, caveat = f"{words} of {row.get('orbit_source') or 'the row'}", f"by the {words} of its elements"
+    matrix = np.transpose(ways) @ np.array(ways)
+    return Covariance(epoch, SETS["cartesian"], middle, matrix, source, False, caveat)
+
+
+def _state(elements: Array) -> Array:
+    """State, shape (6,), m and m/s, ICRF axes, of a, e, i, node, peri, M (m, rad)."""
+    a, e, i, node, peri, mean = elements
+    return np.array(state_from_elements(a * (1.0 - e), e, i, node, peri, mean * np.sqrt(a**3 / GM_SUN)))
+
+
+def _kicked(state: Array, axis: float, ago: float, slower: float) -> Array:
+    """The state if the asteroid had been, ``ago`` s before, where it was, but with a mean motion slower by a share."""
+    then = np.array(two_body(GM_SUN, state, -ago))
+    v = np.linalg.norm(then[3:])
+    then[3:] *= 1.0 + slower * GM_SUN / (3.0 * axis * v * v)
+    return np.array(two_body(GM_SUN, then, ago))
