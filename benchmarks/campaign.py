@@ -303,11 +303,11 @@ def integrators(n: int, seed: int) -> Counter[str]:
         names = [name for name, _, _ in run.events]
         count["with flow"] += yielded
         count["beyond the model"] += run.reason == "beyond model"
+        if run.reason == "beyond model":  # where the other goes on
+            continue
         if coarse is None or fine is None:
             count["event-free not converged"] += 1
             print(f"{count['bodies']}: no impulse found; {names}\n{said(body, encounter)}")
-            continue
-        if run.reason == "beyond model":  # where the other goes on
             continue
         verdicts = [verdict_of(body, *x) for x in ((run.shape, run.velocity_gradient, yielded), coarse, fine)]
         if verdicts[0] != verdicts[2]:

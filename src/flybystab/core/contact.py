@@ -42,6 +42,7 @@ from flybystab.core.state import (
 from flybystab.core.steppers import factorise, solve
 from flybystab.core.tensors import determinant, deviator, inverse, multiply, pack, unpack
 from flybystab.core.tide import COMPONENTS
+from flybystab.core.workspace import copy
 
 Array = NDArray[np.float64]
 
@@ -243,14 +244,23 @@ def _by_weaker_friction(
 ) -> bool:
     """`_newton` by way of the solutions for less friction, where the section is rounder and a first is found."""
     full = par[SIN_PHI]
-    found = False
-    for step in range(1, 9):
-        par[SIN_PHI] = full * (1.0 - 0.5**step) if step < 8 else full
-        found = _newton(x, beta, cos_c, scale, par, work, d_star, jac, pivots)
-        if not found:
+    kept = jac[14]
+    copy(x, kept, 8)
+    share, more = 0.0, 0.5
+    for _ in range(80):
+        ahead = min(1.0, share + more)
+        par[SIN_PHI] = full * ahead
+        if _newton(x, beta, cos_c, scale, par, work, d_star, jac, pivots):
+            share = ahead
+            copy(x, kept, 8)
+            more *= 2.0
+        else:
+            copy(kept, x, 8)
+            more *= 0.5
+        if share == 1.0 or more < 1e-6:
             break
     par[SIN_PHI] = full
-    return found
+    return share == 1.0
 
 
 @kernel
