@@ -5,6 +5,7 @@ import pickle
 import re
 import signal
 from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 
 import astropy.units as u
 import numpy as np
@@ -15,6 +16,7 @@ from flybystab.aggregate.body import Material
 from flybystab.constants import AU, R_EARTH
 from flybystab.core.quick import tide_size
 from flybystab.errors import InvalidInput, OutOfSpan, OutputFailed, UnknownName
+from flybystab.flybys import flyby
 from flybystab.sky.encounter import Encounter
 from flybystab.sky.extent import usual_start
 from flybystab.sky.planets import planet
@@ -85,6 +87,31 @@ def test_an_orbit_into_the_planet_is_an_impact():
     assert row["verdict"] == "IMPACT"
     assert row["p_impact"] + row["p_not_in_equilibrium"] == pytest.approx(1.0)
     assert row["p_yield"] == 1.0
+
+
+def test_a_body_that_may_touch_the_ground_is_not_left_to_the_bound():
+    """Strong bodies of 1.4 km half-length whose centres pass 1 km above the Moon's ground: some stand, some lie."""
+    row = dict(Asteroid.from_catalogue("Anteros").row) | {
+        "semi_axis_a_m": "1400", "semi_axis_b_m": "850", "semi_axis_c_m": "750", "diameter_m": "",
+        "spin_period_h": "6", "name": "long",
+    }  # fmt: skip
+    a = Asteroid(row, file="made")
+    floor = planet("moon").impact_distance
+    enc = Encounter.hyperbolic("moon", (floor + 1000.0) * u.m, 5 * u.km / u.s)
+    passage = Passage(a, "moon", day(2462000.5), floor + 1000.0, 5000.0, enc)
+    n = 12
+    draw = draws(a, n, 3)._replace(axes=np.tile([1400.0, 850.0, 750.0], (n, 1)), cohesion=np.full(n, 1e6))
+    attitudes = Attitudes.at(a, draw, 3, "moon")
+    found = judge(passage, draw, attitudes, Material())
+    assert found.dynamic.all()
+    assert {"IMPACT", "INTACT"} == set(found.verdict)
+    frame = enc.periapsis_axes
+    for i in range(n):
+        one = flyby(draw.body(i, Material()), enc, frame @ attitudes.matrix(i), error=False, history=False)
+        assert found.verdict[i] == one.verdict
+    high = Encounter.hyperbolic("moon", (floor + 1500.0) * u.m, 5 * u.km / u.s)
+    clear = judge(replace(passage, distance=floor + 1500.0, encounter=high), draw, attitudes, Material())
+    assert not clear.dynamic.any()
 
 
 def test_same_rows_for_any_executor_and_order():
