@@ -16,7 +16,7 @@ from flybystab.core.passage import Passage, parameters, passage
 from flybystab.core.regimes import follow
 from flybystab.core.stepping import follow_steps
 from flybystab.core.tide import TidePanels, components, no_tide, tensor, tide_at
-from flybystab.core.workspace import N_EVENT, N_HISTORY
+from flybystab.core.workspace import N_EVENT, N_HISTORY, workspace
 from flybystab.sky.encounter import Encounter
 
 Array = NDArray[np.float64]
@@ -167,7 +167,7 @@ def deforming(
     count, mark = np.zeros(4, dtype=np.int64), np.zeros(2)
     follow(
         0.0, t_stop / t0, t_stop / t0, regime, y, par, scaled, no_ground(), tolerance, limit, m.brittle, False,
-        200_000, history, events, count, mark,
+        200_000, history, events, count, mark, workspace(),
     )  # fmt: skip
     w = y[12:15]
     gradient = tensor(y[6:12]) + np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])

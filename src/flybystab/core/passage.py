@@ -18,7 +18,7 @@ from flybystab.core.jit import inlined, kernel
 from flybystab.core.rheology import DRUCKER_PRAGER, EXTENSION_CONE, least_slope
 from flybystab.core.tensors import determinant, multiply, pack, unpack
 from flybystab.core.tide import TidePanels
-from flybystab.core.workspace import N_EVENT, N_HISTORY, Counts
+from flybystab.core.workspace import N_EVENT, N_HISTORY, Counts, workspace
 
 Array = NDArray[np.float64]
 
@@ -171,7 +171,7 @@ def carry(
     )
     reason, t, regime = regimes.follow(
         t_start / t0, t_stop / t0, t_rest / t0, start, y, par, scaled, below, tolerance, max_axis_ratio,
-        brittle, unyielding, max_steps, hist, events, count, mark,
+        brittle, unyielding, max_steps, hist, events, count, mark, workspace(),
     )  # fmt: skip
     unpack(y[0:6], shape)
     state.gradient(y, gradient)

@@ -69,7 +69,6 @@ from flybystab.core.workspace import (
     borrowed_workspace,
     copy,
     log,
-    workspace,
 )
 
 Array = NDArray[np.float64]
@@ -178,6 +177,7 @@ def follow(
     events: Array,
     count: Counts,
     mark: Array,
+    room: Workspace,
 ) -> tuple[int, float, int]:
     """Follow a body from `t` to `t1` through its regimes.
 
@@ -206,40 +206,13 @@ def follow(
         Rows of history, events, steps, rejected steps.
     mark : ndarray (2,)
         Largest mobilised friction angle while rigid, rad, and its time.
+    room : Workspace
 
     Returns
     -------
     reason, time, regime
         DONE, TOUCH, BEYOND or STUCK; the time reached; the regime there.
     """
-    return _follow(
-        t, t1, t_rest, regime, y, par, tide, ground, tol, limit, brittle, unyielding, max_steps, hist, events,
-        count, mark, workspace(),
-    )  # fmt: skip
-
-
-@kernel
-def _follow(
-    t: float,
-    t1: float,
-    t_rest: float,
-    regime: int,
-    y: Array,
-    par: Array,
-    tide: TidePanels,
-    ground: Ground,
-    tol: float,
-    limit: float,
-    brittle: bool,
-    unyielding: bool,
-    max_steps: int,
-    hist: Array,
-    events: Array,
-    count: Counts,
-    mark: Array,
-    room: Workspace,
-) -> tuple[int, float, int]:
-    """`follow` in the buffers of the caller."""
     # Counting references at each use of a buffer would take longer than the sums.
     ws = borrowed_workspace(room)
     y, par, hist = borrowed(y), borrowed(par), borrowed(hist)
