@@ -36,6 +36,8 @@ from flybystab.units import to_si
 
 Array = NDArray[np.float64]
 
+_SPEED = u.m / u.s
+
 #: Tolerance over the error (m) that it leaves the median asteroid with after ten years; the error grows with the
 #: square of time (``flybystab bench sky``).
 _AT_10_YEARS, _TOLERANCES = 1e-12 / 100.0, (1e-15, 1e-8)
@@ -138,7 +140,8 @@ def find_encounters(
     window = _window(eph, middle.tdb.jd1, middle.tdb.jd2, min(every), max(every))
     chosen = forces
     if chosen is None:
-        used = {name for _, orbit in rows for name in default_forces(orbit, *(b.name for b in found))}
+        kinds = {any(orbit.nongrav.a): orbit for _, orbit in rows}
+        used = {name for orbit in kinds.values() for name in default_forces(orbit, *(b.name for b in found))}
         chosen = tuple(name for name in FORCES if name in used)
     longest = np.maximum(np.abs(epochs - t_start), np.abs(epochs - t_stop))
     if tolerance is None:
@@ -235,7 +238,10 @@ def starts_inside(name: str, epoch: Time, body: Planet) -> InvalidInput:
 def _epochs(rows: list[tuple[str, Orbit]], origin: Time) -> Array:
     """Epochs, s (TDB) from `origin`; whole days first, so that no digit is lost."""
     zero = origin.tdb
-    pairs = np.array([(t.jd1, t.jd2) for t in (orbit.epoch for _, orbit in rows)]).reshape(-1, 2)
+    # Asteroids of a catalogue share few epochs, and a Time takes long to say its date.
+    epochs = {id(orbit.epoch): orbit.epoch for _, orbit in rows}
+    known = {key: (t.jd1, t.jd2) for key, t in epochs.items()}
+    pairs = np.array([known[id(orbit.epoch)] for _, orbit in rows]).reshape(-1, 2)
     return ((pairs[:, 0] - zero.jd1) + (pairs[:, 1] - zero.jd2)) * DAY
 
 
@@ -245,7 +251,7 @@ def _states(rows: list[tuple[str, Orbit]], window: Window, epochs: Array) -> Arr
     centres = np.array([orbit.centre for _, orbit in rows], dtype=object)
     for i, (_, orbit) in enumerate(rows):
         out[i, :3] = orbit.position.to_value(u.m)
-        out[i, 3:] = orbit.velocity.to_value(u.m / u.s)
+        out[i, 3:] = orbit.velocity.to_value(_SPEED)
     for centre in set(centres) - {"ssb"}:
         where = centres == centre
         out[where] += window.states(BODIES.index(centre), epochs[where])
