@@ -1,7 +1,7 @@
 """What digits and U of a catalogue say of its orbits, held against later and better orbits, as tables.
 
-Usage: ``python benchmarks/orbit_errors.py [runoff] [digits]``. Reference data are read from ``../shared/data`` (or
-``$FLYBYSTAB_SHARED/data``); nothing is downloaded.
+Usage: ``python benchmarks/orbit_errors.py [runoff] [digits] [impacts]``. Reference data are read from
+``../shared/data`` (or ``$FLYBYSTAB_SHARED/data``); nothing is downloaded.
 """
 
 from __future__ import annotations
@@ -11,12 +11,15 @@ import sys
 from collections.abc import Sequence
 from pathlib import Path
 
+import astropy.units as u
 import numpy as np
+from astropy.coordinates import GCRS, ITRS, CartesianRepresentation
 from astropy.time import Time
 from numpy.typing import NDArray
 
 from flybystab.constants import AU, YEAR
 from flybystab.sky.dop853 import empty_room
+from flybystab.sky.encounter import Encounter
 from flybystab.sky.ephemeris import Window, ephemeris
 from flybystab.sky.field import field
 from flybystab.sky.forces import FORCES
@@ -30,6 +33,21 @@ from flybystab.survey.orbit_errors import runoff as sigma_of_code
 
 DATA = Path(os.environ.get("FLYBYSTAB_SHARED", Path(__file__).resolve().parents[1] / "../shared")) / "data"
 NEW, OLD, MPC = "nea_sbdb_fullprec_2026-07", "nea_sbdb_fullprec_2020-09", "nea_mpc_2026-02"
+#: All that were found before they hit the Earth, of those that the table has.
+FELL = (
+    *(
+        "2008 TC3",
+        "2014 AA",
+        "2018 LA",
+        "2019 MO",
+        "2022 EB5",
+        "2022 WJ1",
+        "2023 CX1",
+        "2024 BX1",
+        "2024 RW1",
+    ),
+    *("2024 UQ", "2024 XA1"),
+)
 #: Where orbits are compared: the epoch of JPL's orbits of 2026.
 MEETING = Time(2461200.5, format="jd", scale="tdb")
 
@@ -128,9 +146,34 @@ def digits() -> list[str]:
     return out
 
 
+def impacts() -> list[str]:
+    """Asteroids that were seen before they fell: entry on the orbit of the MPC, and how well that says it is known."""
+    mpc = read(MPC)
+    out = [
+        "Asteroids seen before they fell, on orbits of the MPC: where they reach 100 km",
+        "asteroid   U  time (UTC)             lat (deg) lon (deg)  km/s  one sigma (km)",
+    ]
+    for name in FELL:
+        rock = mpc[name]
+        passage = Encounter.from_orbit(rock.orbit, "earth", rock.epoch, search=3 * u.d, ephemeris="de440")
+        if passage.impact_time is None or passage.displacement is None:
+            out.append(f"{name:9s} {rock.row['condition_code']:>2s}  no impact")
+            continue
+        when = later(passage.time, passage.impact_time).utc
+        place = GCRS(CartesianRepresentation(passage.position(passage.impact_time)[0] * u.m), obstime=when)
+        at = place.transform_to(ITRS(obstime=when)).earth_location.to_geodetic()
+        speed = np.linalg.norm(passage.velocity(passage.impact_time)[0]) / 1e3
+        known = f"{passage.displacement.to_value(u.km):15.3g}  {passage.predictability}"
+        code = rock.row["condition_code"]
+        out.append(
+            f"{name:9s} {code:>2s}  {when.iso[:19]} {at.lat.deg:11.2f} {at.lon.deg:9.2f} {speed:5.1f} {known}"
+        )
+    return out
+
+
 def main(arguments: list[str]) -> int:
     """Print the tables that were asked for, by default all."""
-    known = {"runoff": runoff, "digits": digits}
+    known = {"runoff": runoff, "digits": digits, "impacts": impacts}
     for name in arguments or list(known):
         if name not in known:
             print(f"no table {name!r}: there are {', '.join(known)}", file=sys.stderr)

@@ -29,7 +29,7 @@ from flybystab.sky.minima import WIDTH
 from flybystab.sky.need import N_SHARES, NAMES, reduced
 from flybystab.sky.orbit import Orbit, _ephemeris, default_forces, later, seconds
 from flybystab.sky.planets import PLANETS, Planet, planet
-from flybystab.sky.predictability import neighbour
+from flybystab.sky.predictability import neighbour, neighbour_epoch
 from flybystab.sky.threads import in_order
 from flybystab.sky.track import INSIDE, STALLED, search
 from flybystab.units import to_si
@@ -135,8 +135,8 @@ def find_encounters(
     middle = later(start, 0.5 * seconds(stop, start))
     t_start, t_stop = seconds(start, middle), seconds(stop, middle)
     epochs = _epochs(rows, middle)
-    beside = [neighbour(orbit, middle, eph) for _, orbit in rows] if growth else []
-    every = [t_start, t_stop, *epochs, *(seconds(n.orbit.epoch, middle) for n in beside)]
+    known = [seconds(neighbour_epoch(orbit), middle) for _, orbit in rows] if growth else []
+    every = [t_start, t_stop, *epochs, *known]
     window = _window(eph, middle.tdb.jd1, middle.tdb.jd2, min(every), max(every))
     chosen = forces
     if chosen is None:
@@ -219,6 +219,13 @@ def find_encounters(
     out = _table(rows, raw, middle, window, meta)
     if growth:
         from flybystab.sky.growth import add_growth
+
+        # One neighbour for all encounters of an asteroid: the direction that matters is that of the farthest.
+        beside = {}
+        for i in np.unique(out["index"]).tolist():
+            times = raw[raw[:, 11] == i, 1]
+            farthest = float(times[np.argmax(np.abs(times - known[i]))])
+            beside[i] = neighbour(rows[i][1], later(middle, farthest), eph)
 
         def field_of(i: int) -> Field:
             return reduced(everything, shares[i], least, always)

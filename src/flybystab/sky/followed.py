@@ -29,7 +29,14 @@ from flybystab.sky.forces import FORCES, model, shares
 from flybystab.sky.kepler import time_at_distance
 from flybystab.sky.orbit import Orbit, _ephemeris, later, seconds
 from flybystab.sky.planets import Planet
-from flybystab.sky.predictability import Neighbour, Predictability, common_error, neighbour, predictability
+from flybystab.sky.predictability import (
+    Neighbour,
+    Predictability,
+    common_error,
+    neighbour,
+    neighbour_epoch,
+    predictability,
+)
 from flybystab.sky.reboundry import LOG_WIDTH, Flight
 from flybystab.sky.surroundings import chosen_sources, tide_of
 
@@ -113,9 +120,8 @@ def followed(
 ) -> Encounter:
     """The encounter nearest to a time; arguments as checked by :meth:`Encounter.from_orbit`, in SI."""
     index = BODIES.index(body.name)
-    beside = neighbour(orbit, near, ephemeris)
     epoch = seconds(orbit.epoch, near)
-    epochs = (epoch, seconds(beside.orbit.epoch, near))
+    epochs = (epoch, seconds(neighbour_epoch(orbit), near))
     window = _ephemeris(ephemeris).window(
         near, min(*epochs, -reach), max(*epochs, reach + wait + TAIL + 10.0 * DAY)
     )
@@ -124,6 +130,7 @@ def followed(
         raise starts_inside(orbit.name, orbit.epoch, body)
     everything = tuple(n for n in FORCES if n != "non-gravitational" or any(orbit.nongrav.a))
     first = _passage(orbit, window, index, forces or everything, reach, 1e-9)
+    beside = neighbour(orbit, near if first is None else later(near, first.t), ephemeris)
     if first is None or first.distance > largest:
         closest = (
             "no minimum of distance" if first is None else f"{first.distance / AU:.4f} au at the closest"

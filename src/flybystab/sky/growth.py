@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping
 
 import astropy.units as u
 import numpy as np
@@ -50,7 +50,7 @@ def carry(
 
 def add_growth(
     table: QTable,
-    neighbours: Sequence[Neighbour],
+    neighbours: Mapping[int, Neighbour],
     laws: Array,
     window: Window,
     field_of: Callable[[int], Field],
@@ -67,8 +67,8 @@ def add_growth(
     ----------
     table : QTable
         From :func:`flybystab.find_encounters`.
-    neighbours : sequence
-        Of each asteroid.
+    neighbours : mapping
+        By number of the asteroid, of each that the table has.
     laws : ndarray, shape (n, 8)
         A1, A2, A3 of each asteroid with their law.
     window, tolerances
@@ -113,4 +113,4 @@ def add_growth(
     table["predictability"] = np.array(
         [str(predictability(d, x)) for d, x in zip(size, shift, strict=True)], dtype="U12"
     )
-    table.meta["neighbours"] = sorted({n.label for n in neighbours})
+    table.meta["neighbours"] = sorted({n.label for n in neighbours.values()})

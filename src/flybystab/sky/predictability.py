@@ -68,8 +68,13 @@ class Neighbour:
     label: str
 
 
+def neighbour_epoch(orbit: Orbit) -> Time:
+    """The epoch of the neighbours of an orbit: that of its covariance, if it has one."""
+    return orbit.covariance.epoch if isinstance(orbit.covariance, Covariance) else orbit.epoch
+
+
 def neighbour(orbit: Orbit, time: Time, ephemeris: str | Ephemeris | None = None) -> Neighbour:
-    """The neighbour by which encounters around `time` are judged.
+    """The neighbour by which an encounter at `time` is judged.
 
     With a covariance: one sigma along the direction in which two-body motion with A1 and the drift that A2 makes
     leave the asteroid most uncertain at `time`. Planets are left out of this choice of a direction alone.
