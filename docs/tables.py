@@ -13,6 +13,7 @@ TABLES = {
     "apophis": "python benchmarks/sky.py apophis",
     "completeness": "python benchmarks/completeness.py out/whole.ecsv",
     "coverage": "python benchmarks/campaign.py coverage",
+    "extremes": "python benchmarks/campaign.py extremes",
     "flyby": "flybystab bench flyby --output docs/images/precision.png",
     "grains": "python benchmarks/piles.py grains",
     "honesty": "python benchmarks/honesty.py scripted --encounters 300",

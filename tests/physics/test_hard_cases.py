@@ -1,5 +1,7 @@
 """Where a switching integrator can hang, crash or be silently wrong; each case says what is right."""
 
+import dataclasses
+
 import astropy.units as u
 import numpy as np
 import pytest
@@ -26,6 +28,8 @@ from flybystab.core.workspace import ARREST, CONTACT, JAM, LOSS, ONSET
 from flybystab.errors import InvalidInput
 from flybystab.flybys import flyby
 from flybystab.many import flyby_many
+from flybystab.sky.encounter import Encounter
+from flybystab.sky.planets import planet as find_planet
 
 DENSITY = 2000 * u.kg / u.m**3
 TILT = Rotation.from_euler("zxz", [30, 40, 70], degrees=True).as_matrix()
@@ -407,6 +411,24 @@ def test_spin_zero():
     r = flyby(body, earth(1.8))
     assert np.isinf(r.spin_ratio)
     assert np.isnan(r.pole_change)
+
+
+@pytest.mark.parametrize("kilometres", [1.0, 64.0, 6400.0])
+@pytest.mark.parametrize("tolerance", [1e-8, 1e-5])
+def test_a_passage_of_seconds_is_not_stepped_over(kilometres, tolerance):
+    """The same dense planet at three sizes, 70 km/s: the smaller, the sooner over, up to 1e-5 of the dynamical time."""
+    planet = dataclasses.replace(
+        find_planet("earth"),
+        name="ball",
+        gm=3.99e14 * (kilometres / 6400.0) ** 3,
+        radius=1e3 * kilometres,
+        atmosphere=0.0,
+    )
+    e = Encounter.hyperbolic(planet, 1.01 * kilometres * u.km, 70 * u.km / u.s)
+    body = Body([1, 0.999, 0.998] * u.m, 500 * u.kg / u.m**3, 9.7 * u.h, material=material(30))
+    found = flyby(body, e, history=False, tolerance=tolerance)
+    assert found.onset_time is not None
+    assert found.max_required_friction_angle > 30 * u.deg
 
 
 @pytest.mark.parametrize("metres", [1.0, 1e6])

@@ -154,6 +154,8 @@ def follow_rigid(
     # A step never spans more of the change of variable of the tide than its panels resolve, and less of it for a
     # smaller tolerance, as steps of order 8 are smaller: else the run that measures the error would share it.
     reach = min(0.4, 0.225 * (1e8 * tol) ** 0.125)
+    if tide.coefficients.shape[0] > 0:
+        h = min(h, reach * np.sqrt(t * t + tide.tau * tide.tau))
     touched = False
     f = ws.sample
     f[0, N_SAMPLE] = _onset(excess, p, norm, det, par, ws.stress)
