@@ -28,9 +28,8 @@ Rows = dict[str, list[Row]]
 _PROBE = 8
 #: Least and largest number of samples that one part gives to the dynamics, and of parts between the two.
 _BLOCK, _LARGEST, _PARTS = 16, 256, 64
-#: A sample that the bound decides costs about this share of one that the dynamics decides; the same on an orbit of its
-#: own.
-_BOUND, _FOLLOWED = 1 / 64, 1 / 16
+#: A sample that the bound decides costs about this share of one that the dynamics decides.
+_BOUND = 1 / 64
 
 
 def block_of(samples: int) -> int:
@@ -164,7 +163,8 @@ def begun(passage: Passage, settings: Settings, block: int) -> Rows | Begun:
     probe = min(n, block, _PROBE)
     first = work.take(0, work.part(0, probe).judged(settings))
     if work.left:
-        least = _BOUND if work.orbits.clones is None else _FOLLOWED
+        # a clone costs more than the dynamics, whatever decides it: its orbit is followed
+        least = _BOUND if work.orbits.clones is None else 1.0
         work.size = max(1, int(block / max(first.dynamic.mean(), least)))
         if work.left > work.size:
             return work
