@@ -58,7 +58,7 @@ class Neighbour:
     ----------
     orbit : Orbit
     shift : float
-        How far it is away at its epoch, m.
+        How far it is away at its epoch, m: a metre at least, where it only moves otherwise.
     label : str
         What the shift is, in words.
     """
@@ -97,7 +97,7 @@ def neighbour(orbit: Orbit, time: Time, ephemeris: str | Ephemeris | None = None
     states, pushes = covariance.deviations((covariance.values + covariance.factor @ weight)[None])
     beside = deviated(there, covariance.epoch, states, pushes, "neighbour", ephemeris)[0]
     label = "one sigma in the direction least known" + (f", {covariance.caveat}" if covariance.caveat else "")
-    return Neighbour(beside, float(np.linalg.norm(states[0, :3])), label)
+    return Neighbour(beside, max(float(np.linalg.norm(states[0, :3])), 1.0), label)
 
 
 def quiet_growth(orbit: Orbit, beside: Neighbour, times: Array, ephemeris: str | Ephemeris | None) -> Array:
