@@ -122,6 +122,15 @@ def test_apophis_in_2029_is_determined():
     assert away < 3.0 * ours["displacement"].to_value(u.km) < 1000.0
 
 
+def test_an_error_of_the_velocity_alone_has_a_growth():
+    """U without an arc: the place is known at the epoch, so the displacement there is none."""
+    row = dict(mpc("Apophis").row) | {"orbit_source": "elsewhere", "observed_jd": ""}
+    day = Time("2029-04-13", scale="tdb")
+    passage = fs.Encounter.from_orbit(Asteroid(row, file="elsewhere").orbit, "earth", day)
+    assert 1.0 < passage.growth < np.inf
+    assert passage.growth == pytest.approx(passage.displacement.to_value(u.m))
+
+
 def test_a_screening_says_what_is_known():
     rock = mpc("Apophis")
     note = spread(Passage(rock, "earth", Time("2029-04-13 21:46", scale="tdb"), 3.8e7, 5.8e3), 10, 0).note
