@@ -9,7 +9,7 @@ from astropy.time import Time
 from conftest import need_ephemeris
 
 from flybystab.constants import AU, C_LIGHT, OBLIQUITY_J2000, YEAR
-from flybystab.errors import InvalidInput, UnitMismatch, UnknownName
+from flybystab.errors import InvalidInput, NoEncounter, UnitMismatch, UnknownName
 from flybystab.sky.encounter import Encounter
 from flybystab.sky.ephemeris import BODIES, ephemeris
 from flybystab.sky.field import empty_places, field, rate
@@ -355,3 +355,15 @@ def test_a_start_inside_a_planet_is_refused():
         Encounter.from_orbit(sunk, "earth", EPOCH)
     above = Orbit.from_state(EPOCH, [7000, 0, 0] * u.km, [0, 7.5, 0] * u.km / u.s, centre="earth")
     assert len(find_encounters(above, EPOCH, later(EPOCH, 86400.0))) > 10
+
+
+def test_no_encounter_lies_beyond_an_impact():
+    """Forward and backward: a track ends on the planet."""
+    for sign in (-1.0, 1.0):
+        orbit = aimed(0.5, sign=sign)
+        hit = Encounter.from_orbit(orbit, "earth", later(EPOCH, -sign * 3.0 * 86400.0))
+        assert hit.impact
+        with pytest.raises(NoEncounter, match="beyond that impact"):
+            Encounter.from_orbit(
+                orbit, "earth", later(EPOCH, -sign * 400.0 * 86400.0), search=390 * u.d, within=3 * u.au
+            )

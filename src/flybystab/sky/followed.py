@@ -10,7 +10,7 @@ import numpy as np
 from astropy.time import Time
 from numpy.typing import NDArray
 
-from flybystab.constants import AU, DAY
+from flybystab.constants import AU, DAY, HOUR
 from flybystab.core.tide import tide_panels
 from flybystab.errors import InvalidInput, NoEncounter
 from flybystab.sky.approach import (
@@ -41,6 +41,9 @@ from flybystab.sky.reboundry import LOG_WIDTH, Flight
 from flybystab.sky.surroundings import chosen_sources, tide_of
 
 Array = NDArray[np.float64]
+
+#: Crossings of the surface within this time of a passage are its own, s.
+_OWN = 2.0 * HOUR
 
 
 @dataclass(frozen=True)
@@ -130,6 +133,8 @@ def followed(
         raise starts_inside(orbit.name, orbit.epoch, body)
     everything = tuple(n for n in FORCES if n != "non-gravitational" or any(orbit.nongrav.a))
     first = _passage(orbit, window, index, forces or everything, reach, 1e-9)
+    if first is not None:
+        _check_way(orbit, body, window, first, epoch)
     beside = neighbour(orbit, near if first is None else later(near, first.t), ephemeris)
     if first is None or first.distance > largest:
         closest = (
@@ -164,6 +169,20 @@ def followed(
         beside=beside,
     )
     return _around(cls, orbit, body, window, chosen, accuracy, start, wait, reach, size, growth)
+
+
+def _check_way(orbit: Orbit, body: Planet, window: Window, passage: _Passage, epoch: float) -> None:
+    """Raise NoEncounter if the asteroid hits the planet between its epoch and a passage."""
+    index = BODIES.index(body.name)
+    found, _ = crossings(passage.way, window.head, window.data, window.gm, index, body.impact_distance, 8)
+    low, high = sorted((epoch, passage.t))
+    hits = found[(found[:, 0] > low) & (found[:, 0] < high) & (np.abs(found[:, 0] - passage.t) > _OWN), 0]
+    if hits.size:
+        first = hits[np.argmin(np.abs(hits - epoch))]
+        raise NoEncounter(
+            f"{orbit.name or 'the orbit'} meets {body.name} at {later(window.epoch, float(first)).iso} TDB on its way "
+            f"from {orbit.epoch.tdb.iso[:10]}: what is asked for lies beyond that impact"
+        )
 
 
 @dataclass(frozen=True)
