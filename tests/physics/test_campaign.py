@@ -14,6 +14,14 @@ def test_no_random_flyby_fails_gains_energy_or_hangs_on_its_tolerance():
     assert count["not finite"] == count["energy gained"] == count["verdicts differ"] == 0
 
 
+def test_the_ends_of_every_range_at_once():
+    count = campaign["extremes"](300, 6)
+    assert count["ran"] == 300
+    assert count["onset"] > 100
+    assert count["loss of contact"] > 20
+    assert count["not finite"] == count["energy gained"] == count["verdicts differ"] == 0
+
+
 def test_integrators_with_and_without_events_agree():
     count = campaign["integrators"](40, 6)
     assert count["flowed in both"] > 5

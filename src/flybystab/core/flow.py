@@ -44,6 +44,9 @@ Array = NDArray[np.float64]
 #: Longest explicit step, times the rate of relaxation of ``D``: DOP853 is stable to 6 on the axis.
 _STABLE = 5.0
 
+#: The same where stability, not the error, holds explicit steps back so much that implicit ones are better.
+_HELD = 4.0 * _STABLE
+
 #: Longest step towards rest, over the time to it.
 _APPROACH = 0.45
 
@@ -146,7 +149,7 @@ def follow_flow(
             for i in range(N_FULL):
                 y[i] += d / -trend * f0[i]
             return ARREST, t + d / -trend
-        if explicit and d < slow:
+        if explicit and (d < slow or h * pull > _HELD * d):
             explicit, implicit_ahead = False, _BETWEEN
         if not explicit:
             flow_jacobian(t, y, f0, 1e-6, par, tide, ws.work, ws.jac, ws.lu)
