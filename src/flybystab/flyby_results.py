@@ -204,7 +204,8 @@ class FlybyResult:
 class FlybyTable:
     """Results of many encounters as arrays; attributes as in :class:`FlybyResult`, first dimension n.
 
-    A row that could not be computed has the verdict "FAILED", its reason in `failure` and nan elsewhere.
+    A row that could not be computed has the verdict "FAILED", its reason in `failure` and nan elsewhere; `contact` is
+    empty where nothing reaches the ground.
     """
 
     verdict: NDArray[np.str_]
@@ -215,6 +216,7 @@ class FlybyTable:
     margin: Quantity
     spin_ratio: Array
     pole_change: Quantity
+    contact: NDArray[np.str_]
     failure: NDArray[np.str_]
 
     def __len__(self) -> int:

@@ -16,7 +16,7 @@ from flybystab.attitudes import attitude_matrices, periapsis_axes
 from flybystab.core import judgement
 from flybystab.errors import InvalidInput
 from flybystab.flyby_results import FlybyTable
-from flybystab.outcome import VERDICTS
+from flybystab.outcome import VERDICTS, Verdict
 from flybystab.rows import (
     MAX_STEPS,
     TOLERANCE,
@@ -98,6 +98,7 @@ def flyby_many(
         if not failures[lost]:
             failures[lost] = failure_of(out[lost], encounters[lost], tolerance)
         out[lost] = np.nan
+    paths = np.array(["path" if e.impact else "body" for e in encounters], dtype="U4")
     axes, spin = out[:, judgement.AXES : judgement.AXES + 3], out[:, judgement.SPIN : judgement.SPIN + 3]
     return FlybyTable(
         verdict=names,
@@ -108,6 +109,7 @@ def flyby_many(
         margin=np.rad2deg(phi - out[:, judgement.FRICTION]) * u.deg,
         spin_ratio=out[:, judgement.SPIN_RATIO],
         pole_change=np.rad2deg(out[:, judgement.POLE_CHANGE]) * u.deg,
+        contact=np.where(names == Verdict.IMPACT, paths, ""),
         failure=failures.astype(str),
     )
 

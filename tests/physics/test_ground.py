@@ -120,6 +120,8 @@ def test_a_flowing_body_touches_with_its_shape_of_then():
 def test_path_into_the_planet_is_told_from_a_touch():
     deep, graze = flyby(STICK, moon(-5e3)), flyby(STICK, moon(1000))
     assert (deep.contact, graze.contact, flyby(STICK, moon(5e3)).contact) == ("path", "body", None)
+    table = flyby_many([STICK] * 3, [deep.encounter, graze.encounter, moon(5e3)])
+    assert table.contact.tolist() == ["path", "body", ""]
     # the body touches before its centre is down
     assert deep.end_time.value + deep.encounter.t_start < deep.encounter.impact_time
     assert "on a path into the surface" in "\n".join(flyby_lines(deep))
