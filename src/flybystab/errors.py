@@ -86,6 +86,10 @@ class MissingExtra(FlybystabError, ImportError):
         super().__init__(f"{purpose} needs the package {package}: pip install 'flybystab[{extra}]'")
 
 
+class NothingComputed(FlybystabError, RuntimeError):
+    """Every row of a table failed; the message has the commonest reason, the table all of them."""
+
+
 class WorkersLost(FlybystabError, RuntimeError):
     """Processes that computed something are gone; what was finished is kept."""
 

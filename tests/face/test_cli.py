@@ -10,7 +10,6 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from numba import njit
-from numba.core import event
 
 from flybystab.core import quick
 from flybystab.face import compiling
@@ -371,30 +370,27 @@ def test_files_saved_by_excel_or_notepad_are_read(capsys, tmp_path):
     assert run(capsys, "cite", document)[0] == 0
 
 
-class Terminal(io.StringIO):
-    """A stream that says it is a terminal."""
-
-    def isatty(self):
-        return True
-
-
-@pytest.mark.parametrize(
-    ("stream", "json_too", "said"), [(Terminal, False, 1), (Terminal, True, 0), (io.StringIO, False, 0)]
-)
-def test_compiling_is_said_once_on_a_terminal_only(capsys, monkeypatch, stream, json_too, said):
-    errors = stream()
+@pytest.mark.parametrize(("json_too", "said"), [(False, 1), (True, 0)])
+def test_compiling_is_said_once_and_in_logs_too(monkeypatch, json_too, said):
+    """Of a command that compiles two kernels, and not of what is compiled after it."""
+    errors = io.StringIO()
     monkeypatch.setattr(sys, "stderr", errors)
-    heard = []
-    monkeypatch.setattr(compiling, "announce", heard.append)
+
+    def compiling_command(options):
+        for _ in range(2):
+            assert njit(lambda x: 2 * x)(3) == 6
+
+    monkeypatch.setattr(COMMANDS["stability"], "run", compiling_command)
     assert main(["stability", "Anteros", *(["--json"] if json_too else [])]) == 0
-    assert heard == [errors] * said
+    assert errors.getvalue() == said * compiling.WORDS
+    compiling_command(None)
+    assert errors.getvalue() == said * compiling.WORDS
 
 
 def test_numba_tells_what_it_compiles():
     """The event that the announcement waits for: at the first call, not at later ones."""
     stream = io.StringIO()
-    listener = compiling.announce(stream)
-    try:
+    with compiling.announced(stream):
 
         @njit
         def twice(x):
@@ -406,8 +402,6 @@ def test_numba_tells_what_it_compiles():
             stream.getvalue()
             == "flybystab: compiling its kernels, once on this machine (about a minute) ...\n"
         )
-    finally:
-        event.unregister("numba:compile", listener)
 
 
 def test_compiling_in_workers_is_said_beforehand(monkeypatch, tmp_path):
@@ -418,11 +412,15 @@ def test_compiling_in_workers_is_said_beforehand(monkeypatch, tmp_path):
     quick.quick_margins(size, 2000 * one, spin, 0.6 * one, 0 * one, 0, 1e-9, 1e-6, out, verdict)
     assert verdict[0] == quick.INTACT
     stream = io.StringIO()
-    compiling.announce_elsewhere(stream)
-    assert stream.getvalue() == ""
+    with compiling.announced(stream, elsewhere=True):
+        assert stream.getvalue() == ""
     empty = SimpleNamespace(stats=SimpleNamespace(cache_path=str(tmp_path)))
     monkeypatch.setattr(quick, "quick_margins", empty)
-    compiling.announce_elsewhere(stream)
+    with compiling.announced(stream):
+        assert stream.getvalue() == ""
+    with compiling.announced(stream, elsewhere=True):
+        assert stream.getvalue() == compiling.WORDS
+        assert njit(lambda x: 3 * x)(3) == 9
     assert stream.getvalue() == compiling.WORDS
 
 
@@ -452,10 +450,24 @@ def test_a_screening_of_a_body_that_cannot_be_says_so(capsys, tmp_path):
     row = dict(Asteroid.from_catalogue("Apophis").row) | {"density_kg_m3": "2.6"}
     file.write_text(",".join(row) + "\n" + ",".join(f'"{v}"' for v in row.values()) + "\n")
     dates = "--from", "2029-04-01", "--to", "2029-05-01"
-    status, out, _ = run(capsys, "screen", str(file), *dates, "--output", str(tmp_path / "x.ecsv"))
-    assert status == 0
+    reason = "density_kg_m3 = 2.6: expected a value in [50, 25000] for (99942) Apophis"
+    status, out, err = run(capsys, "screen", file, *dates, "--output", tmp_path / "x.ecsv")
     assert "1 encounter, 1 not computed" in out
-    assert "density_kg_m3 = 2.6: expected a value in [50, 25000] for (99942) Apophis" in out
+    assert reason in out
+    # there is a table, but nothing in it: a shell must not take that for done
+    assert status == 1
+    assert err.splitlines()[-1].startswith("flybystab: none of the rows could be computed (1, of which 1: ")
+    assert reason in err
+    status, out, err = run(capsys, "screen", file, *dates, "--output", tmp_path / "y.ecsv", "--json")
+    assert (status, len(json.loads(out)["rows"])) == (1, 1)
+    assert reason in err
+    # one good row is an answer
+    good = row | {"density_kg_m3": "2600", "number": "", "name": "Twin", "designation": "", "aliases": ""}
+    with file.open("a") as stream:
+        stream.write(",".join(f'"{v}"' for v in good.values()) + "\n")
+    status, out, err = run(capsys, "screen", file, *dates, "--output", tmp_path / "z.ecsv")
+    assert status == 0, err
+    assert "2 encounters, 1 not computed" in out
     status, _, err = run(capsys, "cite", str(tmp_path / "none.json"))
     assert (status, err.count("\n")) == (1, 1)
     assert "expected a readable JSON document (No such file" in err

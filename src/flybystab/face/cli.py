@@ -43,13 +43,13 @@ def main(argv: Sequence[str] | None = None) -> int:
     warnings.filterwarnings("ignore", message=".*dubious year.*")
     try:
         check_arguments(options)
-        if sys.stderr.isatty() and not options.json and options.command not in ("cite", "completion"):
-            from flybystab.face.compiling import announce, announce_elsewhere
+        if options.json or options.command in ("cite", "completion"):
+            COMMANDS[options.command].run(options)
+        else:
+            from flybystab.face.compiling import announced
 
-            announce(sys.stderr)
-            if getattr(options, "jobs", 1) > 1:
-                announce_elsewhere(sys.stderr)
-        COMMANDS[options.command].run(options)
+            with announced(sys.stderr, elsewhere=getattr(options, "jobs", 1) > 1):
+                COMMANDS[options.command].run(options)
         sys.stdout.flush()
     except WrongUsage as reason:
         print(f"flybystab {options.command}: {reason} (--help says more)", file=sys.stderr)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import sys
 
+from flybystab.errors import NothingComputed
 from flybystab.face.commands.common import (
     check_table,
     material_arguments,
@@ -100,14 +101,18 @@ def run(options: argparse.Namespace) -> None:
             f"flybystab: {output} holds the rows so far; the same command goes on from there", file=sys.stderr
         )
         raise
+    found = summary(output)
     show(
         options,
         lambda: table_document(read_results(output)),
         lambda: [
-            summary(output).text(),
+            found.text(),
             f"table      {output} (flybystab show {output} --output {output.with_suffix('.png')} draws it)",
         ],
     )
+    if found.rows and found.failed == found.rows:
+        reason, n = next(iter(found.errors.items()), ("no reason is known", found.rows))
+        raise NothingComputed(f"none of the rows could be computed ({found.rows}, of which {n}: {reason})")
 
 
 def _is_file(word: str) -> bool:
