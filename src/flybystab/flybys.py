@@ -9,7 +9,7 @@ import astropy.units as u
 import numpy as np
 from numpy.typing import NDArray
 
-from flybystab.aggregate.body import YIELD_SURFACES, Body
+from flybystab.aggregate.body import DENSITY_RANGE, YIELD_SURFACES, Body
 from flybystab.attitudes import attitude_matrix, periapsis_axes
 from flybystab.core.outcome import principal_axes
 from flybystab.core.passage import REGIMES
@@ -178,11 +178,13 @@ def _body_after(body: Body, found: Judged, yielded: bool) -> Body:
     material = body.material
     if yielded and material.brittle:
         material = material.with_(cohesion=0.0 * u.Pa)
+    rho = float(body.rho * np.prod(body.axes) / np.prod(axes))
     return Body(
         semi_axes=axes * u.m,
-        density=body.rho * np.prod(body.axes) / np.prod(axes) * u.kg / u.m**3,
+        density=rho * u.kg / u.m**3,
         spin=vectors.T @ found.spin * u.rad / u.s,
         material=material,
+        dispersed=not DENSITY_RANGE[0] <= rho <= DENSITY_RANGE[1],
     )
 
 

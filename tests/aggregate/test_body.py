@@ -50,6 +50,17 @@ def test_missing_values_are_refused():
         Body(Masked([3, 2, 1] * u.m, mask=[False, False, True]), DENSITY)
 
 
+@pytest.mark.parametrize("density", [2 * u.kg / u.m**3, 30 * u.g / u.cm**3])
+def test_a_density_that_no_asteroid_has_is_refused(density):
+    with pytest.raises(InvalidInput, match=r"density = .*: expected 50 to 25000 kg / m3 \(1 g / cm3 is 1000"):
+        Body([3, 2, 1] * u.m, density)
+    # comets and metal are taken, and what an encounter has drawn apart
+    for real in (200, 8000):
+        assert Body([3, 2, 1] * u.m, real * u.kg / u.m**3).rho == real
+    apart = Body([3, 2, 1] * u.m, density, dispersed=True)
+    assert apart.with_(material=Material(cohesion=1 * u.Pa)).rho == density.to_value(u.kg / u.m**3)
+
+
 def test_hertz_could_be_turns_or_radians():
     with pytest.raises(UnitMismatch, match="turns or radians"):
         Body([3, 2, 1] * u.m, DENSITY, spin=[0, 0, 1e-4] * u.Hz)

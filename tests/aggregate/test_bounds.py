@@ -25,7 +25,7 @@ def test_bounds_are_the_edges_of_equilibrium(name):
     b = EXAMPLES[name]
     (low, high), *more = density_intervals(b)
     assert not more
-    assert high.value == 30_000
+    assert high.value == 25_000
     for factor, holds in ((0.999, False), (1.001, True)):
         assert equilibrium(b.with_(density=factor * low)).admissible is holds
     r = requirements(b, samples=1)

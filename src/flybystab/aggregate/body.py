@@ -17,6 +17,9 @@ from flybystab.units import brief, frozen, to_si
 
 #: Yield surfaces, in the order of their integer codes in :mod:`flybystab.core.rheology`.
 YIELD_SURFACES = ("drucker-prager", "drucker-prager-extension", "mohr-coulomb", "matsuoka-nakai")
+#: Bulk densities of an asteroid, kg/m3: below the lightest comets, above the heaviest metal. What lies beyond is a
+#: slip, mostly of the unit.
+DENSITY_RANGE = (50.0, 25_000.0)
 
 
 @dataclass(frozen=True)
@@ -94,13 +97,15 @@ class Body:
     semi_axes : Quantity, shape (3,)
         ``a1 >= a2 >= a3``.
     density : Quantity
-        Bulk density.
+        Bulk density, within :data:`DENSITY_RANGE`.
     spin_period : Quantity, optional
         Period of steady rotation about ``+a3``; negative for ``-a3``. Neither this nor `spin`: no spin.
     spin : Quantity, shape (3,), optional
         Angular velocity along the axes ``a1, a2, a3``, for bodies that tumble.
     material : Material, optional
         35 degrees of friction and no cohesion by default.
+    dispersed : bool, optional
+        Whether an encounter has drawn the body apart: its density may then be below that of any asteroid.
 
     Attributes
     ----------
@@ -117,6 +122,7 @@ class Body:
     spin_period: Quantity | None = None
     spin: Quantity | None = None
     material: Material = field(default_factory=Material)
+    dispersed: bool = field(default=False, repr=False, kw_only=True)
 
     axes: NDArray[np.float64] = field(init=False, repr=False, compare=False)
     rho: float = field(init=False, repr=False, compare=False)
@@ -146,6 +152,11 @@ class Body:
             with u.set_enabled_equivalencies(u.dimensionless_angles()):
                 omega = to_si(self.spin, u.rad / u.s, "spin", shape=(3,))
         rho = to_si(self.density, u.kg / u.m**3, "density", low=0.0, open_low=True)
+        least, most = DENSITY_RANGE
+        if not (self.dispersed or least <= rho <= most):
+            raise InvalidInput(
+                "density", self.density, f"{least:g} to {most:g} kg / m3 (1 g / cm3 is 1000 kg / m3)"
+            )
         for name in ("semi_axes", "density", "spin_period", "spin"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, frozen(getattr(self, name)))

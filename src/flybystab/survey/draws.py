@@ -16,7 +16,7 @@ import astropy.units as u
 import numpy as np
 from numpy.typing import NDArray
 
-from flybystab.aggregate.body import Body, Material
+from flybystab.aggregate.body import DENSITY_RANGE, Body, Material
 from flybystab.errors import InvalidInput
 from flybystab.survey.attitude import attitude_matrix, free_spin, isotropic_direction
 from flybystab.survey.catalogue import Asteroid, catalogue
@@ -184,7 +184,8 @@ def _draws(asteroid: Asteroid, x: Array, population: Population, *, keep: bool) 
         centre = value("density_kg_m3")
         has_sigma = asteroid.knows("density_sigma_kg_m3") and not keep
         sd = value("density_sigma_kg_m3") if has_sigma else 0.0
-        rho = truncated_normal(x[:, _DENSITY], centre, sd, 0.25 * centre, 4.0 * centre)
+        least, most = max(0.25 * centre, DENSITY_RANGE[0]), min(4.0 * centre, DENSITY_RANGE[1])
+        rho = truncated_normal(x[:, _DENSITY], centre, sd, least, most)
         if "density_kg_m3" in asteroid.assumed:
             drawn.append("density (from the class)" if asteroid.row.get("taxonomic_class") else "density")
     else:

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from flybystab.aggregate.body import DENSITY_RANGE
 from flybystab.errors import InvalidInput, UnknownName
 from flybystab.survey.distributions import Distribution, distribution_of
 
@@ -18,7 +19,7 @@ from flybystab.survey.distributions import Distribution, distribution_of
 _LIMITS = {
     "friction_angle_deg": (0.0, 89.0),
     "cohesion_Pa": (0.0, np.inf),
-    "density_kg_m3": (1.0, 25_000.0),
+    "density_kg_m3": DENSITY_RANGE,
     "elongation": (1.0, 20.0),
     "flattening": (0.05, 1.0),
     "spin_period_h": (1e-3, np.inf),

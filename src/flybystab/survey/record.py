@@ -14,6 +14,7 @@ import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
 
+from flybystab.aggregate.body import DENSITY_RANGE
 from flybystab.errors import InvalidInput
 
 _LENGTH = ("semi_axis_a_m", "semi_axis_b_m", "semi_axis_c_m", "diameter_m")
@@ -76,7 +77,7 @@ LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType(
     dict.fromkeys(_LENGTH, (0.05, 5e6))
     | dict.fromkeys(_HOURS, (1e-4, 1e5))
     | {c: (0.0, np.inf) for c in UNITS if "sigma" in c}
-    | {"density_kg_m3": (50.0, 25_000.0), "e": (0.0, np.inf), "amplitude_mag": (0.0, 5.0)}
+    | {"density_kg_m3": DENSITY_RANGE, "e": (0.0, np.inf), "amplitude_mag": (0.0, 5.0)}
     | {"i_deg": (0.0, 180.0), "pole_ecl_lat_deg": (-90.0, 90.0)}
 )
 

@@ -122,7 +122,7 @@ def _lines(asteroid: Any, table: Any) -> list[str]:
 def _density_bound(intervals: Any) -> str:
     import astropy.units as u
 
-    from flybystab.aggregate.bounds import DENSITY_RANGE
+    from flybystab.aggregate.body import DENSITY_RANGE
 
     if not len(intervals):
         return "no density is enough without cohesion"
