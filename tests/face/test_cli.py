@@ -350,6 +350,11 @@ def test_stability_of_a_whole_catalogue(tmp_path, capsys):
     assert main(["stability"]) == 2
     assert "--all" in capsys.readouterr().err
     assert main(["stability", "Apophis", "--output", str(out)]) == 2
+    assert main(["stability", "--all", "--catalogue", str(file)]) == 2
+    assert "stability --all FILE" in capsys.readouterr().err
+    file.write_text(f"{head}\nlight,200,160,150,2,8\n")
+    assert main(["stability", "--all", str(file)]) == 1
+    assert "none of the rows could be computed (1, of which 1: density_kg_m3 = 2:" in capsys.readouterr().err
 
 
 def test_files_saved_by_excel_or_notepad_are_read(capsys, tmp_path):
@@ -437,6 +442,7 @@ def test_an_asteroid_of_my_own_file(capsys, tmp_path):
     found = json.loads(out)
     assert found["encounter"]["time_tdb"].startswith("2029-04-13")
     assert found["verdict"] == "INTACT"
+    assert found["catalogue"] == str(file)
     status, _, err = run(capsys, "stability", "yours", "--catalogue", str(file))
     assert status == 1
     assert f"unknown asteroid 'yours' ({file} has 1)" in err

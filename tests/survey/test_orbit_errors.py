@@ -134,7 +134,7 @@ def test_an_error_of_the_velocity_alone_has_a_growth():
 def test_a_screening_says_what_is_known():
     rock = mpc("Apophis")
     note = spread(Passage(rock, "earth", Time("2029-04-13 21:46", scale="tdb"), 3.8e7, 5.8e3), 10, 0).note
-    assert note == "orbit without errors (errors known by the digits and U of its elements)"
+    assert note == "orbit without errors (known only by the digits and U of its elements)"
 
 
 def test_a_row_that_says_nothing_has_no_covariance():

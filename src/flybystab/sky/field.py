@@ -52,7 +52,7 @@ class Field(NamedTuple):
     gm_pn : float
         GM of the Sun if there is relativity, else zero.
     heavy : ndarray, shape (2, 4)
-        GM in use of ``HEAVY`` and square of the radius of the core, where there is no relativity.
+        GM in use of ``HEAVY``, and the square of the radius (m2) inside of which each is left out of relativity.
     head, data, gm : ndarray
         The ephemeris itself, for places to the last digit.
     """

@@ -3,7 +3,8 @@
 After a close passage two tracks part by orders of magnitude (a metre before the 2029 passage of Apophis is
 5 km a year later). Whether a later encounter is still the encounter of this asteroid, or one of many that it
 may have, is decided by following a neighbour of the orbit to it: one sigma of the covariance along the
-direction that moves the asteroid most by then, or, for an orbit taken as exact, one metre away from the Sun.
+direction that moves the asteroid most by then, or, for an orbit of which no error is known, one metre away from the
+Sun.
 """
 
 from __future__ import annotations

@@ -116,7 +116,7 @@ def spread(passage: Passage, samples: int, seed: int) -> Spread:
     if covariance is None:
         return Spread(None, np.nan, "orbit without errors (no covariance)")
     if not covariance.correlated:
-        known = "1-sigmas" if covariance.caveat == "without correlations" else "errors known"
+        known = "1-sigmas" if covariance.caveat == "without correlations" else "known only"
         return Spread(None, np.nan, f"orbit without errors ({known} {covariance.caveat})")
     body = planet(passage.planet)
     key = int(stream(seed, "orbit", identity(asteroid)).integers(2**62))

@@ -6,10 +6,10 @@ import argparse
 import json
 import os
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from typing import Any
 
-from flybystab.errors import InvalidInput, WrongUsage
+from flybystab.errors import InvalidInput, NothingComputed, WrongUsage
 
 #: Other yield surfaces that a verdict is checked on.
 OTHER_SURFACES = ("drucker-prager-extension", "mohr-coulomb", "matsuoka-nakai")
@@ -60,6 +60,13 @@ def show(options: argparse.Namespace, document: Callable[[], Any], lines: Callab
         print(json.dumps(document(), indent=1, allow_nan=False))
     else:
         print("\n".join(_coloured(line) for line in lines()))
+
+
+def check_computed(rows: int, failed: int, reasons: Mapping[str, int]) -> None:
+    """Raise NothingComputed if every row of a table failed; `reasons`: how often each, the commonest first."""
+    if rows and failed == rows:
+        reason, n = next(iter(reasons.items()), ("no reason is known", rows))
+        raise NothingComputed(f"none of the rows could be computed ({rows}, of which {n}: {reason})")
 
 
 def _coloured(line: str) -> str:

@@ -19,7 +19,9 @@ SPAN = ("2000-01-01", "2050-01-01")
 
 def passage_arguments(sub: argparse.ArgumentParser) -> None:
     """Add the asteroid, its encounter, its material, and the sample of attitudes."""
-    sub.add_argument("name", help="number, name or designation in the embedded catalogue")
+    sub.add_argument(
+        "name", help="number, name or designation in the embedded catalogue, or in that of --catalogue"
+    )
     catalogue_argument(sub)
     sub.add_argument(
         "--date", help=f"near the encounter, TDB; the closest one of {SPAN[0]} to {SPAN[1]} if left out"

@@ -32,6 +32,7 @@ def run(options: argparse.Namespace) -> None:
             result,
             sample,
             asteroid=asteroid.label,
+            catalogue=asteroid.file,
             orbit_solution=asteroid.record.get("orbit_solution"),
             assumed=asteroid.assumptions,
             attitude=attitude_words(asteroid),

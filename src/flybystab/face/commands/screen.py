@@ -5,8 +5,8 @@ from __future__ import annotations
 import argparse
 import sys
 
-from flybystab.errors import NothingComputed
 from flybystab.face.commands.common import (
+    check_computed,
     check_table,
     material_arguments,
     material_of,
@@ -110,9 +110,7 @@ def run(options: argparse.Namespace) -> None:
             f"table      {output} (flybystab show {output} --output {output.with_suffix('.png')} draws it)",
         ],
     )
-    if found.rows and found.failed == found.rows:
-        reason, n = next(iter(found.errors.items()), ("no reason is known", found.rows))
-        raise NothingComputed(f"none of the rows could be computed ({found.rows}, of which {n}: {reason})")
+    check_computed(found.rows, found.failed, found.errors)
 
 
 def _is_file(word: str) -> bool:

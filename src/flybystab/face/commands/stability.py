@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+from collections import Counter
 
 from flybystab import __version__
 from flybystab.errors import WrongUsage
 from flybystab.face.commands.common import (
     asteroid_of,
     catalogue_argument,
+    check_computed,
     check_table,
     material_arguments,
     material_of,
@@ -34,6 +36,10 @@ def arguments(sub: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Answer the command."""
+    if options.all and options.catalogue:
+        raise WrongUsage(
+            "--catalogue: expected one NAME with it; --all takes its file as stability --all FILE"
+        )
     if options.all:
         _catalogue(options)
     elif options.name is None:
@@ -87,6 +93,8 @@ def _catalogue(options: argparse.Namespace) -> None:
         return [*out, "levels" + held, *([f"table      {options.output}"] if options.output else [])]
 
     show(options, lambda: table_document(table), lines)
+    reasons = Counter(str(e) for e in table["error"] if e)
+    check_computed(len(table), reasons.total(), dict(reasons.most_common()))
 
 
 def _asteroid(options: argparse.Namespace) -> None:
