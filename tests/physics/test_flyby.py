@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from flybystab.aggregate.body import Body, Material
 from flybystab.attitudes import periapsis_axes
-from flybystab.constants import G
+from flybystab.constants import G, R_EARTH
 from flybystab.errors import InvalidInput, UnitMismatch, UnknownName
 from flybystab.flybys import flyby
 from flybystab.many import flyby_many
@@ -63,6 +63,25 @@ def test_a_body_that_touches_the_planet_hits_it():
     pebble = ball.with_(semi_axes=[10, 10, 10] * u.m)
     table = flyby_many([pebble, ball, pebble], [close, close, clear])
     assert table.verdict.tolist() == ["INTACT", "IMPACT", "INTACT"]
+
+
+def test_a_body_that_an_encounter_thins_is_taken_again():
+    """A very light pile leaves the range of densities of asteroids; the next encounter still takes it."""
+    pile = Body(
+        [1400, 1300, 1200] * u.m,
+        51 * u.kg / u.m**3,
+        spin_period=40 * u.h,
+        material=Material(dilatancy=1.0),
+    )
+    passing = Encounter.hyperbolic("earth", 4 * R_EARTH * u.m, 10 * u.km / u.s)
+    r = flyby(pile, passing, history=False, error=False)
+    assert r.verdict == "RESHAPED"
+    assert 30 * u.kg / u.m**3 < r.body.density < 40 * u.kg / u.m**3
+    assert r.body.mass.value == pytest.approx(pile.mass.value, rel=1e-6)
+    assert r.body.dispersed
+    assert not pile.dispersed
+    strong = r.body.with_(material=Material(cohesion=1 * u.kPa))
+    assert flyby(strong, passing, history=False, error=False).verdict == "INTACT"
 
 
 def test_not_in_equilibrium_says_what_would_help():
