@@ -8,7 +8,7 @@ from scipy.spatial.transform import Rotation
 
 from flybystab.aggregate.body import Body, Material
 from flybystab.attitudes import periapsis_axes
-from flybystab.constants import G, R_EARTH
+from flybystab.constants import R_EARTH, G
 from flybystab.errors import InvalidInput, UnitMismatch, UnknownName
 from flybystab.flybys import flyby
 from flybystab.many import flyby_many
