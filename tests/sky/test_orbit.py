@@ -357,6 +357,23 @@ def test_a_start_inside_a_planet_is_refused():
     assert len(find_encounters(above, EPOCH, later(EPOCH, 86400.0))) > 10
 
 
+def test_an_orbit_that_cannot_be_followed_does_not_end_the_search_of_others():
+    sunk = Orbit.from_state(EPOCH, [5000, 0, 0] * u.km, [0, 7.5, 0] * u.km / u.s, centre="earth", name="sunk")
+    above = Orbit.from_state(
+        EPOCH, [7000, 0, 0] * u.km, [0, 7.5, 0] * u.km / u.s, centre="earth", name="above"
+    )
+    stop = later(EPOCH, 86400.0)
+    alone = find_encounters(above, EPOCH, stop)
+    for rows in ([sunk, above, sunk], [above, sunk], [sunk, sunk, above]):
+        found = find_encounters(rows, EPOCH, stop)
+        assert list(found["distance"]) == list(alone["distance"])
+        assert set(found["asteroid"]) == {"above"}
+        assert set(found["index"]) == {[o.name for o in rows].index("above")}
+        assert [f["asteroid"] for f in found.meta["failed"]] == ["sunk"] * (len(rows) - 1)
+        assert "inside earth" in found.meta["failed"][0]["why"]
+    assert alone.meta["failed"] == []
+
+
 def test_no_encounter_lies_beyond_an_impact():
     """Forward and backward: a track ends on the planet."""
     for sign in (-1.0, 1.0):

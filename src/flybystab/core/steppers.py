@@ -299,25 +299,35 @@ def implicit_step(
     if not factorise(lu, n, pivots):
         return np.inf
     for s in range(8):
+        stage = k[s]
         for i in range(n):
-            total = 0.0
-            for j in range(s):
-                total += _RA[s, j] * k[j, i]
-            y1[i] = y[i] + total
-        rate(FLOWING, t + _RC[s] * h, y1, k[s], par, tide, work)
+            y1[i] = y[i]
+        for j in range(s):
+            a = _RA[s, j]
+            before = k[j]
+            for i in range(n):
+                y1[i] += a * before[i]
+        rate(FLOWING, t + _RC[s] * h, y1, stage, par, tide, work)
         for i in range(n):
-            total = 0.0
-            for j in range(s):
-                total += _RK[s, j] * k[j, i]
-            k[s, i] += total / h + h * _RD[s] * jac[i, n]
-        solve(lu, n, pivots, k[s])
+            stage[i] += h * _RD[s] * jac[i, n]
+        for j in range(s):
+            a = _RK[s, j] / h
+            before = k[j]
+            for i in range(n):
+                stage[i] += a * before[i]
+        solve(lu, n, pivots, stage)
     error = 0.0
+    last = k[7]
     for i in range(n):
-        y1[i] += k[7, i]
-        error += (k[7, i] / scale[i]) ** 2
-        for r in range(3):
-            total = 0.0
-            for j in range(8):
-                total += _RH[r, j] * k[j, i]
-            dense[r, i] = total
+        y1[i] += last[i]
+        error += (last[i] / scale[i]) ** 2
+    for r in range(3):
+        row = dense[r]
+        for i in range(n):
+            row[i] = 0.0
+        for j in range(8):
+            a = _RH[r, j]
+            before = k[j]
+            for i in range(n):
+                row[i] += a * before[i]
     return np.sqrt(error / n) if np.isfinite(error) else np.inf

@@ -106,7 +106,8 @@ def find_encounters(
         an impact, distance and time are those of the two-body orbit without a surface, position and velocity
         are from the step before, and the search ends for that asteroid. Metadata: ephemeris, forces and
         the largest estimated share of each (``share_km``, point masses and 1PN), shares of the forces left out
-        (``left_out_km``), frame, time scale, tolerance.
+        (``left_out_km``), frame, time scale, tolerance, and, of several asteroids, those that could not be
+        followed (``failed``: ``asteroid`` and ``why``).
 
     Raises
     ------
@@ -168,6 +169,8 @@ def find_encounters(
     # A tenth: several shares add up, and passages on the way enlarge them.
     least = 0.1 * accuracy if forces is None else 0.0
 
+    failed: dict[int, dict[str, str]] = {}
+
     def run(part: slice) -> list[Array]:
         tables = everything, laws[part], epochs[part], states[part]
         steps = tolerances[part]
@@ -178,14 +181,21 @@ def find_encounters(
             i, n, status, reached = search(
                 *tables, t_start, t_stop, limits, floors, steps, least, always, shares[part], i, out
             )
-            name = rows[part][i][0] if i < size else ""
-            if status == INSIDE:
-                raise starts_inside(name, rows[part][i][1].epoch, PLANETS[BODIES[int(reached)]])
-            if status == STALLED:
-                raise NotConverged(f"{name}: the step size collapsed at {later(middle, reached).iso} TDB")
+            if status in (INSIDE, STALLED):
+                name, orbit = rows[part][i]
+                why = (
+                    starts_inside(name, orbit.epoch, PLANETS[BODIES[int(reached)]])
+                    if status == INSIDE
+                    else NotConverged(f"{name}: the step size collapsed at {later(middle, reached).iso} TDB")
+                )
+                if len(rows) == 1:
+                    raise why
+                failed[part.start + i] = {"asteroid": name, "why": str(why)}
+                i += 1
+            elif n == 0:
+                space *= 4
             out[:n, 11] += part.start
             parts.append(out[:n].copy())
-            space *= 1 if n else 4
         return parts
 
     workers = threads or os.cpu_count() or 1
@@ -212,6 +222,7 @@ def find_encounters(
         "share_km": share,
         "left_out_km": left_out,
         "impacts_elsewhere": elsewhere,
+        "failed": [failed[i] for i in sorted(failed)],
         "frame": "ICRF",
         "time_scale": "TDB",
         "tolerance": float(tolerances.min(initial=1.0)),

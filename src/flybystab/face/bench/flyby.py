@@ -2,8 +2,9 @@
 
 The truth is the default integrator at a tolerance of 1e-12; errors are the largest relative ones of the
 semi-axes at the end. SciPy's Radau and DOP853 solve the same compiled right-hand side from the same onset to the
-same arrest: what they are spared is the location of events. The rigid row is a pass at 3 radii; its error is
-that of the spin.
+same arrest: what they are spared is the location of events. How many steps Radau refuses depends on the last digits
+of its start: each is started at several of the first states of the flow, and medians are given. The rigid row is a
+pass at 3 radii; its error is that of the spin.
 """
 
 from __future__ import annotations
@@ -28,6 +29,9 @@ from flybystab.sky.encounter import Encounter
 from flybystab.units import R_earth
 
 PHI = np.deg2rad(35.0)
+
+#: Starts of each SciPy run.
+STARTS = 9
 
 
 def case() -> tuple[Body, Encounter]:
@@ -120,8 +124,7 @@ def rows(figure: str | Path | None = None, repeat: int = 5) -> list[dict[str, An
     # SciPy: from just after onset, where the flow is started as the default starts it, to just before arrest.
     history = exact.history
     flowing = np.flatnonzero(history["regime"] == FLOWING)
-    first, last = flowing[0], flowing[-1]
-    start, stop = history["time"][first] / t0, history["time"][last] / t0
+    last = flowing[-1]
     work = empty_buffers()
 
     def numbers(i: int) -> Any:
@@ -141,27 +144,28 @@ def rows(figure: str | Path | None = None, repeat: int = 5) -> list[dict[str, An
     target = axes(history["shape"][last])
     for method, tolerances in (("Radau", (1e-4, 1e-6, 1e-8)), ("DOP853", (1e-4, 1e-6, 1e-8))):
         for tolerance in tolerances:
-
-            def solved(method: str = method, tolerance: float = tolerance) -> Any:
-                # |D| starts at 1e-10: its own tolerance must be below it
-                return solve_ivp(
+            found = []
+            for first in flowing[:STARTS]:
+                clock = time.process_time()
+                solution = solve_ivp(
                     derivative,
-                    (start, stop),
+                    (history["time"][first] / t0, history["time"][last] / t0),
                     numbers(first),
                     method=method,
                     rtol=tolerance,
+                    # |D| starts at 1e-10: its own tolerance must be below it
                     atol=tolerance * 1e-4,
                 )
-
-            solution = solved()
-            cpu = _best(solved, 3)
-            error = float(np.abs(axes(tensor(solution.y[:6, -1])) * a0 / target - 1.0).max())
+                clock = time.process_time() - clock
+                shape = tensor(solution.y[:6, -1]) * a0**2
+                found.append((clock, float(np.abs(axes(shape) / target - 1.0).max())))
+            cpu, error = np.median(found, axis=0)
             out.append(
                 {
                     "method": f"SciPy {method}",
                     "setting": f"rtol {tolerance:.0e}",
-                    "error_relative": error,
-                    "cpu_s": cpu,
+                    "error_relative": float(error),
+                    "cpu_s": float(cpu),
                 }
             )
     reached = [r["cpu_s"] for r in out if r["method"] == "default" and r["error_relative"] <= 1e-6]

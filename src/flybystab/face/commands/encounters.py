@@ -84,6 +84,7 @@ def run(options: argparse.Namespace) -> None:
             if not many
             else f"{options.name or 'embedded catalogue'} ({len(asteroids)} asteroids): {head}",
             *_lines(table, many),
+            *[f"not followed: {one['why']}" for one in table.meta["failed"][:SHOWN]],
             *([f"table      {options.output}"] if options.output else []),
         ],
     )
