@@ -13,15 +13,14 @@ import numpy as np
 from astropy.units import Quantity
 from numpy.typing import NDArray
 
-from flybystab.aggregate.body import Body
+from flybystab.aggregate.body import Body, check_body
 from flybystab.attitudes import attitude_matrix, periapsis_axes
 from flybystab.core.jit import kernel
-from flybystab.core.judgement import NEAR_GROUND
 from flybystab.core.passage import passage
 from flybystab.core.state import rotated_to_body, rotation_matrix
 from flybystab.core.tide import TidePanels, tide_at
 from flybystab.errors import InvalidInput, NotConverged
-from flybystab.rows import span_of
+from flybystab.rows import ground_near, span_of
 from flybystab.sky.encounter import Encounter
 from flybystab.units import brief
 
@@ -82,8 +81,7 @@ def rigid_course(
         Relative error allowed in each integration step. The rows are a quarter of a step apart: a smaller one
         gives more of them (1e-10: about 12 per dynamical time near the planet).
     """
-    if not isinstance(body, Body):
-        raise InvalidInput("body", body, "a flybystab.Body (of an asteroid: asteroid.body)")
+    check_body(body)
     if not isinstance(encounter, Encounter):
         raise InvalidInput("encounter", encounter, "a flybystab.Encounter")
     rotation = periapsis_axes(encounter).T @ attitude_matrix(attitude)
@@ -105,7 +103,7 @@ def rigid_course(
         tolerance=tolerance,
         max_axis_ratio=np.inf,
         keep=ROWS,
-        ground=encounter.ground if encounter.height <= NEAR_GROUND * body.axes[0] else None,
+        ground=ground_near(encounter, float(body.axes[0])),
     )
     if run.reason == "stuck" or run.history is None:
         raise NotConverged(f"the rigid course stopped {run.time - start:.1f} s after the start")

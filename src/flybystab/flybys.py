@@ -9,7 +9,7 @@ import astropy.units as u
 import numpy as np
 from numpy.typing import NDArray
 
-from flybystab.aggregate.body import DENSITY_RANGE, YIELD_SURFACES, Body
+from flybystab.aggregate.body import DENSITY_RANGE, YIELD_SURFACES, Body, check_body
 from flybystab.attitudes import attitude_matrix, periapsis_axes
 from flybystab.core.outcome import principal_axes
 from flybystab.core.passage import REGIMES
@@ -70,8 +70,7 @@ def flyby(
     NotConverged
         If the integrator cannot go on; the message says where.
     """
-    if not isinstance(body, Body):
-        raise InvalidInput("body", body, "a flybystab.Body (of an asteroid: asteroid.body)")
+    check_body(body)
     if not isinstance(encounter, Encounter):
         raise InvalidInput("encounter", encounter, "a flybystab.Encounter")
     tolerance, max_axis_ratio = step_tolerance(tolerance), axis_ratio(max_axis_ratio)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flybystab.aggregate.body import Body
 from flybystab.core import judgement
-from flybystab.core.ground import no_ground
+from flybystab.core.ground import Ground, no_ground
 from flybystab.core.passage import REGIMES, event_log, unpacked_history
 from flybystab.core.workspace import N_EVENT, N_HISTORY
 from flybystab.errors import InvalidInput
@@ -116,9 +116,8 @@ def columns(bodies: Sequence[Body], rotations: Array, encounters: Sequence[Encou
     met = {id(e): e for e in encounters}
     place = {key: k for k, key in enumerate(met)}
     tides = [e.tide for e in met.values()]
-    # The way above the ground is made for encounters in which one of these bodies is near it.
-    longest = judgement.NEAR_GROUND * max(b.axes[0] for b in bodies)
-    grounds = [e.ground if e.height <= longest else no_ground() for e in met.values()]
+    longest = max(b.axes[0] for b in bodies)
+    grounds = [ground_near(e, longest) for e in met.values()]
     return (
         np.array([b.axes for b in bodies]),
         np.array([b.rho for b in bodies]),
@@ -146,6 +145,11 @@ def _joined(series: Sequence[Array]) -> tuple[NDArray[np.int64], Array]:
 def _material(body: Body) -> Array:
     m = body.material
     return np.array([m.phi, m.c_pa, m.dilatancy, m.surface_code, m.brittle], dtype=float)
+
+
+def ground_near(encounter: Encounter, longest: float) -> Ground:
+    """The ground along an encounter that bodies of a long semi-axis (m) may touch; none where it is far below."""
+    return encounter.ground if encounter.height <= judgement.NEAR_GROUND * longest else no_ground()
 
 
 def span_of(encounter: Encounter) -> Array:

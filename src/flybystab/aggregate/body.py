@@ -88,6 +88,12 @@ class Material:
         return f"<Material {', '.join(said)}>"
 
 
+def check_body(body: Any) -> None:
+    """Raise InvalidInput for what is no body."""
+    if not isinstance(body, Body):
+        raise InvalidInput("body", body, "a flybystab.Body (of an asteroid: asteroid.body)")
+
+
 @dataclass(frozen=True, eq=False)
 class Body:
     """A homogeneous ellipsoid of granular material.

@@ -18,7 +18,7 @@ import numpy as np
 from astropy.units import Quantity
 from numpy.typing import NDArray
 
-from flybystab.aggregate.body import Body
+from flybystab.aggregate.body import Body, check_body
 from flybystab.constants import G
 from flybystab.core.rheology import lode_angle
 from flybystab.core.statics import demand, invariants, load_interval, overload, rigid_stress
@@ -138,8 +138,7 @@ def equilibrium(body: Body, tide: Quantity | None = None) -> Equilibrium:
     -------
     Equilibrium
     """
-    if not isinstance(body, Body):
-        raise InvalidInput("body", body, "a flybystab.Body (of an asteroid: asteroid.body)")
+    check_body(body)
     m = body.material
     c = stress_components(body, tide)
     p, s, det = invariants(c)

@@ -15,7 +15,7 @@ import numpy as np
 from astropy.units import Quantity
 from numpy.typing import NDArray
 
-from flybystab.aggregate.body import Body
+from flybystab.aggregate.body import Body, check_body
 from flybystab.aggregate.stability import unit_deviator
 from flybystab.constants import G
 from flybystab.core.energy import velocity_gradient
@@ -23,7 +23,7 @@ from flybystab.core.passage import Passage, passage
 from flybystab.core.push import EDGE
 from flybystab.core.rheology import least_slope
 from flybystab.core.tide import components, no_tide
-from flybystab.errors import InvalidInput, NotConverged
+from flybystab.errors import NotConverged
 from flybystab.units import to_si
 
 Array = NDArray[np.float64]
@@ -139,8 +139,7 @@ def recovery_energy(
 
 
 def _dilatancy(body: Body, dilatancy: float | None) -> float:
-    if not isinstance(body, Body):
-        raise InvalidInput("body", body, "a flybystab.Body (of an asteroid: asteroid.body)")
+    check_body(body)
     own = body.material.dilatancy if dilatancy is None else dilatancy
     return float(to_si(own, u.dimensionless_unscaled, "dilatancy", low=0.0, high=1.0))
 

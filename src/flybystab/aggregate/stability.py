@@ -27,7 +27,7 @@ import numpy as np
 from astropy.units import Quantity
 from numpy.typing import NDArray
 
-from flybystab.aggregate.body import Body
+from flybystab.aggregate.body import Body, check_body
 from flybystab.aggregate.equilibrium import Equilibrium, equilibrium, spin_limits
 from flybystab.constants import G
 from flybystab.core import classify as columns
@@ -185,8 +185,7 @@ def stability(body: Body, *, dilatancy: float | None = 1.0) -> Stability:
     -------
     Stability
     """
-    if not isinstance(body, Body):
-        raise InvalidInput("body", body, "a flybystab.Body (of an asteroid: asteroid.body)")
+    check_body(body)
     m = body.material
     beta = m.dilatancy if dilatancy is None else dilatancy
     beta = to_si(beta, u.dimensionless_unscaled, "dilatancy", low=0.0, high=1.0)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flybystab.core.flow_ends import first_end, health, record_end, record_inside, sample
+from flybystab.core.flow_ends import first_end, health, record_end, record_flow, record_inside, sample
 from flybystab.core.flow_rule import fade
 from flybystab.core.ground import Ground, touches
 from flybystab.core.jacobian import flow_jacobian
@@ -13,11 +13,8 @@ from flybystab.core.jit import kernel
 from flybystab.core.section import choose_part, settle
 from flybystab.core.state import (
     BETA,
-    DETERMINANT,
     FLOWING,
     N_FULL,
-    PRESSURE,
-    STRENGTH,
 )
 from flybystab.core.steppers import (
     explicit_dense,
@@ -30,13 +27,13 @@ from flybystab.core.workspace import (
     ARREST,
     D_REST,
     DONE,
+    FADE,
     STUCK,
     SWITCH,
     TOUCH,
     Counts,
     Workspace,
     copy,
-    record,
 )
 
 Array = NDArray[np.float64]
@@ -134,10 +131,8 @@ def follow_flow(
     sample(-1, 0, ws)
     while t < t1:
         # Here f0 and the stress in `ws.work` belong to (t, y).
-        p, strength = ws.work.s[PRESSURE], ws.work.s[STRENGTH]
+        record_flow(t, y, par, ws, hist, count)
         _, d, _ = deviator(y[6:12], ws.stress)
-        det = ws.work.s[DETERMINANT]
-        record(t, FLOWING, y, par, p, strength, det, ws, hist, count)
         # d|D'|/dt = Dhat : Ddot
         trend = 0.0
         for i in range(3):
@@ -207,16 +202,17 @@ def follow_flow(
             # Repeat the step up to the root: the order of the method instead of that of the interpolant.
             h *= end
             _step(explicit, t, y, h, par, tide, ws)
-            if reason == SWITCH and hist.shape[0] > 1:
+            goes_on = reason in (SWITCH, FADE)
+            if goes_on and hist.shape[0] > 1:
                 if explicit:
                     explicit_dense(FLOWING, t, y, N_FULL, h, par, tide, ws.work, ws.k, ws.y1, ws.ys, ws.dense)
                 record_inside(explicit, t, y, h, spare, par, tide, limit2, ws, hist, count)
             copy(ws.y1, y, N_FULL)
             t += h
-            if reason != SWITCH:
+            if not goes_on:
                 record_end(t, y, f0, par, tide, limit2, ws, hist, count)
                 return reason, t
-            if ws.mark[4] - np.sqrt(determinant(y[0:6])) < 1e-6:
+            if reason == FADE:
                 ws.mark[4] = np.inf
                 h /= end
             else:

@@ -35,7 +35,7 @@ from flybystab.core.state import (
 from flybystab.core.steppers import explicit_at, implicit_at
 from flybystab.core.tensors import eigensystem
 from flybystab.core.tide import TidePanels
-from flybystab.core.workspace import BEYOND, JAM, LOSS, N_SAMPLE, SWITCH, Counts, Workspace, record
+from flybystab.core.workspace import BEYOND, FADE, JAM, LOSS, N_SAMPLE, SWITCH, Counts, Workspace, record
 
 Array = NDArray[np.float64]
 
@@ -88,10 +88,13 @@ def health(
     if strength < least:
         least = strength
         ws.mark[3] = LOSS
-    inside = min(inside, ws.mark[4] - ws.work.s[VOLUME])
     if inside < least:
         least = inside
         ws.mark[3] = SWITCH
+    ahead = ws.mark[4] - ws.work.s[VOLUME]
+    if ahead < least:
+        least = ahead
+        ws.mark[3] = FADE
     return least
 
 
@@ -223,6 +226,13 @@ def first_end(
 
 
 @kernel
+def record_flow(t: float, y: Array, par: Array, ws: Workspace, hist: Array, count: Counts) -> None:
+    """Append a state of flow to the history, with the stress that `health` has left of it."""
+    s = ws.work.s
+    record(t, FLOWING, y, par, s[PRESSURE], s[STRENGTH], s[DETERMINANT], ws, hist, count)
+
+
+@kernel
 def record_end(
     t: float,
     y: Array,
@@ -237,8 +247,7 @@ def record_end(
     """Append the last state of a flow to the history."""
     if hist.shape[0] > 1:
         health(t, y, dy, par, tide, limit2, ws)
-        p, strength, det = ws.work.s[PRESSURE], ws.work.s[STRENGTH], ws.work.s[DETERMINANT]
-        record(t, FLOWING, y, par, p, strength, det, ws, hist, count)
+        record_flow(t, y, par, ws, hist, count)
 
 
 @kernel
@@ -260,5 +269,4 @@ def record_inside(
         x = j / N_SAMPLE
         inside(explicit, x, y, ws)
         health(t + x * h, ws.ys, dy, par, tide, limit2, ws)
-        p, strength, det = ws.work.s[PRESSURE], ws.work.s[STRENGTH], ws.work.s[DETERMINANT]
-        record(t + x * h, FLOWING, ws.ys, par, p, strength, det, ws, hist, count)
+        record_flow(t + x * h, ws.ys, par, ws, hist, count)

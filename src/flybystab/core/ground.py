@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from flybystab.core.jit import kernel
 from flybystab.core.state import N_FULL, N_RIGID, RIGID, S1, S2, S3, W_SCRATCH, rotation_matrix
 from flybystab.core.steppers import explicit_at, implicit_at
+from flybystab.core.tide import panel_at
 from flybystab.core.workspace import Workspace
 
 Array = NDArray[np.float64]
@@ -61,10 +62,8 @@ def no_ground() -> Ground:
 @kernel
 def _direction(t: float, ground: Ground, n: Array) -> float:
     """Height (m) of the centre above the ground at time `t`; writes the unit vector ``n[3]`` along its position."""
-    v = (np.arcsinh(t / ground.tau) - ground.start) / ground.width
     c = ground.coefficients
-    i = min(max(int(np.floor(v)), 0), c.shape[0] - 1)
-    x = min(max(2.0 * (v - i) - 1.0, -1.0), 1.0)
+    i, x = panel_at(ground.tau, ground.start, ground.width, c.shape[0], t)
     r2 = 0.0
     for j in range(3):
         b1 = 0.0

@@ -113,7 +113,8 @@ def flow_jacobian(
 ) -> None:
     """Jacobian of plastic flow ``jac[15, 16]``, the last column of which is the derivative in time.
 
-    To be called after ``rate(FLOWING, t, y, f0, ...)``, which leaves the field and the pressure in `work`. `dt` is
+    To be called after ``rate(FLOWING, t, y, f0, ...)``, which leaves the field, the tide and the pressure in
+    `work`. `dt` is
     the step of the difference quotient of the tide; ``scratch[15, 15]``.
     """
     s, sinv, big_l = work.m[W_S], work.m[W_SINV], work.m[W_L]
@@ -248,7 +249,6 @@ def flow_jacobian(
         _answer(j, fading, along, system, work, jac)
     # t: M is the change of the tide
     before, after = work.c[0], work.c[1]
-    tide_at(tide.tau, tide.start, tide.width, tide.coefficients, t, before)
     tide_at(tide.tau, tide.start, tide.width, tide.coefficients, t + dt, after)
     for i in range(6):
         after[i] = (after[i] - before[i]) / dt

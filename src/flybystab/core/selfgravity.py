@@ -142,7 +142,7 @@ def gravity_derivative(s: Array, sinv: Array, det: float, out: Array) -> None:
     """Write ``out[6, :6]``: components (columns) of the derivative of ``Gamma`` along each of those of ``s`` (rows).
 
     A component off the diagonal moves both elements of ``S``. From ``dM_k = -3/2 (N_(k+2) dI1 + N_(k+1) dI2 + N_k
-    dI3)``. Beyond the reach of the rules an approximation: 2e-3 of the largest element at an axis ratio of 100.
+    dI3)``. Beyond the reach of the rules an approximation: to 2e-5 of the largest element at an axis ratio of 100.
     """
     i1, i2, m = _invariants(s, sinv, det)
     r = 1.0 / m

@@ -104,6 +104,14 @@ def tide_j2(
 
 
 @kernel
+def panel_at(tau: float, start: float, width: float, n: int, t: float) -> tuple[int, float]:
+    """Which of `n` panels holds the time `t`, and the place -1...1 in it; the nearest end for times outside."""
+    v = (np.arcsinh(t / tau) - start) / width
+    i = min(max(int(np.floor(v)), 0), n - 1)
+    return i, min(max(2.0 * (v - i) - 1.0, -1.0), 1.0)
+
+
+@kernel
 def tide_at(tau: float, start: float, width: float, coefficients: Array, t: float, out: Array) -> None:
     """Write into ``out[6]`` the tide at time ``t`` (s from closest approach); zero where there are no panels.
 
@@ -115,9 +123,7 @@ def tide_at(tau: float, start: float, width: float, coefficients: Array, t: floa
         for j in range(6):
             out[j] = 0.0
         return
-    v = (np.arcsinh(t / tau) - start) / width
-    i = min(max(int(np.floor(v)), 0), n - 1)
-    x = min(max(2.0 * (v - i) - 1.0, -1.0), 1.0)
+    i, x = panel_at(tau, start, width, n, t)
     c = coefficients[i]
     # Clenshaw, b_k = c_k + 2 x b_(k+1) - b_(k+2), all six at once: each alone would wait for itself
     x2 = 2.0 * x

@@ -25,6 +25,7 @@ JAM = code(6)
 STUCK = code(7)  # more steps or switches than allowed
 SWITCH = code(8)  # flow passes from one part of the yield section to another (not logged)
 TOUCH = code(9)  # the body has reached the ground
+FADE = code(10)  # the dilatancy of a flow begins to fade (not logged)
 
 #: Columns of the history: time, regime, S (6), D (6), w (3), pressure, deviator norm, unit determinant, and
 #: the unit quaternion (body axes -> fixed frame) of a rigid body, zero otherwise.

@@ -142,6 +142,17 @@ def _piece(when: Array, t: float) -> tuple[int, float]:
 
 
 @pasted_kernel
+def _find_quartic(when: Array, pieces: Array, t: float, p: Array) -> None:
+    """Write the 48 columns of a grid of degree 4 at `t`."""
+    i, x = _piece(when, t)
+    c = pieces[i]
+    x2 = x * x
+    x4 = x2 * x2
+    for j in range(48):
+        p[j] = ((c[0, j] + c[1, j] * x) + (c[2, j] + c[3, j] * x) * x2) + c[4, j] * x4
+
+
+@pasted_kernel
 def find_places(book: Almanac, t: float, belt: bool, out: Places) -> None:
     """Write where all bodies are at ``t`` (s)."""
     # Powers in pairs of pairs (Estrin): independent products, which the compiler makes vectors of.
@@ -167,25 +178,13 @@ def find_places(book: Almanac, t: float, belt: bool, out: Places) -> None:
             (c[4, j] + c[5, j] * x) + (c[6, j] + c[7, j] * x) * x2
         ) * x4
     if belt:
-        i, x = _piece(book.when[2], t)
-        c = book.belt[i]
-        p = out.belt
-        x2 = x * x
-        x4 = x2 * x2
-        for j in range(48):
-            p[j] = ((c[0, j] + c[1, j] * x) + (c[2, j] + c[3, j] * x) * x2) + c[4, j] * x4
+        _find_quartic(book.when[2], book.belt, t, out.belt)
 
 
 @pasted_kernel
 def find_heavy(book: Almanac, t: float, out: Places) -> None:
     """Write what relativity needs of the heavy bodies at ``t`` (s)."""
-    i, x = _piece(book.when[3], t)
-    c = book.heavy[i]
-    p = out.heavy
-    x2 = x * x
-    x4 = x2 * x2
-    for j in range(48):
-        p[j] = ((c[0, j] + c[1, j] * x) + (c[2, j] + c[3, j] * x) * x2) + c[4, j] * x4
+    _find_quartic(book.when[3], book.heavy, t, out.heavy)
 
 
 @pasted_kernel
