@@ -28,6 +28,7 @@ check: .venv/.test
 	$(PY) -m ruff check .
 	$(PY) -m ruff format --check .
 	$(PY) -m mypy
+	.venv/bin/lint-imports
 
 .venv/.docs: pyproject.toml | .venv/bin/python
 	$(PY) -m pip install --quiet --disable-pip-version-check -e ".[docs]"

@@ -29,14 +29,14 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import flybystab as fs
-from flybystab.aggregate.body import YIELD_SURFACES
+from flybystab.body.body import YIELD_SURFACES
 from flybystab.constants import G
-from flybystab.core.passage import parameters, passage
-from flybystab.core.stepping import follow_steps
-from flybystab.core.tide import TidePanels, components, tensor
-from flybystab.outcome import bound_fraction, classed
-from flybystab.rows import Judged, judged
-from flybystab.sky.planets import planet
+from flybystab.core.dynamics.moreau import follow_steps
+from flybystab.core.dynamics.run import parameters, passage
+from flybystab.core.ellipsoid.tide import TidePanels, components, tensor
+from flybystab.flybys.batch import Judged, judged
+from flybystab.flybys.verdict import bound_fraction, classed
+from flybystab.orbit.planets import planet
 
 Scene = tuple[fs.Body, fs.Encounter, np.ndarray]
 

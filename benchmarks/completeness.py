@@ -25,9 +25,9 @@ import numpy as np
 from astropy.table import QTable
 from astropy.time import Time
 
-from flybystab.sky.finder import find_encounters
-from flybystab.survey.asteroid import Asteroid
-from flybystab.survey.catalogue import catalogue, key_of
+from flybystab.catalogues.asteroid import Asteroid
+from flybystab.catalogues.catalogue import catalogue, key_of
+from flybystab.orbit.search.encounter_finder import find_encounters
 
 DATA = Path(os.environ.get("FLYBYSTAB_SHARED", Path(__file__).resolve().parents[1] / "../shared")) / "data"
 SPAN = Time("1950-01-01", scale="tdb"), Time("2050-01-01", scale="tdb")

@@ -15,9 +15,9 @@ import astropy.units as u
 import numpy as np
 from astropy.time import Time
 
-from flybystab.sky.ephemeris import ephemeris
-from flybystab.sky.finder import find_encounters
-from flybystab.sky.orbit import Orbit, later, seconds
+from flybystab.orbit.ephemeris import ephemeris
+from flybystab.orbit.orbit import Orbit, later, seconds
+from flybystab.orbit.search.encounter_finder import find_encounters
 
 DATA = Path(os.environ.get("FLYBYSTAB_SHARED", Path(__file__).resolve().parents[1] / "../shared")) / "data"
 BODIES = {

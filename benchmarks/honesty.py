@@ -19,18 +19,18 @@ import astropy.units as u
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from flybystab.aggregate.body import Material
+from flybystab.body.body import Material
+from flybystab.catalogues.catalogue import catalogue
 from flybystab.constants import G
-from flybystab.core.passage import passage
-from flybystab.core.quick import INTACT, NOT_IN_EQUILIBRIUM, quick_margins, tide_size
+from flybystab.core.dynamics.run import passage
+from flybystab.core.ellipsoid.yield_bound import INTACT, NOT_IN_EQUILIBRIUM, quick_margins, tide_size
+from flybystab.encounter.encounter import Encounter
 from flybystab.errors import FlybystabError
-from flybystab.sky.encounter import Encounter
-from flybystab.sky.planets import planet
-from flybystab.survey.catalogue import catalogue
-from flybystab.survey.draws import Attitudes, draws
-from flybystab.survey.judging import judge
-from flybystab.survey.passages import passages
-from flybystab.survey.settings import settings
+from flybystab.orbit.planets import planet
+from flybystab.screening.draws import Attitudes, draws
+from flybystab.screening.encounters import passages
+from flybystab.screening.sample_verdicts import judge
+from flybystab.screening.settings import settings
 
 PLANETS = ("earth", "moon", "venus", "mars", "mercury", "jupiter")
 Sample = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray, np.ndarray]

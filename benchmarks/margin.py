@@ -16,8 +16,8 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import flybystab as fs
-from flybystab.many import flyby_many
-from flybystab.margins import HOLDS, RECOVERS, RUNS_AWAY, flyby_margin
+from flybystab.flybys.flyby_many import flyby_many
+from flybystab.flybys.margin import HOLDS, RECOVERS, RUNS_AWAY, flyby_margin
 
 GCC = u.g / u.cm**3
 BODIES = {

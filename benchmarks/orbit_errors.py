@@ -17,19 +17,19 @@ from astropy.coordinates import GCRS, ITRS, CartesianRepresentation
 from astropy.time import Time
 from numpy.typing import NDArray
 
+from flybystab.catalogues.asteroid import Asteroid
+from flybystab.catalogues.catalogue import catalogue
+from flybystab.catalogues.orbit_errors import runoff as sigma_of_code
 from flybystab.constants import AU, YEAR
-from flybystab.sky.dop853 import empty_room
-from flybystab.sky.encounter import Encounter
-from flybystab.sky.ephemeris import Window, ephemeris
-from flybystab.sky.field import field
-from flybystab.sky.forces import FORCES
-from flybystab.sky.growth import carry
-from flybystab.sky.orbit import Orbit, later, seconds
-from flybystab.sky.predictability import neighbour
-from flybystab.survey.asteroid import Asteroid
-from flybystab.survey.catalogue import catalogue
-from flybystab.survey.draws import identity
-from flybystab.survey.orbit_errors import runoff as sigma_of_code
+from flybystab.encounter.encounter import Encounter
+from flybystab.orbit.ephemeris import Window, ephemeris
+from flybystab.orbit.forces import FORCES
+from flybystab.orbit.orbit import Orbit, later, seconds
+from flybystab.orbit.predictability import neighbour
+from flybystab.orbit.search.acceleration import field
+from flybystab.orbit.search.dop853 import empty_room
+from flybystab.orbit.search.neighbours import carry
+from flybystab.screening.draws import identity
 
 DATA = Path(os.environ.get("FLYBYSTAB_SHARED", Path(__file__).resolve().parents[1] / "../shared")) / "data"
 NEW, OLD, MPC = "nea_sbdb_fullprec_2026-07", "nea_sbdb_fullprec_2020-09", "nea_mpc_2026-02"

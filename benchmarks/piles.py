@@ -13,7 +13,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 import flybystab as fs
-from flybystab.aggregate.body import YIELD_SURFACES
+from flybystab.body.body import YIELD_SURFACES
 
 # Discrete elements (Yade, 541 grains; see docs): periapsis (R_E), largest clump, a2/a1, a3/a1, period (h).
 GRAINS = (

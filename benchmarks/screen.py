@@ -27,16 +27,16 @@ from typing import Any, NamedTuple
 import astropy.units as u
 from astropy.time import Time
 
+from flybystab.catalogues.catalogue import Asteroid, catalogue, key_of
+from flybystab.catalogues.formats import with_physical_data
 from flybystab.constants import AU, R_EARTH
-from flybystab.sky.encounter import Encounter
-from flybystab.survey.catalogue import Asteroid, catalogue, key_of
-from flybystab.survey.formats import with_physical_data
-from flybystab.survey.passages import Passage
-from flybystab.survey.progress import ProgressBar, duration
-from flybystab.survey.results import read_results
-from flybystab.survey.screening import Screening
-from flybystab.survey.settings import Settings, settings
-from flybystab.survey.summary import summary
+from flybystab.encounter.encounter import Encounter
+from flybystab.screening.encounters import Passage
+from flybystab.screening.progress import ProgressBar, duration
+from flybystab.screening.results import read_results
+from flybystab.screening.screening import Screening
+from flybystab.screening.settings import Settings, settings
+from flybystab.screening.summary import summary
 
 SPAN = ("2026-01-01", "2050-01-01")
 DISTANCES = {"0.02 au": 0.02 * AU, "10 R_E": 10 * R_EARTH, "4 R_E": 4 * R_EARTH, "2 R_E": 2 * R_EARTH}

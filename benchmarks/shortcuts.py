@@ -18,12 +18,14 @@ from astropy.time import Time
 from numba import njit
 
 import flybystab as fs
-from flybystab.core import judgement, motion, state
-from flybystab.core.jacobian import flow_jacobian
-from flybystab.core.passage import parameters
-from flybystab.core.steppers import N_STAGES, factorise, implicit_step, solve
-from flybystab.core.tide import TidePanels, components
-from flybystab.rows import MAX_STEPS, buffers, judge_rows, one_row
+from flybystab.core.dynamics import rates as motion
+from flybystab.core.dynamics import state
+from flybystab.core.dynamics import verdict_row as judgement
+from flybystab.core.dynamics.jacobian import flow_jacobian
+from flybystab.core.dynamics.run import parameters
+from flybystab.core.dynamics.steppers import N_STAGES, factorise, implicit_step, solve
+from flybystab.core.ellipsoid.tide import TidePanels, components
+from flybystab.flybys.batch import MAX_STEPS, buffers, judge_rows, one_row
 
 PILE = fs.Body(semi_axes=[1400, 850, 750] * u.m, density=2000 * u.kg / u.m**3, spin_period=6 * u.h)
 

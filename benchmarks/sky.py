@@ -15,11 +15,11 @@ from pathlib import Path
 import astropy.units as u
 from astropy.time import Time
 
+from flybystab.encounter.encounter import Encounter
 from flybystab.errors import MissingExtra
-from flybystab.sky.encounter import Encounter
-from flybystab.sky.ephemeris import ephemeris
-from flybystab.sky.forces import FORCES
-from flybystab.sky.orbit import Orbit, seconds
+from flybystab.orbit.ephemeris import ephemeris
+from flybystab.orbit.forces import FORCES
+from flybystab.orbit.orbit import Orbit, seconds
 
 DATA = Path(os.environ.get("FLYBYSTAB_SHARED", Path(__file__).resolve().parents[1] / "../shared")) / "data"
 UNIT = u.au / u.d**2

@@ -19,16 +19,16 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import minimize
 
-from flybystab.aggregate.body import YIELD_SURFACES, Body, Material
-from flybystab.aggregate.recovery import recovery_energy
-from flybystab.aggregate.regions import DEPTHS, stability_many, stability_map
-from flybystab.aggregate.stability import stability
+from flybystab.body.body import YIELD_SURFACES, Body, Material
+from flybystab.body.recovery import recovery_energy
+from flybystab.body.stability import stability
+from flybystab.body.stability_regions import DEPTHS, stability_many, stability_map
 from flybystab.constants import G
-from flybystab.core import classify as columns
-from flybystab.core.classify import classify
-from flybystab.core.jit import kernel
-from flybystab.core.push import LONGEST, Pile, barrier, pile, powers, second_order, third_order
-from flybystab.core.search import BARRIER, SECOND, THIRD, level
+from flybystab.core.energy import stability_row as columns
+from flybystab.core.energy.direction_search import BARRIER, SECOND, THIRD, level
+from flybystab.core.energy.perturbation import LONGEST, Pile, barrier, pile, powers, second_order, third_order
+from flybystab.core.energy.stability_row import classify
+from flybystab.core.numerics.jit import kernel
 
 Array = NDArray[np.float64]
 
@@ -159,9 +159,7 @@ def push() -> None:
     print(
         "critical energies / binding energy; dynamics: least and median over 16 directions of the energy from"
     )
-    print(
-        "which the body does not come to rest inside the model (flybystab.aggregate.recovery.recovery_energy)"
-    )
+    print("which the body does not come to rest inside the model (flybystab.body.recovery.recovery_energy)")
     print(
         f"{'body':>22} {'friction':>8} {'required':>8} {'dilatancy':>9} | {'second':>7} {'third':>7} {'barrier':>7}"
         f" {'kind':>8} | {'least':>7} {'median':>7} | {'least/barrier':>13}"

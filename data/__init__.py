@@ -1,1 +1,1 @@
-"""The embedded catalogue: read it through :mod:`flybystab.survey.catalogue`."""
+"""The embedded catalogue: read it through :mod:`flybystab.catalogues.catalogue`."""

@@ -12,9 +12,9 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import flybystab as fs
-from flybystab.face.cli import main
-from flybystab.face.maps import outcome_map, outcome_plot, target_map, target_plot
-from flybystab.face.scene import animation, scene_plot
+from flybystab.cli.main import main
+from flybystab.plots.outcome_map import outcome_map, outcome_plot, target_map, target_plot
+from flybystab.plots.scene import animation, scene_plot
 
 DOCS = Path(__file__).resolve().parent
 IMAGES = DOCS / "images"

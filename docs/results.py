@@ -16,20 +16,20 @@ import astropy.units as u
 import numpy as np
 from astropy.time import Time
 
-from flybystab.face.plotting_survey import inference_figure, results_figure
-from flybystab.survey.asteroid import Asteroid
-from flybystab.survey.catalogue import catalogue, find
-from flybystab.survey.columns import YIELDED
-from flybystab.survey.executors import workers
-from flybystab.survey.formats import with_physical_data
-from flybystab.survey.inference import infer, strongest_passage, survived
-from flybystab.survey.population import Population
-from flybystab.survey.progress import ProgressBar
-from flybystab.survey.results import read_results
-from flybystab.survey.screening import Screening
-from flybystab.survey.selection import listed
-from flybystab.survey.settings import settings
-from flybystab.survey.summary import summary
+from flybystab.catalogues.asteroid import Asteroid
+from flybystab.catalogues.catalogue import catalogue, find
+from flybystab.catalogues.formats import with_physical_data
+from flybystab.plots.screening import inference_figure, results_figure
+from flybystab.screening.columns import YIELDED
+from flybystab.screening.executors import workers
+from flybystab.screening.inference import infer, strongest_passage, survived
+from flybystab.screening.priors import Population
+from flybystab.screening.progress import ProgressBar
+from flybystab.screening.results import read_results
+from flybystab.screening.screening import Screening
+from flybystab.screening.selection import listed
+from flybystab.screening.settings import settings
+from flybystab.screening.summary import summary
 
 ROOT = Path(__file__).resolve().parents[1]
 OUT = ROOT / "out" / "results"

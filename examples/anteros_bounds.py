@@ -9,7 +9,7 @@ import astropy.units as u
 import numpy as np
 
 import flybystab as fs
-from flybystab.aggregate.bounds import density_intervals
+from flybystab.body.bounds import density_intervals
 from flybystab.constants import G
 
 anteros = fs.Asteroid.from_catalogue("Anteros")

@@ -13,7 +13,7 @@ import numpy as np
 from scipy.special import elliprf
 
 import flybystab as fs
-from flybystab.aggregate.bounds import requirements
+from flybystab.body.bounds import requirements
 from flybystab.constants import G
 
 FRICTION = 35  # deg, where friction is given

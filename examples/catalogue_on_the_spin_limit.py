@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 import flybystab as fs
-from flybystab.aggregate.equilibrium import spin_limits
+from flybystab.body.equilibrium import spin_limits
 
 rate, flat, need = [], [], []
 for asteroid in fs.catalogue():

@@ -14,9 +14,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Circle
 
 import flybystab as fs
-from flybystab.sky.b_plane import capture_radius
-from flybystab.sky.linear_plane import ellipse
-from flybystab.survey.catalogue import catalogue
+from flybystab.catalogues.catalogue import catalogue
+from flybystab.encounter.linear_target_plane import ellipse
+from flybystab.orbit.target_plane import capture_radius
 
 (asteroid,) = catalogue(Path(__file__).with_name("2024YR4.ke1"))
 day = Time("2032-12-22", scale="tdb")

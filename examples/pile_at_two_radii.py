@@ -3,7 +3,7 @@
 import astropy.units as u
 
 import flybystab as fs
-from flybystab.aggregate.body import YIELD_SURFACES
+from flybystab.body.body import YIELD_SURFACES
 
 pile = fs.Body(semi_axes=[1400, 850, 750] * u.m, density=2000 * u.kg / u.m**3, spin_period=6 * u.h)
 verdicts = {}

@@ -7,8 +7,8 @@ dynamics, which is brought there by a slow ramp of the tide and reports its onse
 import numpy as np
 
 from flybystab.constants import G
-from flybystab.core.passage import passage
-from flybystab.core.tide import tide_panels
+from flybystab.core.dynamics.run import passage
+from flybystab.core.ellipsoid.tide import tide_panels
 
 RHO = 2000.0
 rate = np.sqrt(np.pi * G * RHO)

@@ -4,7 +4,7 @@ import astropy.units as u
 import numpy as np
 
 import flybystab as fs
-from flybystab.survey.summary import summary
+from flybystab.screening.summary import summary
 
 # the ephemeris that comes with the package ends in 2050 (extra `jpl`: 2650)
 table = fs.screen(None, "2026-01-01", "2049-12-01", within=0.02 * u.au)

@@ -9,7 +9,7 @@ memory, not from the papers). The size cancels: without cohesion only the densit
 import astropy.units as u
 
 import flybystab as fs
-from flybystab.sky.planets import PLANETS
+from flybystab.orbit.planets import PLANETS
 
 radius = PLANETS["jupiter"].radius * u.m
 passage = fs.Encounter.hyperbolic("jupiter", 1.31 * radius, 0 * u.km / u.s, start_distance=12 * radius)

@@ -13,9 +13,9 @@ from matplotlib.figure import Figure
 
 import flybystab as fs
 from flybystab.constants import GM_EARTH
-from flybystab.face.maps import verdict_points
-from flybystab.sky.planets import PLANETS
-from flybystab.survey.judging import wilson
+from flybystab.orbit.planets import PLANETS
+from flybystab.plots.outcome_map import verdict_points
+from flybystab.screening.sample_verdicts import wilson
 
 SPEED, N = 6.0e3, 300
 pile = fs.Body(semi_axes=[140, 85, 75] * u.m, density=2000 * u.kg / u.m**3, spin_period=6 * u.h)

@@ -17,7 +17,7 @@ from matplotlib.figure import Figure
 
 import flybystab as fs
 from flybystab.constants import G
-from flybystab.spin import spin_states
+from flybystab.flybys.spin_sample import spin_states
 
 N = 300
 drawn, three_sigma = {}, {}

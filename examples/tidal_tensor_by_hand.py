@@ -8,7 +8,7 @@ import numpy as np
 
 import flybystab as fs
 from flybystab.constants import GM_EARTH
-from flybystab.core.tide import tensor, tide_at
+from flybystab.core.ellipsoid.tide import tensor, tide_at
 
 encounter = fs.Encounter.hyperbolic("earth", periapsis=38_012 * u.km, v_inf=5.841 * u.km / u.s)
 out = np.zeros(6)

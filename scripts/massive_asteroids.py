@@ -13,7 +13,7 @@ import numpy as np
 from jplephem.spk import SPK
 from numpy.polynomial import chebyshev
 
-from flybystab.sky.ephemeris import BELT, BELT_LENGTH, BELT_START
+from flybystab.orbit.ephemeris import BELT, BELT_LENGTH, BELT_START
 
 NUMBERS = (107, 1, 65, 511, 15, 31, 52, 10, 704, 7, 3, 2, 16, 87, 88, 4)
 STOP, COUNT = 2689000.5, 10

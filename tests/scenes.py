@@ -8,16 +8,16 @@ import astropy.units as u
 import numpy as np
 from numpy.typing import NDArray
 
-from flybystab.aggregate.body import Body, Material
+from flybystab.body.body import Body, Material
 from flybystab.constants import R_EARTH, G
-from flybystab.core import state
-from flybystab.core.ground import no_ground
-from flybystab.core.passage import Passage, parameters, passage
-from flybystab.core.regimes import follow
-from flybystab.core.stepping import follow_steps
-from flybystab.core.tide import TidePanels, components, no_tide, tensor, tide_at
-from flybystab.core.workspace import N_EVENT, N_HISTORY, workspace
-from flybystab.sky.encounter import Encounter
+from flybystab.core.dynamics import state
+from flybystab.core.dynamics.ground import no_ground
+from flybystab.core.dynamics.moreau import follow_steps
+from flybystab.core.dynamics.regimes import follow
+from flybystab.core.dynamics.run import Passage, parameters, passage
+from flybystab.core.dynamics.workspace import N_EVENT, N_HISTORY, workspace
+from flybystab.core.ellipsoid.tide import TidePanels, components, no_tide, tensor, tide_at
+from flybystab.encounter.encounter import Encounter
 
 Array = NDArray[np.float64]
 

@@ -5,8 +5,8 @@ import pytest
 from astropy.time import Time
 
 import flybystab as fs
-from flybystab.aggregate.bounds import requirements
-from flybystab.course import rigid_course
+from flybystab.body.bounds import requirements
+from flybystab.flybys.rigid_course import rigid_course
 
 
 @pytest.fixture(scope="module")

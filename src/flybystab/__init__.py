@@ -14,60 +14,60 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
+from flybystab._version import __version__
 
 _HOME = {
-    "Asteroid": "survey.asteroid",
-    "Body": "aggregate.body",
-    "Encounter": "sky.encounter",
-    "FlybyResult": "flyby_results",
+    "Asteroid": "catalogues.asteroid",
+    "Body": "body.body",
+    "Encounter": "encounter.encounter",
+    "FlybyResult": "flybys.result",
     "FlybystabError": "errors",
-    "Material": "aggregate.body",
-    "Orbit": "sky.orbit",
+    "Material": "body.body",
+    "Orbit": "orbit.orbit",
     "R_earth": "units",
-    "Verdict": "outcome",
-    "catalogue": "survey.catalogue",
-    "encounter_distribution": "sky.distribution",
-    "cite": "face.cite",
-    "equilibrium": "aggregate.equilibrium",
-    "find_encounters": "sky.finder",
-    "flyby": "flybys",
-    "flyby_many": "many",
-    "flyby_margin": "margins",
-    "infer": "survey.inference",
-    "periapsis_axes": "attitudes",
-    "screen": "survey.screening",
-    "spin_sample": "spin",
-    "stability": "aggregate.stability",
-    "surface_change": "surfaces",
-    "survival": "odds",
+    "Verdict": "flybys.verdict",
+    "catalogue": "catalogues.catalogue",
+    "encounter_distribution": "encounter.distribution",
+    "cite": "io.citation",
+    "equilibrium": "body.equilibrium",
+    "find_encounters": "orbit.search.encounter_finder",
+    "flyby": "flybys.flyby",
+    "flyby_many": "flybys.flyby_many",
+    "flyby_margin": "flybys.margin",
+    "infer": "screening.inference",
+    "periapsis_axes": "encounter.attitude",
+    "screen": "screening.screening",
+    "spin_sample": "flybys.spin_sample",
+    "stability": "body.stability",
+    "surface_change": "flybys.surface_change",
+    "survival": "flybys.survival",
 }
 
 __all__ = ["__version__", *_HOME]
 
 if TYPE_CHECKING:
-    from flybystab.aggregate.body import Body, Material
-    from flybystab.aggregate.equilibrium import equilibrium
-    from flybystab.aggregate.stability import stability
-    from flybystab.attitudes import periapsis_axes
+    from flybystab.body.body import Body, Material
+    from flybystab.body.equilibrium import equilibrium
+    from flybystab.body.stability import stability
+    from flybystab.catalogues.asteroid import Asteroid
+    from flybystab.catalogues.catalogue import catalogue
+    from flybystab.encounter.attitude import periapsis_axes
+    from flybystab.encounter.distribution import encounter_distribution
+    from flybystab.encounter.encounter import Encounter
     from flybystab.errors import FlybystabError
-    from flybystab.face.cite import cite
-    from flybystab.flyby_results import FlybyResult
-    from flybystab.flybys import flyby
-    from flybystab.many import flyby_many
-    from flybystab.margins import flyby_margin
-    from flybystab.odds import survival
-    from flybystab.outcome import Verdict
-    from flybystab.sky.distribution import encounter_distribution
-    from flybystab.sky.encounter import Encounter
-    from flybystab.sky.finder import find_encounters
-    from flybystab.sky.orbit import Orbit
-    from flybystab.spin import spin_sample
-    from flybystab.surfaces import surface_change
-    from flybystab.survey.asteroid import Asteroid
-    from flybystab.survey.catalogue import catalogue
-    from flybystab.survey.inference import infer
-    from flybystab.survey.screening import screen
+    from flybystab.flybys.flyby import flyby
+    from flybystab.flybys.flyby_many import flyby_many
+    from flybystab.flybys.margin import flyby_margin
+    from flybystab.flybys.result import FlybyResult
+    from flybystab.flybys.spin_sample import spin_sample
+    from flybystab.flybys.surface_change import surface_change
+    from flybystab.flybys.survival import survival
+    from flybystab.flybys.verdict import Verdict
+    from flybystab.io.citation import cite
+    from flybystab.orbit.orbit import Orbit
+    from flybystab.orbit.search.encounter_finder import find_encounters
+    from flybystab.screening.inference import infer
+    from flybystab.screening.screening import screen
     from flybystab.units import R_earth
 
 

@@ -1,5 +1,5 @@
 """``python -m flybystab``: the command line."""
 
-from flybystab.face.cli import main
+from flybystab.cli.main import main
 
 raise SystemExit(main())

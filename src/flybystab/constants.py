@@ -1,6 +1,6 @@
 """Physical constants in SI units, each with its source.
 
-Bodies of the solar system (GM, radius, J2, pole) live in :mod:`flybystab.sky.planets`.
+Bodies of the solar system (GM, radius, J2, pole) live in :mod:`flybystab.orbit.planets`.
 """
 
 from __future__ import annotations

@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 from scenes import axes_of, carried, deforming, kinetic, material, momentum, potential
 
-from flybystab.aggregate.body import Body
+from flybystab.body.body import Body
 from flybystab.constants import G
-from flybystab.core.ellipsoid import gravity_coefficients
-from flybystab.core.state import DISPERSED, FLOWING, FLUID
-from flybystab.core.tide import components, tide_panels
+from flybystab.core.dynamics.state import DISPERSED, FLOWING, FLUID
+from flybystab.core.ellipsoid.potential import gravity_coefficients
+from flybystab.core.ellipsoid.tide import components, tide_panels
 
 DENSITY = 2000 * u.kg / u.m**3
 RHO = 2000.0

@@ -18,7 +18,7 @@ from scenes import (
 )
 from scipy.spatial.transform import Rotation
 
-from flybystab.aggregate.body import Body
+from flybystab.body.body import Body
 
 DENSITY = 2000 * u.kg / u.m**3
 
@@ -166,7 +166,7 @@ def test_rotating_everything_together_changes_nothing():
     e = earth(2.0)
     body = PILE
     turn = Rotation.from_rotvec([0.3, -0.7, 0.5]).as_matrix()
-    from flybystab.core.tide import components, tensor
+    from flybystab.core.ellipsoid.tide import components, tensor
 
     tilted = e.tide._replace(
         coefficients=np.ascontiguousarray(components(turn @ tensor(e.tide.coefficients) @ turn.T))

@@ -14,11 +14,11 @@ from scipy.spatial.transform import Rotation
 from tests.scenes import PILE
 
 from flybystab import Body, Encounter, Material, flyby, flyby_many
-from flybystab.core.passage import passage
-from flybystab.course import rigid_course
-from flybystab.face.text import flyby_lines
-from flybystab.rows import span_of
-from flybystab.sky.planets import PLANETS
+from flybystab.core.dynamics.run import passage
+from flybystab.flybys.batch import span_of
+from flybystab.flybys.rigid_course import rigid_course
+from flybystab.io.text import flyby_lines
+from flybystab.orbit.planets import PLANETS
 
 MOON = PLANETS["moon"].radius
 STRONG = Material(cohesion=1 * u.MPa)

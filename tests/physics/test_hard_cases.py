@@ -19,17 +19,17 @@ from scenes import (
 )
 from scipy.spatial.transform import Rotation
 
-from flybystab.aggregate.body import YIELD_SURFACES, Body
-from flybystab.attitudes import periapsis_axes
-from flybystab.core import state
-from flybystab.core.rheology import required_friction
-from flybystab.core.tide import tensor
-from flybystab.core.workspace import ARREST, CONTACT, JAM, LOSS, ONSET
+from flybystab.body.body import YIELD_SURFACES, Body
+from flybystab.core.dynamics import state
+from flybystab.core.dynamics.workspace import ARREST, CONTACT, JAM, LOSS, ONSET
+from flybystab.core.ellipsoid.tide import tensor
+from flybystab.core.material.yield_surface import required_friction
+from flybystab.encounter.attitude import periapsis_axes
+from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
-from flybystab.flybys import flyby
-from flybystab.many import flyby_many
-from flybystab.sky.encounter import Encounter
-from flybystab.sky.planets import planet as find_planet
+from flybystab.flybys.flyby import flyby
+from flybystab.flybys.flyby_many import flyby_many
+from flybystab.orbit.planets import planet as find_planet
 
 DENSITY = 2000 * u.kg / u.m**3
 TILT = Rotation.from_euler("zxz", [30, 40, 70], degrees=True).as_matrix()
@@ -355,10 +355,10 @@ def test_looking_out_for_the_ground_changes_nothing():
 
 def test_frictionless_impulse_is_the_closed_form():
     """beta = 0 and no friction: L += -(tr L/tr S^-1) S^-1."""
-    from flybystab.core.contact import SLIDING, friction_impulse
-    from flybystab.core.passage import parameters
-    from flybystab.core.state import empty_buffers
-    from flybystab.core.tide import components
+    from flybystab.core.dynamics.impulse import SLIDING, friction_impulse
+    from flybystab.core.dynamics.run import parameters
+    from flybystab.core.dynamics.state import empty_buffers
+    from flybystab.core.ellipsoid.tide import components
 
     rng = np.random.default_rng(4)
     body = Body(semi_axes=[700, 500, 400] * u.m, density=DENSITY, material=material(0.0))

@@ -1,1 +1,1 @@
-"""Ground floor: compiled kernels on SI floats and small arrays. No objects with units, no astropy."""
+"""Compiled kernels on SI floats and small arrays; no objects with units, no astropy."""

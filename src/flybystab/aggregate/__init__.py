@@ -1,1 +1,0 @@
-"""What the asteroid is: its body, its material, its equilibrium and its stability."""

@@ -1,0 +1,205 @@
+"""Error against time of the flyby integrators, on one case with flow (reference flyby P1) and one without.
+
+The truth is the default integrator at a tolerance of 1e-12; errors are the largest relative ones of the
+semi-axes at the end. SciPy's Radau and DOP853 solve the same compiled right-hand side from the same onset to the
+same arrest: what they are spared is the location of events. How many steps Radau refuses depends on the last digits
+of its start: each is started at several of the first states of the flow, and medians are given. The rigid row is a
+pass at 3 radii; its error is that of the spin.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import astropy.units as u
+import numpy as np
+
+from flybystab.body.body import Body
+from flybystab.core.dynamics import rates as motion
+from flybystab.core.dynamics.moreau import follow_steps
+from flybystab.core.dynamics.run import parameters, passage
+from flybystab.core.dynamics.state import FLOWING, empty_buffers
+from flybystab.core.dynamics.verdict_row import N_ANSWER
+from flybystab.core.ellipsoid.tide import TidePanels, tensor
+from flybystab.encounter.encounter import Encounter
+from flybystab.flybys.batch import MAX_STEPS, buffers, judge_rows, one_row
+from flybystab.units import R_earth
+
+PHI = np.deg2rad(35.0)
+
+#: Starts of each SciPy run.
+STARTS = 9
+
+
+def case() -> tuple[Body, Encounter]:
+    """The pile and its passage at 2.2 radii: reference flyby P1."""
+    body = Body(semi_axes=[1400, 850, 750] * u.m, density=2000 * u.kg / u.m**3, spin_period=6 * u.h)
+    encounter = Encounter.hyperbolic(
+        "earth", periapsis=2.2 * R_earth, v_inf=5 * u.km / u.s, start_distance=10 * R_earth
+    )
+    return body, encounter
+
+
+def _best(run: Any, repeat: int) -> float:
+    """Least processor time of several runs, s: the least disturbed one. All of them use one core."""
+    times = []
+    for _ in range(repeat):
+        start = time.process_time()
+        run()
+        times.append(time.process_time() - start)
+    return min(times)
+
+
+def rows(figure: str | Path | None = None, repeat: int = 5) -> list[dict[str, Any]]:
+    """Rows of method, setting, relative error, processor time (s) and time over that of the default at 1e-6."""
+    body, e = case()
+    t0 = body.dynamical_time
+    a0 = float(np.cbrt(np.prod(body.axes)))
+    tide = TidePanels(e.tide.tau / t0, e.tide.start, e.tide.width, e.tide.coefficients * t0**2)
+
+    def default(tolerance: float, keep: int = 0) -> Any:
+        return passage(
+            body.axes, body.rho, body.omega, np.eye(3), e.t_start, e.t_stop, e.tide,
+            phi=PHI, tolerance=tolerance, keep=keep,
+        )  # fmt: skip
+
+    def kernel(tolerance: float, encounter: Encounter) -> Callable[[], None]:
+        """The compiled run alone, as `flyby` and `flyby_many` call it for each row."""
+        arguments = one_row(body, encounter)
+        return lambda: judge_rows(*arguments, tolerance, 6.0, MAX_STEPS, False, *buffers(0), answer)
+
+    def axes(shape: Any) -> Any:
+        return np.sqrt(np.linalg.eigvalsh(shape)[::-1])
+
+    exact = default(1e-12, keep=200_000)
+    truth = axes(exact.shape)
+    out: list[dict[str, Any]] = []
+    answer = np.empty((1, N_ANSWER))
+
+    def add(method: str, setting: str, shape: Any, cpu: float) -> None:
+        error = float(np.abs(axes(shape) / truth - 1.0).max())
+        out.append({"method": method, "setting": setting, "error_relative": error, "cpu_s": cpu})
+
+    for tolerance in (1e-3, 3e-4, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10):
+        run = default(tolerance)
+        add("default", f"tol {tolerance:.0e}", run.shape, _best(kernel(tolerance, e), repeat))
+
+    far = Encounter.hyperbolic(
+        "earth", periapsis=3.0 * R_earth, v_inf=5 * u.km / u.s, start_distance=10 * R_earth
+    )
+
+    def rigid(tolerance: float) -> Any:
+        return passage(
+            body.axes, body.rho, body.omega, np.eye(3), far.t_start, far.t_stop, far.tide, phi=PHI, tolerance=tolerance
+        )  # fmt: skip
+
+    gradients = [rigid(tolerance).velocity_gradient for tolerance in (1e-8, 1e-12)]
+    out.append(
+        {
+            "method": "default, rigid",
+            "setting": "no yield, tol 1e-08",
+            "error_relative": float(
+                np.linalg.norm(gradients[0] - gradients[1]) / np.linalg.norm(gradients[1])
+            ),
+            "cpu_s": _best(kernel(1e-8, far), 20),
+        }
+    )
+    par = parameters(body.axes, body.rho, PHI, 0.0, 0.0, 0)
+
+    def stepping(n: int) -> Any:
+        y = np.zeros(15)
+        y[:3] = (body.axes / a0) ** 2
+        y[12:15] = body.omega * t0
+        follow_steps(e.t_start / t0, e.t_stop / t0, n, y, par.copy(), tide, False, np.zeros(4))
+        return tensor(y[:6]) * a0**2
+
+    for n in (2000, 8000, 32000):
+        coarse, fine = stepping(n), stepping(2 * n)
+        cpu = _best(lambda n=n: (stepping(n), stepping(2 * n)), 2)
+        add("stepping", f"{n} and {2 * n} steps", 2.0 * fine - coarse, cpu)
+
+    # SciPy: from just after onset, where the flow is started as the default starts it, to just before arrest.
+    history = exact.history
+    flowing = np.flatnonzero(history["regime"] == FLOWING)
+    last = flowing[-1]
+    work = empty_buffers()
+
+    def numbers(i: int) -> Any:
+        gradient = history["velocity_gradient"][i] * t0
+        d, w = 0.5 * (gradient + gradient.T), 0.5 * (gradient - gradient.T)
+        shape = history["shape"][i] / a0**2
+        pick = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
+        return np.array([shape[p] for p in pick] + [d[p] for p in pick] + [w[2, 1], w[0, 2], w[1, 0]])
+
+    def derivative(t: float, y: Any) -> Any:
+        dy = np.zeros(15)
+        motion.rate(FLOWING, t, y, dy, par, tide, work)
+        return dy
+
+    from scipy.integrate import solve_ivp
+
+    target = axes(history["shape"][last])
+    for method, tolerances in (("Radau", (1e-4, 1e-6, 1e-8)), ("DOP853", (1e-4, 1e-6, 1e-8))):
+        for tolerance in tolerances:
+            found = []
+            for first in flowing[:STARTS]:
+                clock = time.process_time()
+                solution = solve_ivp(
+                    derivative,
+                    (history["time"][first] / t0, history["time"][last] / t0),
+                    numbers(first),
+                    method=method,
+                    rtol=tolerance,
+                    # |D| starts at 1e-10: its own tolerance must be below it
+                    atol=tolerance * 1e-4,
+                )
+                clock = time.process_time() - clock
+                shape = tensor(solution.y[:6, -1]) * a0**2
+                found.append((clock, float(np.abs(axes(shape) / target - 1.0).max())))
+            cpu, error = np.median(found, axis=0)
+            out.append(
+                {
+                    "method": f"SciPy {method}",
+                    "setting": f"rtol {tolerance:.0e}",
+                    "error_relative": float(error),
+                    "cpu_s": float(cpu),
+                }
+            )
+    reached = [r["cpu_s"] for r in out if r["method"] == "default" and r["error_relative"] <= 1e-6]
+    for row in out:
+        row["cpu_over_default_at_1e-6"] = row["cpu_s"] / min(reached)
+    if figure is not None:
+        _plot(out, figure)
+    return out
+
+
+def lines(rows: list[dict[str, Any]]) -> list[str]:
+    """The table as text."""
+    head = (
+        f"{'method':14s} {'setting':24s} {'rel. error':>10s} {'cpu (ms)':>10s} {'over default at 1e-6':>21s}"
+    )
+    return [head] + [
+        f"{r['method']:14s} {r['setting']:24s} {r['error_relative']:10.1e} {1e3 * r['cpu_s']:10.2f} "
+        f"{r['cpu_over_default_at_1e-6']:21.1f}"
+        for r in rows
+    ]
+
+
+def _plot(rows: list[dict[str, Any]], path: str | Path) -> None:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(6.0, 4.2), layout="constrained")
+    FigureCanvasAgg(figure)
+    panel: Any = figure.subplots()
+    for method, marker in zip(dict.fromkeys(r["method"] for r in rows), "oxs^Dv", strict=False):
+        points = [(r["cpu_s"] * 1e3, r["error_relative"]) for r in rows if r["method"] == method]
+        panel.loglog(*zip(*points, strict=True), marker=marker, label=method)
+    panel.set(
+        xlabel="processor time (ms)", ylabel="relative error of the semi-axes", title="Flyby P1, with flow"
+    )
+    panel.legend(frameon=False)
+    figure.savefig(path, dpi=150)

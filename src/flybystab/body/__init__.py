@@ -1,0 +1,1 @@
+"""The rubble pile: body, material, equilibrium and stability."""

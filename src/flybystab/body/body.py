@@ -1,0 +1,214 @@
+"""The asteroid as a homogeneous ellipsoidal rubble pile: its material, shape, density and spin."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from difflib import get_close_matches
+from typing import Any
+
+import astropy.units as u
+import numpy as np
+from astropy.units import Quantity
+from numpy.typing import NDArray
+
+from flybystab.constants import G
+from flybystab.errors import InvalidInput, UnitMismatch, UnknownName
+from flybystab.units import brief, frozen, to_si
+
+#: Yield surfaces, in the order of their integer codes in :mod:`flybystab.core.material.yield_surface`.
+YIELD_SURFACES = ("drucker-prager", "drucker-prager-extension", "mohr-coulomb", "matsuoka-nakai")
+#: Bulk densities of an asteroid, kg/m3: below the lightest comets, above the heaviest metal. What lies beyond is a
+#: slip, mostly of the unit.
+DENSITY_RANGE = (50.0, 25_000.0)
+
+
+@dataclass(frozen=True)
+class Material:
+    """A rigid, perfectly plastic granular material (theory, section 3).
+
+    Parameters
+    ----------
+    friction_angle : Quantity
+        Angle of internal friction, in [0, 90) deg.
+    cohesion : Quantity
+        Mohr-Coulomb cohesion ``Y`` (shear strength at zero pressure), Pa.
+    dilatancy : float
+        Below 1 the flow goes along the stress deviator with ``tr D = beta |D'|``, ``beta`` this share of the least
+        slope ``k`` of the yield surface; 0 preserves volume. 1 is associative: ``D`` along the true normal.
+    yield_surface : str
+        One of :data:`YIELD_SURFACES`; the default is the cone through triaxial compression.
+    brittle : bool
+        Whether cohesion is lost for good at first yield.
+    bulk_modulus : Quantity or None
+        Plastic bulk modulus ``kappa`` of the energy criterion, Pa; None leaves it out.
+
+    Raises
+    ------
+    InvalidInput, UnitMismatch, UnknownName
+    """
+
+    friction_angle: Quantity = field(default_factory=lambda: 35.0 * u.deg)
+    cohesion: Quantity = field(default_factory=lambda: 0.0 * u.Pa)
+    dilatancy: float = 0.0
+    yield_surface: str = "drucker-prager"
+    brittle: bool = False
+    bulk_modulus: Quantity | None = None
+
+    phi: float = field(init=False, repr=False)  #: friction angle, rad
+    c_pa: float = field(init=False, repr=False)  #: cohesion, Pa
+
+    def __post_init__(self) -> None:
+        phi_deg = to_si(self.friction_angle, u.deg, "friction_angle", low=0.0, high=90.0, open_high=True)
+        object.__setattr__(self, "phi", float(np.deg2rad(phi_deg)))
+        object.__setattr__(self, "c_pa", to_si(self.cohesion, u.Pa, "cohesion", low=0.0))
+        dilatancy = to_si(self.dilatancy, u.dimensionless_unscaled, "dilatancy", low=0.0, high=1.0)
+        object.__setattr__(self, "dilatancy", dilatancy)
+        if self.yield_surface not in YIELD_SURFACES:
+            near = get_close_matches(str(self.yield_surface), YIELD_SURFACES, cutoff=0.4)
+            raise UnknownName("yield surface", str(self.yield_surface), near, f"(known: {YIELD_SURFACES})")
+        if not isinstance(self.brittle, bool | np.bool_):
+            raise InvalidInput("brittle", self.brittle, "True or False")
+        if self.bulk_modulus is not None:
+            to_si(self.bulk_modulus, u.Pa, "bulk_modulus", low=0.0)
+
+    @property
+    def surface_code(self) -> int:
+        """Integer code of the yield surface in the kernels."""
+        return YIELD_SURFACES.index(self.yield_surface)
+
+    def with_(self, **changes: Any) -> Material:
+        """A copy with some parameters changed."""
+        return replace(self, **changes)
+
+    def __repr__(self) -> str:
+        more = [f"dilatancy {self.dilatancy:g}"] if self.dilatancy else []
+        more += ["brittle"] if self.brittle else []
+        more += [] if self.bulk_modulus is None else [f"bulk modulus {brief(self.bulk_modulus)}"]
+        said = [self.yield_surface, brief(self.friction_angle), brief(self.cohesion), *more]
+        return f"<Material {', '.join(said)}>"
+
+
+def check_body(body: Any) -> None:
+    """Raise InvalidInput for what is no body."""
+    if not isinstance(body, Body):
+        raise InvalidInput("body", body, "a flybystab.Body (of an asteroid: asteroid.body)")
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A homogeneous ellipsoid of granular material.
+
+    Parameters
+    ----------
+    semi_axes : Quantity, shape (3,)
+        ``a1 >= a2 >= a3``.
+    density : Quantity
+        Bulk density, within :data:`DENSITY_RANGE`.
+    spin_period : Quantity, optional
+        Period of steady rotation about ``+a3``; negative for ``-a3``. Neither this nor `spin`: no spin.
+    spin : Quantity, shape (3,), optional
+        Angular velocity along the axes ``a1, a2, a3``, for bodies that tumble.
+    material : Material, optional
+        35 degrees of friction and no cohesion by default.
+    dispersed : bool, optional
+        Whether an encounter has drawn the body apart: its density may then be below that of any asteroid.
+
+    Attributes
+    ----------
+    axes, rho, omega : ndarray (3,), float, ndarray (3,)
+        The same in SI floats: m, kg/m3, rad/s.
+
+    Raises
+    ------
+    InvalidInput, UnitMismatch
+    """
+
+    semi_axes: Quantity
+    density: Quantity
+    spin_period: Quantity | None = None
+    spin: Quantity | None = None
+    material: Material = field(default_factory=Material)
+    dispersed: bool = field(default=False, repr=False, kw_only=True)
+
+    axes: NDArray[np.float64] = field(init=False, repr=False, compare=False)
+    rho: float = field(init=False, repr=False, compare=False)
+    omega: NDArray[np.float64] = field(init=False, repr=False, compare=False)
+
+    def __post_init__(self) -> None:
+        axes = to_si(self.semi_axes, u.m, "semi_axes", shape=(3,), low=0.0, open_low=True)
+        if not (axes[0] >= axes[1] >= axes[2]):
+            raise InvalidInput(
+                "semi_axes", self.semi_axes, "a1 >= a2 >= a3 (sort them: a3 is the short axis)"
+            )
+        if not isinstance(self.material, Material):
+            raise InvalidInput("material", self.material, "a Material")
+        if self.spin_period is not None and self.spin is not None:
+            raise InvalidInput("spin", self.spin, "either spin_period or spin, not both")
+        omega = np.zeros(3)
+        if self.spin_period is not None:
+            period = to_si(self.spin_period, u.s, "spin_period")
+            if period == 0.0:
+                raise InvalidInput(
+                    "spin_period", self.spin_period, "a period other than zero (leave it out for no spin)"
+                )
+            omega[2] = 2.0 * np.pi / period
+        elif self.spin is not None:
+            if u.Hz in getattr(getattr(self.spin, "unit", None), "bases", ()):
+                raise UnitMismatch("spin", self.spin, "rad / s: hertz may count turns or radians")
+            with u.set_enabled_equivalencies(u.dimensionless_angles()):
+                omega = to_si(self.spin, u.rad / u.s, "spin", shape=(3,))
+        rho = to_si(self.density, u.kg / u.m**3, "density", low=0.0, open_low=True)
+        least, most = DENSITY_RANGE
+        if not (self.dispersed or least <= rho <= most):
+            raise InvalidInput(
+                "density", self.density, f"{least:g} to {most:g} kg / m3 (1 g / cm3 is 1000 kg / m3)"
+            )
+        for name in ("semi_axes", "density", "spin_period", "spin"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, frozen(getattr(self, name)))
+        for name, value in (("axes", axes), ("rho", rho), ("omega", omega)):
+            if isinstance(value, np.ndarray):
+                value.setflags(write=False)
+            object.__setattr__(self, name, value)
+
+    @property
+    def volume(self) -> Quantity:
+        """Volume, m3."""
+        return 4.0 / 3.0 * np.pi * float(np.prod(self.axes)) * u.m**3
+
+    @property
+    def mass(self) -> Quantity:
+        """Mass, kg."""
+        return self.rho * self.volume.value * u.kg
+
+    @property
+    def mean_radius(self) -> Quantity:
+        """Radius of the sphere of equal volume, m."""
+        return float(np.cbrt(np.prod(self.axes))) * u.m
+
+    @property
+    def inertia(self) -> Quantity:
+        """Principal moments of inertia ``(m/5)(a_j^2 + a_k^2)``, kg m2."""
+        s = self.axes**2
+        return self.mass.value / 5.0 * (s.sum() - s) * u.kg * u.m**2
+
+    @property
+    def dynamical_time(self) -> float:
+        """``1/sqrt(pi G rho)``, s: the unit of time of the kernels."""
+        return float(1.0 / np.sqrt(np.pi * G * self.rho))
+
+    def with_(self, **changes: Any) -> Body:
+        """A copy with some parameters changed; `spin` replaces `spin_period` and the reverse."""
+        if "spin" in changes and "spin_period" not in changes:
+            changes["spin_period"] = None
+        elif "spin_period" in changes and "spin" not in changes:
+            changes["spin"] = None
+        return replace(self, **changes)
+
+    def __repr__(self) -> str:
+        spin = "no spin"
+        if self.spin_period is not None:
+            spin = f"turns in {brief(self.spin_period)}"
+        elif self.spin is not None and np.any(self.omega != 0.0):
+            spin = f"spin {brief(self.spin)}"
+        return f"<Body {brief(self.semi_axes)}, {brief(self.density)}, {spin}, {repr(self.material)[10:-1]}>"

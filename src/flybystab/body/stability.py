@@ -1,0 +1,365 @@
+"""Structural stability of a rubble pile: the energy criterion of theory.md, section 5.
+
+Three questions, weakest first: is the body admissible (its stress inside the yield surface); is it stable to
+infinitesimal pushes; and how strong a push does it stand. A push is a rate of strain held for a while, seen
+from the frame in which the body has no relative angular momentum, with the angular momentum itself held. Its
+kinetic energy is ``K(0) + t P1 + t^2/2 P2 + t^3/6 P3 + ...``: friction takes ``-P1`` and a push goes on once
+what gravity and spin give (``P2``) has overcome it. The critical energy and strain are the least over all six
+directions of strain, at second order (certified), third order and from the whole barrier along paths of
+constant velocity gradient, up to the axis ratio of 6:1 at which the homogeneous model ends. The three side by side
+show what the approximation is worth: the two series are taken at the strain of rest, and where they differ from the
+barrier the critical strain is far from small. The full dynamics of a pushed body
+(:mod:`flybystab.body.recovery`) is the judge; ``python benchmarks/stability.py push`` holds the three against it.
+
+With a plastic bulk modulus ``kappa`` the pressure falls as the material dilates, ``pdot = -kappa tr D``. Under strictly
+associative flow it has no say: the work of the stress does not depend on the pressure.
+These results are derived from the governing equations of Sharma (2013, sections 1-3); the later sections of
+that paper were not available, and its figures are not claimed to be reproduced.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import astropy.units as u
+import numpy as np
+from astropy.units import Quantity
+from numpy.typing import NDArray
+
+from flybystab.body.body import Body, check_body
+from flybystab.body.equilibrium import Equilibrium, equilibrium, spin_limits
+from flybystab.constants import G
+from flybystab.core.ellipsoid.potential import carlson_fd
+from flybystab.core.ellipsoid.tide import tensor
+from flybystab.core.energy import stability_row as columns
+from flybystab.core.energy.perturbation import loss_at, pile, powers, rate_of_strain, slope_of_flow
+from flybystab.core.energy.stability_row import classify
+from flybystab.errors import InvalidInput
+from flybystab.units import to_si
+
+Array = NDArray[np.float64]
+
+LEVELS = (
+    "inadmissible",
+    "admissible",
+    "stable to infinitesimal pushes",
+    "stable to finite pushes at second order",
+)
+
+
+class Orders(NamedTuple):
+    """A result at second order, third order and from the barrier."""
+
+    second: Any
+    third: Any
+    barrier: Any
+
+
+class BodyUnits(NamedTuple):
+    """Units of the energy kernels for one body: mean radius, and time, energy, stress and momentum, in SI."""
+
+    length: float
+    time: float
+    energy: float
+    stress: float
+    momentum: float
+
+
+def body_units(body: Body) -> BodyUnits:
+    """Units in which the mean radius, the density and ``pi G rho`` of a body are one."""
+    a = float(np.cbrt(np.prod(body.axes)))
+    t = body.dynamical_time
+    stress = np.pi * G * body.rho**2 * a**2
+    return BodyUnits(a, t, stress * a**3, stress, body.rho * a**5 / t)
+
+
+@dataclass(frozen=True)
+class Stability:
+    """What the energy criterion says of a body.
+
+    Attributes
+    ----------
+    body : Body
+        The body.
+    equilibrium : Equilibrium
+        Its stress and required friction.
+    dilatancy : float
+        ``beta/min k`` of the test; 1 is associative flow.
+    level : int
+        0 inadmissible, 1 admissible, 2 stable to infinitesimal pushes, 3 stable to finite ones of any direction
+        at second order; :data:`LEVELS` names them.
+    admissible, stable_infinitesimal : bool
+        The first two tests. Strictly inside the yield surface friction stops any small enough push; on it
+        ``P2 < 0`` along the direction that flows first decides.
+    critical_energy : Orders of Quantity
+        Least kinetic energy of deformation, J, that a push needs to overcome friction; inf where no push of
+        that order does. The barrier is the least energy that leads past a maximum of the energy lost or out of
+        the model (`barrier_kind`): with less a push comes to rest.
+    critical_strain : Orders of float
+        Least strain ``e t`` (measured with ``|D'| = 1``) at which a push begins to grow, at second and third
+        order; for the barrier, the strain at which the least barrier is passed. In a direction at the apex
+        of the yield surface ``tr D = k`` instead measures it.
+    directions : Orders of ndarray, shape (3, 3)
+        Rate of strain in body axes that has the least critical energy.
+    direction : ndarray, shape (3, 3)
+        The one of the second order.
+    at_apex : Orders of bool
+        Whether that direction dilates faster than the friction asks for (apex of the yield surface).
+    barrier_kind : str
+        "maximum": past the barrier the push gains energy; "edge": there the axis ratio passes 6:1, while friction is
+        still the stronger; "dispersal": the body expands for ever; "none": no push of this size leads anywhere;
+        "inadmissible": it does not stand in the first place.
+    spread : float
+        Largest over least critical energy of the three orders, less one: the error of the approximation.
+    binding_energy : Quantity
+        ``(3/5) G m^2 R_F``, J, for scale.
+    curvature_at_yield : float
+        ``Phi''/(p V)`` along the direction that flows first if only the required friction were there;
+        negative: the body lives on friction that it does not need for equilibrium. nan without a deviator.
+    stable_at_yield : bool
+        Whether that is positive.
+    kappa_crit : Quantity or None
+        Plastic bulk modulus above which a body at yield is unstable, Pa; None for associative or
+        volume-preserving flow, on which ``kappa`` has no say.
+    spin_limits : Quantity, shape (2,)
+        Slowest and fastest spin about ``a3``, rad/s, that the shape and material bear.
+    critical_momentum : Quantity, shape (2,)
+        Angular momentum about ``a3``, kg m2/s, to be taken away or added until one of them is met; nan for
+        bodies that do not spin about ``a3``. Pushes that add angular momentum are judged by this, not by the
+        critical energy.
+    steady : bool
+        Whether the spin is about a principal axis; a tumbling body is judged at its present instant.
+    """
+
+    body: Body
+    equilibrium: Equilibrium
+    dilatancy: float
+    level: int
+    admissible: bool
+    stable_infinitesimal: bool
+    critical_energy: Orders
+    critical_strain: Orders
+    directions: Orders
+    at_apex: Orders
+    barrier_kind: str
+    spread: float
+    binding_energy: Quantity
+    curvature_at_yield: float
+    stable_at_yield: bool
+    kappa_crit: Quantity | None
+    spin_limits: Quantity
+    critical_momentum: Quantity
+    steady: bool
+
+    @property
+    def direction(self) -> Array:
+        """Rate of strain in body axes with the least critical energy at second order."""
+        return np.asarray(self.directions.second)
+
+    @property
+    def verdict(self) -> str:
+        """The level in words."""
+        return LEVELS[self.level]
+
+    def __repr__(self) -> str:
+        energies = [f"{float(e / self.binding_energy):.3g}" for e in self.critical_energy]
+        return (
+            f"<Stability {self.verdict}; critical energy over binding energy {', '.join(energies)} "
+            "(second order, third order, barrier)>"
+        )
+
+
+def stability(body: Body, *, dilatancy: float | None = 1.0) -> Stability:
+    """Three levels of stability of a body, with the energy and strain of the weakest push.
+
+    Parameters
+    ----------
+    body : Body
+        With its spin and material.
+    dilatancy : float or None
+        ``beta/min k``: 1 (default) is associative flow, the classical energy criterion; 0 preserves volume;
+        None takes that of the material.
+
+    Returns
+    -------
+    Stability
+    """
+    check_body(body)
+    m = body.material
+    beta = m.dilatancy if dilatancy is None else dilatancy
+    beta = to_si(beta, u.dimensionless_unscaled, "dilatancy", low=0.0, high=1.0)
+    units = body_units(body)
+    row = np.empty(columns.COLUMNS)
+    found = np.empty((columns.DIRECTIONS, 5))
+    kappa = 0.0 if m.bulk_modulus is None else m.bulk_modulus.to_value(u.Pa)
+    arguments: Any = (
+        *(body.axes**2),
+        body.omega * units.time,
+        m.surface_code,
+        m.phi,
+        m.c_pa / units.stress,
+        beta,
+        kappa / units.stress,
+    )
+    arguments_and_out: Any = (*arguments, 5, row, found)
+    classify(*arguments_and_out)
+    scene = pile(*arguments)
+    e = equilibrium(body)
+    energies = Orders(
+        *(row[i] * units.energy * u.J for i in (columns.ENERGY_2, columns.ENERGY_3, columns.ENERGY_B))
+    )
+    strains = Orders(*(float(row[i]) for i in (columns.STRAIN_2, columns.STRAIN_3, columns.STRAIN_B)))
+    values = np.array([q.value for q in energies])
+    finite = np.all(np.isfinite(values)) and values.min() > 0.0
+    steady = np.count_nonzero(body.omega) <= 1
+    limits = spin_limits(body)
+    rate = abs(body.omega[2])
+    about_a3 = body.omega[0] == 0.0 and body.omega[1] == 0.0
+    j3 = body.inertia[2].to_value(u.kg * u.m**2)
+    margin = (
+        np.array([rate - limits[0].value, limits[1].value - rate]) * j3 if about_a3 else np.full(2, np.nan)
+    )
+    curvature = float(row[columns.CURVATURE])
+    binding = 0.6 * G * body.mass.value**2 * _inverse_radius(body)
+    directions = [_strain_rate(scene, found[i]) for i in (0, 2, 4)]
+    return Stability(
+        body=body,
+        equilibrium=e,
+        dilatancy=beta,
+        level=int(row[columns.LEVEL]),
+        admissible=bool(row[columns.LEVEL] >= 1),
+        stable_infinitesimal=bool(row[columns.LEVEL] >= 2),
+        critical_energy=energies,
+        critical_strain=strains,
+        directions=Orders(*(d for d, _ in directions)),
+        at_apex=Orders(*(a for _, a in directions)),
+        barrier_kind=_kind(scene, found[4], row),
+        spread=float(values.max() / values.min() - 1.0) if finite else np.inf,
+        binding_energy=binding * u.J,
+        curvature_at_yield=curvature,
+        stable_at_yield=bool(curvature > 0.0),
+        kappa_crit=None if np.isnan(row[columns.KAPPA]) else row[columns.KAPPA] * units.stress * u.Pa,
+        spin_limits=limits,
+        critical_momentum=margin * u.kg * u.m**2 / u.s,
+        steady=bool(steady),
+    )
+
+
+@dataclass(frozen=True)
+class Push:
+    """One push: its powers, and the barrier against strain along its path.
+
+    Attributes
+    ----------
+    direction : ndarray, shape (3, 3)
+        Rate of strain in body axes, ``|D'| = 1``.
+    powers : tuple of Quantity
+        ``P1, P2, P3``, J: the kinetic energy is ``K(0) + t P1 + t^2/2 P2 + t^3/6 P3`` at strain ``t``.
+    strain : ndarray
+        Strains.
+    loss : Orders of Quantity
+        Kinetic energy lost at these strains, J: to second order, to third order, and whole.
+    """
+
+    direction: Array
+    powers: tuple[Quantity, Quantity, Quantity]
+    strain: Array
+    loss: Orders
+
+
+def push(body: Body, direction: Any, strain: Any, *, dilatancy: float = 1.0) -> Push:
+    """Kinetic energy that a push in a given direction loses, against strain.
+
+    Parameters
+    ----------
+    body : Body
+        The body.
+    direction : array_like, shape (3, 3)
+        Symmetric rate of strain in body axes; only its deviator counts, scaled to one. The trace follows from
+        `dilatancy`.
+    strain : array_like
+        Strains at which the loss is wanted.
+
+    Returns
+    -------
+    Push
+    """
+    d = unit_deviator(direction)
+    r2, r6 = np.sqrt(2.0), np.sqrt(6.0)
+    x = np.array(
+        [
+            (d[0, 0] - d[1, 1]) / r2,
+            (d[0, 0] + d[1, 1] - 2 * d[2, 2]) / r6,
+            r2 * d[0, 1],
+            r2 * d[0, 2],
+            r2 * d[1, 2],
+        ]
+    )
+    m = body.material
+    units = body_units(body)
+    arguments: Any = (
+        *(body.axes**2),
+        body.omega * units.time,
+        m.surface_code,
+        m.phi,
+        m.c_pa / units.stress,
+        to_si(dilatancy, u.dimensionless_unscaled, "dilatancy", low=0.0, high=1.0),
+        0.0 if m.bulk_modulus is None else m.bulk_modulus.to_value(u.Pa) / units.stress,
+    )
+    scene = pile(*arguments)
+    p1, p2, p3 = powers(scene, x)
+    t = np.asarray(strain, dtype=float)
+    second = -(t * p1 + t**2 / 2 * p2)
+    whole = np.array([_loss(scene, x, ti) for ti in t.ravel()]).reshape(t.shape)
+    joule = units.energy * u.J
+    return Push(
+        direction=_strain_rate(scene, x)[0],
+        powers=(p1 * joule, p2 * joule, p3 * joule),
+        strain=t,
+        loss=Orders(second * joule, (second - t**3 / 6 * p3) * joule, whole * joule),
+    )
+
+
+def _kind(scene: Any, x: Array, row: Array) -> str:
+    """What ends the least barrier."""
+    if row[columns.LEVEL] < 1:
+        return "inadmissible"
+    energy, strain = row[columns.ENERGY_B], row[columns.STRAIN_B]
+    if not np.isfinite(energy):
+        return "none"
+    if not np.isfinite(strain):
+        return "dispersal"
+    ahead = loss_at(scene, x, strain + 0.01) if strain > 0.0 else -np.inf
+    return "edge" if ahead > energy else "maximum"
+
+
+def _loss(scene: Any, x: Array, t: float) -> float:
+    """Energy that the push has lost at strain `t`, in the units of the kernels."""
+    return float(loss_at(scene, x, t))
+
+
+def _strain_rate(scene: Any, x: Array) -> tuple[Array, bool]:
+    """Rate of strain tensor of a direction, and whether it is at the apex."""
+    if not np.all(np.isfinite(x)):
+        return np.full((3, 3), np.nan), False
+    _, trace = slope_of_flow(scene, x)
+    d = np.empty(6)
+    rate_of_strain(x, trace, d)
+    return tensor(d), bool(np.sum(x * x) < 1.0 - 1e-6)
+
+
+def _inverse_radius(body: Body) -> float:
+    """``R_F(a1^2, a2^2, a3^2)``, 1/m."""
+    return float(carlson_fd(*(body.axes**2))[0])
+
+
+def unit_deviator(direction: Any) -> Array:
+    """Deviator (3, 3) of the symmetric part of a rate of strain, scaled to ``|D'| = 1``."""
+    d = to_si(direction, u.dimensionless_unscaled, "direction", shape=(3, 3))
+    d = 0.5 * (d + d.T)
+    d = d - np.trace(d) / 3.0 * np.eye(3)
+    size = np.linalg.norm(d)
+    if size == 0.0:
+        raise InvalidInput("direction", direction, "a rate of strain with a deviator")
+    return d / size

@@ -1,0 +1,1 @@
+"""Asteroids and the formats in which their data are published."""

@@ -1,0 +1,265 @@
+"""One asteroid of a catalogue: its body and its orbit, built from its record."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import astropy.units as u
+import numpy as np
+from astropy.time import Time
+from astropy.units import Quantity
+
+from flybystab.body.body import Body, Material
+from flybystab.catalogues.covariance_files import embedded_covariance
+from flybystab.catalogues.record import BODILY, ORBIT, ORBIT_SI, ORBITAL, SHAPE, Record
+from flybystab.catalogues.tumbling import attitude_matrix, ecliptic_direction, free_spin, tumbling_state
+from flybystab.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from flybystab.orbit.covariance import Covariance
+    from flybystab.orbit.orbit import Orbit
+
+#: Version of the embedded table: the date of its newest source.
+CATALOGUE_DATE = "2026-07"
+
+
+@lru_cache(maxsize=64)
+def _day(jd: float) -> Time:
+    """A Julian date, TDB; most rows of a catalogue share theirs."""
+    whole = np.floor(jd)
+    return Time(whole, jd - whole, format="jd", scale="tdb")
+
+
+@dataclass(frozen=True, eq=False)
+class Asteroid(Record):
+    """One asteroid: a row of a catalogue, with its body and its orbit built on request.
+
+    Attributes
+    ----------
+    row : mapping of str to str
+        The row as it stands in the file.
+    material : Material
+        What the body is made of: a choice, not catalogue data. 35 degrees of friction by default.
+    file : str
+        Where the row comes from.
+    covariance : Covariance or None
+        How well the orbit is known, where a file says so; else see :attr:`orbit`.
+    """
+
+    row: Mapping[str, str]
+    material: Material = field(default_factory=Material)
+    file: str = f"embedded catalogue {CATALOGUE_DATE}"
+    covariance: Covariance | None = field(default=None, repr=False)
+
+    @classmethod
+    def from_catalogue(cls, name: str | int, material: Material | None = None) -> Asteroid:
+        """The asteroid of the embedded catalogue with this number, name or designation.
+
+        Parameters
+        ----------
+        name : str or int
+            "Apophis", 99942, "2004 MN4", "2004mn4", "(99942) Apophis": case and spaces do not count.
+        material : Material, optional
+            What it is made of.
+
+        Raises
+        ------
+        UnknownName
+            With near matches.
+        """
+        from flybystab.catalogues.catalogue import catalogue, find
+
+        return find(catalogue(), name, "the embedded catalogue").with_material(material)
+
+    @classmethod
+    def from_file(cls, path: str | Path, name: str | int, material: Material | None = None) -> Asteroid:
+        """The asteroid with this number, name or designation of a file with the catalogue's columns."""
+        from flybystab.catalogues.catalogue import catalogue, find
+
+        return find(catalogue(path), name, str(path)).with_material(material)
+
+    def with_material(self, material: Material | None) -> Asteroid:
+        """The same asteroid of another material (None: unchanged)."""
+        return self if material is None else replace(self, material=material)
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        # Without what was built from the row: it is rebuilt where it is needed.
+        return Asteroid, (dict(self.row), self.material, self.file, self.covariance)
+
+    def __repr__(self) -> str:
+        return f"<Asteroid {self.label}>"
+
+    def completed(self, other: Asteroid) -> Asteroid:
+        """The same asteroid; what its row does not know of its body and names is taken from another row."""
+        row = dict(self.row)
+        if other.row.get("name") and row.get("name", "") in ("", row.get("designation"), row.get("number")):
+            row["name"] = other.row["name"]
+        # A size or a period from elsewhere would not fit the shape and the spin state that go with it.
+        for c, v in other.row.items():
+            if c not in ORBITAL and (not row.get(c) or c in BODILY):
+                row[c] = v
+        return replace(self, row=row)
+
+    @property
+    def epoch(self) -> Time:
+        """Epoch of the elements, TDB."""
+        return _day(self._number("epoch_jd_tdb"))
+
+    @cached_property
+    def orbit(self) -> Orbit:
+        """The orbit, from the elements of the row with every digit, and A1, A2, A3 (zero where not known).
+
+        Its covariance is the asteroid's own; else the one embedded for it; else the diagonal of the row's
+        1-sigmas, marked as uncorrelated; else what digits and U say (:mod:`flybystab.catalogues.orbit_errors`);
+        else None.
+        """
+        from flybystab.orbit.forces import NonGravitational, au_per_day2
+        from flybystab.orbit.orbit import Orbit
+
+        epoch = self.epoch
+        elements = [self._number(c) * unit for c, unit in zip(ORBIT[1:], ORBIT_SI.tolist(), strict=True)]
+        a1, a2, a3 = (
+            au_per_day2(self._number(c)) if self.row.get(c) else 0.0
+            for c in ("A1_au_d2", "A2_au_d2", "A3_au_d2")
+        )
+        push = NonGravitational((a1, a2, a3))
+        return Orbit._from_si_elements(epoch, elements, push, self.name, self._covariance(epoch))
+
+    def _covariance(self, epoch: Time) -> Covariance | None:
+        if self.covariance is not None:
+            return self.covariance
+        if self.file.startswith("embedded") and (known := embedded_covariance(self.row.get("number", ""))):
+            return known
+        sigmas = tuple("sigma_" + c for c in ORBIT[1:])
+        if not self.knows(*sigmas):
+            from flybystab.catalogues.orbit_errors import error_of
+
+            return error_of(self.row, epoch)
+        from flybystab.orbit.covariance import SETS, Covariance
+
+        sigma = np.array([self._number(c) for c in sigmas]) * ORBIT_SI
+        source = self.row.get("sigma_source") or self.row.get("orbit_source") or self.file
+        return Covariance(
+            epoch,
+            SETS["keplerian"],
+            np.array([self._number(c) for c in ORBIT[1:]]) * ORBIT_SI,
+            np.diag(sigma**2),
+            f"1-sigmas without correlations, {source}",
+            correlated=False,
+        )
+
+    @property
+    def tumbles(self) -> bool:
+        """Whether the row has a complete tumbling solution (two periods and a mode)."""
+        return self.knows("tumbling_mode", "precession_period_h", "rotation_period_h")
+
+    @property
+    def semi_axes(self) -> Quantity:
+        """Semi-axes ``a >= b >= c``, m."""
+        return np.array([self._number(c) for c in SHAPE]) * u.m
+
+    @cached_property
+    def body(self) -> Body:
+        """The body, of the asteroid's `material`; a tumbler at phase zero of its rotation."""
+        return self.body_with()
+
+    def body_with(self, material: Material | None = None, *, phase: float = 0.0) -> Body:
+        """The body.
+
+        Parameters
+        ----------
+        material : Material, optional
+            Instead of the asteroid's own.
+        phase : float
+            For a tumbler: fraction of its rotation period, which fixes where the spin vector is in the body.
+
+        Returns
+        -------
+        Body
+            Spinning about its short axis, or with the angular velocity of the tumbling solution (a
+            homogeneous ellipsoid with the two observed periods). A tumbler without a solution spins about
+            its short axis with its main lightcurve period: `assumptions` says so.
+        """
+        material = material or self.material
+        density = self.quantity("density_kg_m3")
+        if not self.tumbles:
+            period = self.quantity("spin_period_h")
+            return Body(semi_axes=self.semi_axes, density=density, spin_period=period, material=material)
+        moments, momentum, j = self._tumbling
+        spin = free_spin(moments, momentum, j, np.array([phase]))[0][0]
+        return Body(semi_axes=self.semi_axes, density=density, spin=spin * u.rad / u.s, material=material)
+
+    @cached_property
+    def _tumbling(self) -> tuple[np.ndarray, float, float]:
+        """Moments of inertia per mass (m2) of the ellipsoid, angular momentum per mass, L^2/(2E) per mass."""
+        squares = self.semi_axes.value**2
+        moments = (squares.sum() - squares) / 5.0
+        precession, rotation = (
+            self._number(c) * 3600.0 for c in ("precession_period_h", "rotation_period_h")
+        )
+        return moments, *tumbling_state(moments, precession, rotation, self.row["tumbling_mode"])
+
+    @property
+    def pole(self) -> np.ndarray | None:
+        """Unit vector, ICRF, of the spin pole (angular momentum of a tumbler); None where not known."""
+        if not self.knows("pole_ecl_lon_deg", "pole_ecl_lat_deg"):
+            return None
+        lon, lat = (np.radians(self._number(c)) for c in ("pole_ecl_lon_deg", "pole_ecl_lat_deg"))
+        return ecliptic_direction(float(lon), float(lat))
+
+    def attitude(self, angle: Quantity, *, phase: float = 0.0, pole: Any = None) -> np.ndarray:
+        """Rotation from body axes to ICRF.
+
+        Parameters
+        ----------
+        angle : Quantity
+            Turn about the pole. No catalogue says at what angle an asteroid is at a date decades away.
+        phase : float
+            For a tumbler: the phase given to `body_with`.
+        pole : ndarray (3,), optional
+            Direction, ICRF, of the angular momentum instead of the catalogued one.
+
+        Returns
+        -------
+        ndarray (3, 3)
+
+        Raises
+        ------
+        InvalidInput
+            No pole is known and none is given.
+        """
+        direction = self.pole if pole is None else np.asarray(pole, dtype=float)
+        if direction is None:
+            raise InvalidInput("pole", "(unknown)", f"a direction: the catalogue has no pole of {self.label}")
+        momentum = np.array([0.0, 0.0, 1.0])
+        if self.tumbles:
+            moments, size, j = self._tumbling
+            momentum = moments * free_spin(moments, size, j, np.array([phase]))[0][0]
+        return attitude_matrix(momentum, direction, float(angle.to_value(u.rad)))
+
+    @property
+    def assumptions(self) -> tuple[str, ...]:
+        """What a reader must know before taking the body for measured, in words."""
+        out = []
+        if any(c in self.assumed for c in SHAPE):
+            out.append("shape from size and lightcurve amplitude")
+        if "density_kg_m3" in self.assumed:
+            out.append("density")
+        if self.pole is None:
+            out.append("pole unknown")
+        if "spin_state" in self.assumed:
+            out.append("principal-axis spin")
+        if "tumbling" in self.row.get("spin_state", "") and not self.tumbles:
+            out.append("tumbling replaced by principal-axis spin")
+        if self.row.get("unchecked"):
+            out.append("quoted, not checked: " + self.row["unchecked"].replace(";", ", "))
+        return tuple(out)
+
+
+def identity(asteroid: Asteroid) -> str:
+    """The number, designation or name that stands for an asteroid in the random streams and in a journal."""
+    return str(asteroid.number) if asteroid.number is not None else asteroid.designation or asteroid.name

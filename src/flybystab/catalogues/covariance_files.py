@@ -1,0 +1,24 @@
+"""Covariances that come with the package, by number of the asteroid (``data/covariances``)."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from importlib import resources
+from typing import TYPE_CHECKING
+
+from flybystab.catalogues.formats import from_neocc, from_sbdb_answer
+
+if TYPE_CHECKING:
+    from flybystab.orbit.covariance import Covariance
+
+
+@lru_cache(maxsize=64)
+def embedded_covariance(number: str) -> Covariance | None:
+    """Covariance of the orbit of a numbered asteroid, as its source published it; None where there is none."""
+    if not number.isdigit():
+        return None
+    for suffix, read in ((".json", from_sbdb_answer), (".ke1", from_neocc)):
+        file = resources.files("flybystab.data").joinpath("covariances", number + suffix)
+        if file.is_file():
+            return read(file.read_text(encoding="utf-8"), number + suffix)[1]
+    return None

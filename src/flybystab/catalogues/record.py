@@ -1,0 +1,191 @@
+"""The record of an asteroid: what a row of a catalogue says, each value with its unit and its source.
+
+A value that nobody measured is flagged as assumed. The columns are explained in ``data/README.md``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cached_property
+from types import MappingProxyType
+from typing import Any
+
+import astropy.units as u
+import numpy as np
+from astropy.units import Quantity
+
+from flybystab.body.body import DENSITY_RANGE
+from flybystab.errors import InvalidInput
+
+_LENGTH = ("semi_axis_a_m", "semi_axis_b_m", "semi_axis_c_m", "diameter_m")
+_HOURS = ("spin_period_h", "precession_period_h", "rotation_period_h")
+_ANGLES = ("i_deg", "node_deg", "peri_deg", "M_deg")
+
+#: Unit of every numeric column.
+UNITS: Mapping[str, u.UnitBase] = MappingProxyType(
+    dict.fromkeys(_LENGTH, u.m)
+    | {c[:-2] + "_sigma_m": u.m for c in _LENGTH}
+    | dict.fromkeys(_HOURS, u.h)
+    | {c[:-2] + "_sigma_h": u.h for c in _HOURS}
+    | {"density_kg_m3": u.kg / u.m**3, "density_sigma_kg_m3": u.kg / u.m**3}
+    | dict.fromkeys(("pole_ecl_lon_deg", "pole_ecl_lat_deg", *_ANGLES), u.deg)
+    | {"sigma_" + c: u.deg for c in _ANGLES}
+    | {"H_mag": u.mag, "amplitude_mag": u.mag, "epoch_jd_tdb": u.d, "a_au": u.au, "sigma_a_au": u.au}
+    | dict.fromkeys(("A1_au_d2", "A2_au_d2", "A3_au_d2"), u.au / u.d**2)
+    | dict.fromkeys(
+        ("e", "sigma_e", "inertia_a_over_c", "inertia_b_over_c", "condition_code"), u.dimensionless_unscaled
+    )
+)
+
+#: Text columns.
+TEXTS = (
+    *(
+        "number",
+        "name",
+        "designation",
+        "aliases",
+        "orbit_class",
+        "pha",
+        "taxonomic_class",
+        "taxonomic_source",
+    ),
+    *("binary", "shape_kind", "semi_axes_source", "diameter_source", "spin_state", "spin_source"),
+    *("amplitude_source", "pole_source", "tumbling_mode", "tumbling_source", "density_assumed"),
+    *("density_source", "frame", "sigma_source", "nongrav_source", "orbit_solution"),
+    *("condition_code_source", "orbit_source", "assumed", "unchecked", "notes"),
+)
+
+#: Epoch and elements, and the factors of the elements to SI.
+ORBIT = ("epoch_jd_tdb", "a_au", "e", "i_deg", "node_deg", "peri_deg", "M_deg")
+ORBIT_SI = np.array([UNITS[c].si.scale for c in ORBIT[1:]])
+#: Columns of an orbit: kept as they are when a row is completed from another.
+ORBITAL = frozenset(
+    {*ORBIT, "A1_au_d2", "A2_au_d2", "A3_au_d2", "frame", "sigma_source", "nongrav_source"}
+    | {"sigma_" + c for c in ORBIT[1:]}
+    | {"orbit_solution", "orbit_source", "condition_code", "condition_code_source"}
+)
+#: Columns that belong together: taken from the completing row as a whole.
+BODILY = frozenset(
+    c for c in (*UNITS, *TEXTS) if c.startswith(("semi_axis", "semi_axes", "diameter", "spin_"))
+)
+#: Semi-axes.
+SHAPE = ("semi_axis_a_m", "semi_axis_b_m", "semi_axis_c_m")
+
+
+#: Smallest and largest value that a cell may have: what is beyond is a slip, mostly of the unit.
+LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType(
+    dict.fromkeys(_LENGTH, (0.05, 5e6))
+    | dict.fromkeys(_HOURS, (1e-4, 1e5))
+    | {c: (0.0, np.inf) for c in UNITS if "sigma" in c}
+    | {"density_kg_m3": DENSITY_RANGE, "e": (0.0, np.inf), "amplitude_mag": (0.0, 5.0)}
+    | {"i_deg": (0.0, 180.0), "pole_ecl_lat_deg": (-90.0, 90.0)}
+)
+
+
+def key_of(name: object) -> str:
+    """A name as it is compared: no case, no spaces, no brackets."""
+    return "".join(c for c in str(name).casefold() if not c.isspace() and c not in "()_")
+
+
+class Record:
+    """A row of a catalogue; text in the file, numbers with units here.
+
+    Attributes
+    ----------
+    row : mapping of str to str
+        The row as it stands in the file.
+    file : str
+        Where the row comes from.
+    """
+
+    row: Mapping[str, str]
+    file: str
+
+    @property
+    def name(self) -> str:
+        """Name, or designation where there is none."""
+        return self.row.get("name") or self.row.get("designation") or self.row.get("number") or "unnamed"
+
+    @property
+    def number(self) -> int | None:
+        """IAU number."""
+        text = self.row.get("number", "")
+        return int(text) if text.isdigit() else None
+
+    @property
+    def designation(self) -> str:
+        """Principal designation."""
+        return self.row.get("designation", "")
+
+    @property
+    def label(self) -> str:
+        """Number and name, as astronomers write them."""
+        return self.name if self.number is None else f"({self.number}) {self.name}"
+
+    @cached_property
+    def names(self) -> tuple[str, ...]:
+        """Everything it can be found by."""
+        row = self.row
+        found = [row.get("name", ""), row.get("number", ""), row.get("designation", "")]
+        found += row.get("aliases", "").split(";")
+        found += [
+            f"{self.number} {n}" for n in (row.get("name"), row.get("designation")) if self.number and n
+        ]
+        return tuple(dict.fromkeys(n.strip() for n in found if n and n.strip()))
+
+    @cached_property
+    def assumed(self) -> tuple[str, ...]:
+        """Columns whose values nobody measured."""
+        return tuple(c for c in self.row.get("assumed", "").split(";") if c)
+
+    @cached_property
+    def measured(self) -> tuple[str, ...]:
+        """Numeric columns with a measured value."""
+        return tuple(c for c in UNITS if self.row.get(c) and c not in self.assumed)
+
+    @cached_property
+    def sources(self) -> Mapping[str, str]:
+        """Where each group of values comes from, e.g. ``sources["density"]``."""
+        found = {c.removesuffix("_source"): v for c, v in self.row.items() if c.endswith("_source") and v}
+        return MappingProxyType(found)
+
+    @cached_property
+    def record(self) -> Mapping[str, Any]:
+        """The whole row: a Quantity where the column has a unit, text otherwise, None where unknown."""
+        return MappingProxyType(
+            {
+                c: (self.quantity(c) if self.row.get(c) else None) if c in UNITS else self.row.get(c, "")
+                for c in (*TEXTS, *UNITS)
+            }
+        )
+
+    def quantity(self, column: str) -> Quantity:
+        """Value of a numeric column with its unit.
+
+        Raises
+        ------
+        InvalidInput
+            The cell is empty, not a finite number, or out of its :data:`LIMITS`.
+        """
+        return self._number(column) * UNITS[column]
+
+    def _number(self, column: str) -> float:
+        text = self.row.get(column, "")
+        if not text:
+            raise InvalidInput(column, "(empty)", f"a value for {self.label} in {self.file}")
+        try:
+            value = float(text)
+        except ValueError:
+            value = np.nan
+        low, high = LIMITS.get(column, (-np.inf, np.inf))
+        if not np.isfinite(value):
+            raise InvalidInput(column, text, f"a finite number for {self.label} in {self.file}")
+        if not low <= value <= high:
+            raise InvalidInput(
+                column, text, f"a value in [{low:g}, {high:g}] for {self.label} in {self.file}"
+            )
+        return value
+
+    def knows(self, *columns: str) -> bool:
+        """Whether all these columns have a value."""
+        return all(self.row.get(c) for c in columns)

@@ -1,0 +1,56 @@
+"""The commands of the shell, one module each.
+
+A command is a module with ``HELP`` and ``EXAMPLE`` (text), ``arguments(sub)``, which adds its arguments to an argparse
+parser, and ``run(options)``, which answers it. Heavy modules are imported inside ``run``. A new command is one new
+module and one new entry here.
+"""
+
+from __future__ import annotations
+
+import argparse
+from typing import Protocol
+
+from flybystab.cli import (
+    bench,
+    cite,
+    completion,
+    encounters,
+    figure,
+    flyby,
+    infer,
+    report,
+    scenario,
+    screen,
+    show,
+    stability,
+)
+
+
+class Command(Protocol):
+    """What the module of a command offers."""
+
+    HELP: str
+    EXAMPLE: str
+
+    def arguments(self, sub: argparse.ArgumentParser) -> None:
+        """Add the arguments of the command."""
+
+    def run(self, options: argparse.Namespace) -> None:
+        """Answer the command."""
+
+
+#: By name, in the order of the help text.
+COMMANDS: dict[str, Command] = {
+    "flyby": flyby,
+    "report": report,
+    "scenario": scenario,
+    "encounters": encounters,
+    "stability": stability,
+    "figure": figure,
+    "screen": screen,
+    "show": show,
+    "infer": infer,
+    "bench": bench,
+    "cite": cite,
+    "completion": completion,
+}

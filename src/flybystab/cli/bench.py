@@ -1,0 +1,28 @@
+"""``flybystab bench [WHAT]``: error against time."""
+
+from __future__ import annotations
+
+import argparse
+
+from flybystab._version import __version__
+from flybystab.bench import BENCHES
+from flybystab.cli.common import check_picture, figure_argument, show
+
+HELP = "error against time: " + "; ".join(f"{name} ({about})" for name, about in BENCHES.items())
+EXAMPLE = "flybystab bench flyby --output bench.png"
+
+
+def arguments(sub: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    sub.add_argument("what", nargs="?", default="flyby", choices=list(BENCHES), help="which one (flyby)")
+    figure_argument(sub)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Answer the command."""
+    from importlib import import_module
+
+    check_picture(options.output)
+    bench = import_module(f"flybystab.bench.{options.what}")
+    rows = bench.rows(options.output)
+    show(options, lambda: {"flybystab": __version__, "rows": rows}, lambda: bench.lines(rows))

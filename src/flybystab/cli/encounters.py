@@ -1,0 +1,167 @@
+"""``flybystab encounters NAME``: close approaches of an asteroid, and how well they are known."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from typing import Any
+
+from flybystab.cli.common import check_table, show, span_arguments, tdb
+from flybystab.errors import WrongUsage
+
+HELP = "close approaches of an asteroid"
+#: Most encounters that are printed; of more, the closest.
+SHOWN = 100
+EXAMPLE = "flybystab encounters Apophis --to 2030-01-01 --clones 1000"
+
+
+def arguments(sub: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    sub.add_argument(
+        "name",
+        nargs="?",
+        help="number, name or designation, or a file with one orbit (.ke1, .json) or more (.csv)",
+    )
+    sub.add_argument(
+        "--all",
+        action="store_true",
+        help="the embedded catalogue, or the file given (own CSV, JPL SBDB, MPC), without following neighbours",
+    )
+    span_arguments(sub, "2020-01-01", "2050-01-01")
+    sub.add_argument(
+        "--error", type=float, default=0.1, metavar="KM", help="error of the distances to aim at (0.1 km)"
+    )
+    sub.add_argument(
+        "--clones", type=int, default=0, metavar="N", help="orbits drawn from the covariance (0: none)"
+    )
+    sub.add_argument("--seed", type=int, default=0, help="fixes the clones (0)")
+    sub.add_argument("--output", metavar="FILE", help="write the table (.ecsv, .parquet)")
+
+
+def run(options: argparse.Namespace) -> None:
+    """Answer the command."""
+    import astropy.units as u
+
+    from flybystab.catalogues.catalogue import catalogue
+    from flybystab.io.document import table_document
+    from flybystab.orbit.search.encounter_finder import find_encounters
+    from flybystab.screening.progress import Progress, ProgressBar
+    from flybystab.screening.tables import write_table
+
+    if options.name is None and not options.all:
+        raise WrongUsage("NAME: expected an asteroid, or --all for the whole catalogue")
+    if options.clones and options.all:
+        raise WrongUsage("--clones: expected one asteroid or a file of a few, not --all")
+    check_table(options.output)
+    asteroids = list(catalogue()) if options.name is None else _asteroids(options.name)
+    bar = ProgressBar()
+    begin = time.monotonic()
+
+    def progress(done: int, total: int, found: int) -> None:
+        bar(Progress(done, total, 0, found, {}, time.monotonic() - begin))
+
+    table = find_encounters(
+        asteroids,
+        tdb(options.start, "--from"),
+        tdb(options.stop, "--to"),
+        planets=options.planet or ["earth"],
+        within=options.within * u.au,
+        error=options.error * u.km,
+        growth=not options.all,
+        progress=progress if len(asteroids) > SHOWN else None,
+    )
+    if options.clones:
+        table = _with_clones(table, asteroids, options.clones, options.seed)
+    if options.output:
+        write_table(table, options.output)
+    many = len(asteroids) > 1
+    head = f"{len(table)} encounters within {options.within:g} au"
+    show(
+        options,
+        lambda: table_document(table),
+        lambda: [
+            f"{asteroids[0].label}: {head}"
+            if not many
+            else f"{options.name or 'embedded catalogue'} ({len(asteroids)} asteroids): {head}",
+            *_lines(table, many),
+            *[f"not followed: {one['why']}" for one in table.meta["failed"][:SHOWN]],
+            *([f"table      {options.output}"] if options.output else []),
+        ],
+    )
+
+
+def _asteroids(name: str) -> list[Any]:
+    """The asteroid of that name, or those of that file."""
+    from pathlib import Path
+
+    from flybystab.catalogues.asteroid import Asteroid
+    from flybystab.catalogues.catalogue import catalogue
+
+    path = Path(name)
+    if path.suffix in (".ke1", ".json", ".csv", ".gz") or path.is_file():
+        return list(catalogue(path))
+    return [Asteroid.from_catalogue(name)]
+
+
+def _with_clones(table: Any, asteroids: list[Any], clones: int, seed: int) -> Any:
+    """The table with the columns of the clones, row by row in the same order."""
+    import numpy as np
+
+    from flybystab.encounter.distribution import add_clones, distributions
+
+    found: list[Any] = [None] * len(table)
+    for i in np.unique(table["index"]).tolist():
+        if len(asteroids) > 1 and asteroids[i].orbit.covariance is None:
+            continue
+        rows = np.flatnonzero(table["index"] == i)
+        for row, one in zip(rows, distributions(asteroids[i], table[rows], n=clones, seed=seed), strict=True):
+            found[row] = one
+    add_clones(table, found)
+    return table
+
+
+def _lines(table: Any, many: bool) -> list[str]:
+    """The table for people: distances, and behind them what is known of them."""
+    import astropy.units as u
+    import numpy as np
+
+    if not len(table):
+        return []
+    clones, known = "clones" in table.colnames, "growth" in table.colnames
+    count = len(table)
+    if count > SHOWN:
+        table = table[np.sort(np.argsort(table["distance"])[:SHOWN])]
+    head = f"{'planet':8s} {'time (TDB)':19s} {'distance (km)':>16s} {'(au)':>9s} {'v_inf (km/s)':>12s} "
+    head += f"{'B.T (km)':>13s} {'B.R (km)':>13s}" + (f" {'moves (km)':>11s}  known" if known else "")
+    if clones:
+        head = head.replace("  known", f" {'sigma (km)':>11s} {'P(impact), 95 %':>24s} {'linear':>9s}  known")
+    out = [(f"{'asteroid':16s} " if many else "") + head]
+    for row in table:
+        line = f"{row['asteroid'][:16]:16s} " if many else ""
+        line += (
+            f"{row['planet']:8s} {row['time'].tdb.iso[:19]} {row['distance'].to_value(u.km):16,.1f} "
+            f"{row['distance'].to_value(u.au):9.6f} {row['v_inf'].to_value(u.km / u.s):12.4f} "
+            f"{row['b_t'].to_value(u.km):13,.0f} {row['b_r'].to_value(u.km):13,.0f}"
+        )
+        if known:
+            line += f" {row['displacement'].to_value(u.km):11.4g}"
+        if clones:
+            odds = f"{row['p_impact']:.3g} ({row['p_impact_low']:.2g}-{row['p_impact_high']:.2g})"
+            line += f" {row['distance_sigma'].to_value(u.km):11.4g} {odds:>24s} {row['p_impact_linear']:9.2g}"
+        said = [row["predictability"]] if known else []
+        said += ["impact"] if row["impact"] else []
+        out.append(f"{line}  {', '.join(said)}".rstrip())
+    if count > SHOWN:
+        out.append(f"the closest {SHOWN} of {count}; --output FILE keeps all")
+    if not known:
+        return out
+    neighbours = "; ".join(table.meta["neighbours"])
+    out.append(f"moves: how far the asteroid is displaced there by {neighbours}")
+    if clones:
+        lost = int((table["clones"] - table["clones_found"]).max())
+        out.append(
+            f"sigma, P(impact): of {table['clones'].max()} clones"
+            + (f", at most {lost} of them not there at that time" if lost else "")
+            + f"; covariance: {'; '.join(table.meta['covariances'])}"
+        )
+    return out

@@ -1,0 +1,65 @@
+"""``flybystab figure WHAT``: the figures of equilibrium and stability."""
+
+from __future__ import annotations
+
+import argparse
+
+from flybystab._version import __version__
+from flybystab.cli.common import (
+    asteroid_of,
+    check_picture,
+    material_arguments,
+    material_of,
+    show,
+)
+from flybystab.plots.formats import FIGURES
+
+HELP = "figures of equilibrium and stability: regions, spin limits, barrier, failure distance"
+EXAMPLE = "flybystab figure regions --output regions.png"
+
+
+def arguments(sub: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    sub.add_argument("what", choices=["regions", "spin", "barrier", "failure"], help="which figure")
+    sub.add_argument(
+        "name",
+        nargs="?",
+        help="asteroid of the barrier; a pile of 1400 x 850 x 750 m, 2 g/cm3, 6 h if left out",
+    )
+    material_arguments(sub)
+    sub.add_argument("--output", metavar="FILE", help=f"file ({', '.join(FIGURES)}; WHAT.png)")
+
+
+def run(options: argparse.Namespace) -> None:
+    """Answer the command."""
+    import astropy.units as u
+
+    from flybystab.body.body import Body
+    from flybystab.errors import WrongUsage
+    from flybystab.plots.figures import (
+        barrier_figure,
+        catalogue_bodies,
+        failure_figure,
+        regions_figure,
+        spin_figure,
+    )
+
+    output = options.output or f"{options.what}.png"
+    check_picture(output)
+    if options.name is not None and options.what != "barrier":
+        raise WrongUsage(f"NAME = {options.name}: expected no asteroid, only the barrier is of one body")
+    material = material_of(options)
+    if options.what == "barrier":
+        pile = Body([1400, 850, 750] * u.m, 2000 * u.kg / u.m**3, 6 * u.h, material=material)
+        figure = barrier_figure(pile if options.name is None else asteroid_of(options).body)
+    elif options.what == "failure":
+        figure = failure_figure(material.yield_surface)
+    else:
+        make = regions_figure if options.what == "regions" else spin_figure
+        figure = make(catalogue_bodies(), material.yield_surface)
+    figure.savefig(output, dpi=130)
+    show(
+        options,
+        lambda: {"flybystab": __version__, "figure": options.what, "file": output},
+        lambda: [f"figure     {output}"],
+    )

@@ -1,0 +1,54 @@
+"""``flybystab flyby NAME``: one asteroid through one encounter."""
+
+from __future__ import annotations
+
+import argparse
+
+from flybystab.cli.common import check_picture, figure_argument, show, write_picture
+from flybystab.cli.flown import attitude_words, flown, passage_arguments
+from flybystab.plots.formats import FIGURES, FILMS
+
+HELP = "one asteroid through one encounter"
+EXAMPLE = "flybystab flyby Apophis --output apophis.png"
+
+
+def arguments(sub: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    passage_arguments(sub)
+    figure_argument(sub, films=True)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Answer the command."""
+    from flybystab.io import document, text
+
+    check_picture(options.output, FIGURES + FILMS)
+    asteroid, result, sample = flown(options)
+    encounter = result.encounter
+    if options.output:
+        write_picture(result, f"{asteroid.label}, {encounter.time.tdb.iso[:10]}", options.output)
+    show(
+        options,
+        lambda: document.flyby_document(
+            result,
+            sample,
+            asteroid=asteroid.label,
+            catalogue=asteroid.file,
+            orbit_solution=asteroid.record.get("orbit_solution"),
+            assumed=asteroid.assumptions,
+            attitude=attitude_words(asteroid),
+            distance_error_numerical_km=None
+            if encounter.distance_error is None
+            else encounter.distance_error.to_value("km"),
+            figure=options.output,
+        ),
+        lambda: [
+            f"asteroid   {asteroid.label}",
+            *text.encounter_lines(encounter),
+            f"attitude   {attitude_words(asteroid)}",
+            *text.flyby_lines(result),
+            *text.sample_lines(sample),
+            *text.model_lines(result, asteroid.assumptions),
+            *([f"figure     {options.output}"] if options.output else []),
+        ],
+    )

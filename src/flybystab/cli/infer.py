@@ -1,0 +1,132 @@
+"""``flybystab infer NAME``: what an asteroid's survival says of its material."""
+
+from __future__ import annotations
+
+import argparse
+from typing import Any
+
+from flybystab.cli.common import (
+    asteroid_named,
+    catalogue_argument,
+    check_picture,
+    figure_argument,
+    show,
+    span_arguments,
+    surface_argument,
+    tdb,
+)
+
+HELP = "what an asteroid's survival says of its material"
+EXAMPLE = "flybystab infer Toutatis --output toutatis.png"
+
+
+def arguments(sub: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    sub.add_argument("name", help="number, name or designation")
+    catalogue_argument(sub)
+    span_arguments(sub, "1950-01-01", "2026-01-01")
+    sub.add_argument("--attitudes", type=int, default=32, metavar="N", help="tried in every passage (32)")
+    sub.add_argument("--seed", type=int, default=0, help="fixes the attitudes (0)")
+    surface_argument(sub)
+    figure_argument(sub)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Answer the command."""
+    import astropy.units as u
+
+    from flybystab.io.document import table_document
+    from flybystab.plots.screening import inference_figure
+    from flybystab.screening.inference import infer, survived
+
+    check_picture(options.output)
+    asteroid = asteroid_named(options)
+    passages = survived(
+        asteroid,
+        tdb(options.start, "--from"),
+        tdb(options.stop, "--to"),
+        planets=options.planet or ["earth"],
+        within=options.within * u.au,
+    )
+    table = infer(
+        asteroid,
+        passages,
+        attitudes=options.attitudes,
+        seed=options.seed,
+        yield_surface=options.surface,
+    )
+    if options.output:
+        inference_figure(table, options.output)
+    show(options, lambda: table_document(table), lambda: _lines(asteroid, table))
+
+
+def _lines(asteroid: Any, table: Any) -> list[str]:
+    """The bounds of shape and spin, what each passage adds, and the table by density and cohesion."""
+    import astropy.units as u
+    import numpy as np
+
+    from flybystab.body.bounds import density_intervals, required_cohesion
+    from flybystab.body.equilibrium import equilibrium
+    from flybystab.screening.inference import NEGLIGIBLE
+
+    body = asteroid.body
+    rho = body.density.to_value(u.kg / u.m**3)
+    rest = equilibrium(body)
+    phi = body.material.friction_angle
+    needed = rest.required_friction_angle.to_value(u.deg)
+    lines = [
+        f"{asteroid.label}: what it is made of, if it has kept its shape",
+        f"shape and spin, at {rho:.0f} kg/m3"
+        + (" (assumed)" if "density_kg_m3" in asteroid.assumed else "")
+        + ": "
+        + (
+            f"friction >= {needed:.1f} deg without cohesion"
+            if np.isfinite(needed)
+            else "no friction is enough without cohesion"
+        ),
+        f"at {phi.to_value(u.deg):g} deg: cohesion >= {required_cohesion(body, phi).to_value(u.Pa):.3g} Pa; "
+        + _density_bound(density_intervals(body)),
+    ]
+    small = np.rad2deg(NEGLIGIBLE)
+    for p in table.meta["passages"]:
+        worst = p["adds_at_worst_attitude_deg"]
+        lines.append(
+            f"passage {p['passage']}: "
+            + (
+                f"adds less than {small:.2g} deg at any attitude"
+                if worst < small
+                else f"adds {p['adds_at_any_attitude_deg']:.2f} deg whatever the attitude, "
+                f"{worst:.2f} deg at the worst one (largest over the table)"
+            )
+        )
+    if not table.meta["passages"]:
+        lines.append("no passage in this time within this distance")
+    telling = any(p["adds_at_worst_attitude_deg"] >= small for p in table.meta["passages"])
+    cohesions = np.unique(table["cohesion"].to_value(u.Pa))
+    for name, title in (
+        ("friction_equilibrium", "by shape and spin"),
+        ("friction_any_attitude", "with the passages, whatever the attitude"),
+        ("friction_every_attitude", "with the passages, enough at every attitude"),
+    ):
+        if name != "friction_equilibrium" and not telling:
+            continue
+        lines.append(f"least friction angle (deg), {title}; columns: cohesion (Pa)")
+        lines.append(f"{'kg/m3':>8s} " + " ".join(f"{c:8g}" for c in cohesions))
+        need = table[name].to_value(u.deg).reshape(-1, len(cohesions))
+        for density, row in zip(np.unique(table["density"].value), need, strict=True):
+            cells = (f"{x:8.2f}" if np.isfinite(x) else f"{'none':>8s}" for x in row)
+            lines.append(f"{density:8.0f} " + " ".join(cells))
+    return lines
+
+
+def _density_bound(intervals: Any) -> str:
+    import astropy.units as u
+
+    from flybystab.body.body import DENSITY_RANGE
+
+    if not len(intervals):
+        return "no density is enough without cohesion"
+    least = intervals[0, 0].to_value(u.kg / u.m**3)
+    if least <= 1.001 * DENSITY_RANGE[0]:
+        return "any density"
+    return f"density >= {least:.0f} kg/m3 without cohesion"

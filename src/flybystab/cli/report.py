@@ -1,0 +1,56 @@
+"""``flybystab report NAME``: the same as one web page, figures and all."""
+
+from __future__ import annotations
+
+import argparse
+
+from flybystab.cli.common import check_picture, show
+from flybystab.cli.flown import flown, passage_arguments
+
+HELP = "the same as one web page, figures and all"
+EXAMPLE = "flybystab report Apophis --output apophis.html"
+
+
+def arguments(sub: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    passage_arguments(sub)
+    sub.add_argument(
+        "--samples", type=int, default=200, metavar="N", help="draws of the uncertain inputs (200; 1: none)"
+    )
+    sub.add_argument("--output", default="report.html", metavar="FILE", help="the page (report.html)")
+
+
+def run(options: argparse.Namespace) -> None:
+    """Answer the command."""
+    import shlex
+
+    import astropy.units as u
+
+    from flybystab.io import document
+    from flybystab.io.report import report
+    from flybystab.screening.screening import screen
+
+    check_picture(options.output, (".html",))
+    asteroid, result, sample = flown(options)
+    e = result.encounter
+    screened = None
+    if options.samples > 1:
+        day = 1.0 * u.d
+        table = screen(
+            [asteroid],
+            e.time - day,
+            e.time + day,
+            planets=[options.planet],
+            within=1.01 * e.distance,
+            samples=options.samples,
+            seed=options.seed,
+            material=asteroid.material,
+        )
+        screened = table[0] if len(table) == 1 and not table["error"][0] else None
+    command = "flybystab " + shlex.join(options.words)
+    path = report(asteroid, result, sample, options.output, screened=screened, command=command)
+    show(
+        options,
+        lambda: document.flyby_document(result, sample, asteroid=asteroid.label, report=str(path)),
+        lambda: [f"{asteroid.label}: {result.verdict}", f"report     {path}"],
+    )

@@ -1,0 +1,50 @@
+"""``flybystab scenario FILE.toml``: a scripted encounter from a TOML file."""
+
+from __future__ import annotations
+
+import argparse
+
+from flybystab.cli.common import (
+    OTHER_SURFACES,
+    check_picture,
+    figure_argument,
+    show,
+    write_picture,
+)
+from flybystab.plots.formats import FIGURES, FILMS
+
+HELP = "a scripted encounter from a TOML file"
+EXAMPLE = "flybystab scenario examples/disruption_p2.toml"
+
+
+def arguments(sub: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    sub.add_argument("file", help="scenario file")
+    figure_argument(sub, films=True)
+
+
+def run(options: argparse.Namespace) -> None:
+    """Answer the command."""
+    from flybystab.flybys.flyby import flyby
+    from flybystab.io import document, text
+    from flybystab.io.scenario import scenario
+
+    check_picture(options.output, FIGURES + FILMS)
+    script = scenario(options.file)
+    figure = options.output or script.figure
+    check_picture(figure, FIGURES + FILMS)
+    others = [s for s in (*OTHER_SURFACES, "drucker-prager") if s != script.body.material.yield_surface]
+    result = flyby(script.body, script.encounter, script.attitude, surfaces=others)
+    if figure:
+        write_picture(result, script.title, figure)
+    show(
+        options,
+        lambda: document.flyby_document(result, title=script.title, figure=figure),
+        lambda: [
+            f"scenario   {script.title}",
+            *text.encounter_lines(script.encounter),
+            *text.flyby_lines(result),
+            *text.model_lines(result),
+            *([f"figure     {figure}"] if figure else []),
+        ],
+    )

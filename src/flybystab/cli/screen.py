@@ -1,0 +1,119 @@
+"""``flybystab screen [FILE or NAME ...]``: a whole catalogue through its encounters."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+
+from flybystab.cli.common import (
+    check_computed,
+    check_table,
+    material_arguments,
+    material_of,
+    show,
+    span_arguments,
+    tdb,
+)
+
+HELP = "a whole catalogue through its encounters"
+EXAMPLE = "flybystab screen --from 2026-01-01 --to 2036-01-01 --samples 100 --jobs 2"
+
+
+def arguments(sub: argparse.ArgumentParser) -> None:
+    """Add the arguments of the command."""
+    sub.add_argument(
+        "asteroids",
+        nargs="*",
+        metavar="FILE",
+        help="catalogue files (own CSV, JPL SBDB, MPC, NEOCC .ke1) or names; the embedded catalogue if left out",
+    )
+    span_arguments(sub, "2026-01-01", "2036-01-01")
+    material_arguments(sub)
+    sub.add_argument(
+        "--samples", type=int, default=1, metavar="N", help="draws of the uncertain inputs (1: none)"
+    )
+    sub.add_argument("--seed", type=int, default=0, help="fixes every draw (0)")
+    sub.add_argument(
+        "--population", metavar="FILE", help="distributions to draw from, TOML; what it leaves out is default"
+    )
+    sub.add_argument("--population-default", action="store_true", help="print the default as TOML, and stop")
+    sub.add_argument("--jobs", type=int, default=1, metavar="N", help="processes (1)")
+    sub.add_argument("--dask", metavar="ADDRESS", help="a dask scheduler instead of processes")
+    sub.add_argument(
+        "--output", default="screening.ecsv", metavar="FILE", help="table, .ecsv or .parquet (screening.ecsv)"
+    )
+    sub.add_argument(
+        "--overwrite", action="store_true", help="replace finished tables (an unfinished run goes on without)"
+    )
+    sub.add_argument("--samples-output", metavar="FILE", help="table of all samples, .ecsv or .parquet")
+
+
+def run(options: argparse.Namespace) -> None:
+    """Answer the command."""
+    from pathlib import Path
+
+    import astropy.units as u
+
+    from flybystab.io.document import table_document
+    from flybystab.screening.executors import workers
+    from flybystab.screening.priors import Population
+    from flybystab.screening.progress import ProgressBar
+    from flybystab.screening.results import read_results
+    from flybystab.screening.screening import Screening
+    from flybystab.screening.selection import listed
+    from flybystab.screening.settings import settings
+    from flybystab.screening.summary import summary
+
+    if options.population_default:
+        print(Population().toml(), end="")
+        return
+    check_table(options.output)
+    check_table(options.samples_output)
+    output = Path(options.output)
+    names = [Path(a) if _is_file(a) else a for a in options.asteroids]
+    screening = Screening(
+        listed(names or None),
+        settings(
+            tdb(options.start, "--from"),
+            tdb(options.stop, "--to"),
+            planets=options.planet or ["earth"],
+            within=options.within * u.au,
+            samples=options.samples,
+            seed=options.seed,
+            material=material_of(options),
+            population=Population.from_file(options.population) if options.population else None,
+            keep_samples=options.samples_output is not None,
+        ),
+    )
+    bar = ProgressBar()
+    try:
+        with workers(options.jobs, options.dask) as executor:
+            screening.run(
+                output,
+                samples_output=options.samples_output,
+                overwrite=options.overwrite,
+                executor=executor,
+                progress=bar,
+            )
+    except KeyboardInterrupt:
+        bar.end()
+        print(
+            f"flybystab: {output} holds the rows so far; the same command goes on from there", file=sys.stderr
+        )
+        raise
+    found = summary(output)
+    show(
+        options,
+        lambda: table_document(read_results(output)),
+        lambda: [
+            found.text(),
+            f"table      {output} (flybystab show {output} --output {output.with_suffix('.png')} draws it)",
+        ],
+    )
+    check_computed(found.rows, found.failed, found.errors)
+
+
+def _is_file(word: str) -> bool:
+    from pathlib import Path
+
+    return Path(word).exists() or Path(word).suffix in (".csv", ".gz", ".ke1", ".json") or "/" in word

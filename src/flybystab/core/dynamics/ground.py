@@ -1,0 +1,220 @@
+"""The ground below a passage: whether and when the body reaches it.
+
+A body with the shape tensor ``S`` extends ``h = sqrt(n.S.n)`` from its centre towards the planet, ``n`` the unit vector
+to it: the support function of the ellipsoid. It touches once its centre is no higher than ``h``. The tangent plane
+stands for the sphere of the planet, of radius R: ``h`` is too large by at most ``a1^2/(2 R)``, 8 cm for 1 km at Earth.
+
+The centre is that low for seconds only, far shorter than a step of the dynamics. So the part of a step in which it is
+lower than the body is large is cut out first, and searched by itself.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flybystab.core.dynamics.state import N_FULL, N_RIGID, RIGID, S1, S2, S3, W_SCRATCH, rotation_matrix
+from flybystab.core.dynamics.steppers import explicit_at, implicit_at
+from flybystab.core.dynamics.workspace import Workspace
+from flybystab.core.ellipsoid.tide import panel_at
+from flybystab.core.numerics.jit import kernel
+
+Array = NDArray[np.float64]
+
+_GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
+#: Samples a radian that the body turns or deforms, and at least.
+_DENSE, _LEAST, _MOST = 16, 8, 4000
+
+
+class Ground(NamedTuple):
+    """Where the planet is, seen from the body.
+
+    Attributes
+    ----------
+    tau, start, width : float
+        As in :class:`flybystab.core.ellipsoid.tide.TidePanels`.
+    floor : float
+        Distance from the planet's centre that counts as the ground, m.
+    least : float
+        Least height of the body's centre above it, reached at closest approach, m; negative where it gets below.
+    unit : float
+        m in the unit of length of the states.
+    coefficients : ndarray, shape (panels, degree + 1, 3)
+        Chebyshev coefficients of the position, m, frame of the tide. No panels: no ground.
+    """
+
+    tau: float
+    start: float
+    width: float
+    floor: float
+    least: float
+    unit: float
+    coefficients: Array
+
+
+def no_ground() -> Ground:
+    """No ground to reach."""
+    return Ground(1.0, 0.0, 1.0, 0.0, np.inf, 1.0, np.zeros((0, 1, 3)))
+
+
+@kernel
+def _direction(t: float, ground: Ground, n: Array) -> float:
+    """Height (m) of the centre above the ground at time `t`; writes the unit vector ``n[3]`` along its position."""
+    c = ground.coefficients
+    i, x = panel_at(ground.tau, ground.start, ground.width, c.shape[0], t)
+    r2 = 0.0
+    for j in range(3):
+        b1 = 0.0
+        b2 = 0.0
+        for k in range(c.shape[1] - 1, 0, -1):
+            b1, b2 = c[i, k, j] + 2.0 * x * b1 - b2, b1
+        n[j] = c[i, 0, j] + x * b1 - b2
+        r2 += n[j] * n[j]
+    r = np.sqrt(r2)
+    for j in range(3):
+        n[j] /= r
+    return r - ground.floor
+
+
+@kernel
+def _reach(regime: int, y: Array, par: Array, n: Array, m: Array) -> float:
+    """Extent ``sqrt(n.S.n)`` of the body along ``n[3]``, in units of the body; `m` is scratch (3, 3)."""
+    if regime == RIGID:
+        rotation_matrix(y, m)
+        s = 0.0
+        for i in range(3):
+            along = m[0, i] * n[0] + m[1, i] * n[1] + m[2, i] * n[2]
+            s += par[S1 + i] * along * along
+        return np.sqrt(s)
+    s = y[0] * n[0] * n[0] + y[1] * n[1] * n[1] + y[2] * n[2] * n[2]
+    s += 2.0 * (y[3] * n[0] * n[1] + y[4] * n[0] * n[2] + y[5] * n[1] * n[2])
+    return np.sqrt(s)
+
+
+@kernel
+def _gap(
+    regime: int, explicit: bool, t: float, h: float, when: float, par: Array, ground: Ground, ws: Workspace
+) -> float:
+    """Height of the body's lowest point above the ground at the time `when` of the step from `t` by `h`, m."""
+    x = (when - t) / h
+    if regime == RIGID:
+        explicit_at(x, ws.y, N_RIGID, ws.dense, ws.ys)
+    elif explicit:
+        explicit_at(x, ws.y, N_FULL, ws.dense, ws.ys)
+    else:
+        implicit_at(x, ws.y, N_FULL, ws.dense, ws.y1, ws.ys)
+    n = ws.spare[42:45]
+    height = _direction(when, ground, n)
+    return height - ground.unit * _reach(regime, ws.ys, par, n, ws.work.m[W_SCRATCH])
+
+
+@kernel
+def _crossing(low: float, high: float, size: float, ground: Ground, n: Array) -> float:
+    """The time between `low` and `high` at which the centre passes the height `size` (m)."""
+    falling = _direction(high, ground, n) < size
+    for _ in range(60):
+        mid = 0.5 * (low + high)
+        if (_direction(mid, ground, n) < size) == falling:
+            high = mid
+        else:
+            low = mid
+        if high - low < 1e-15 * (1.0 + abs(mid)):
+            break
+    return low if falling else high
+
+
+@kernel
+def touches(
+    regime: int, explicit: bool, t: float, h: float, par: Array, ground: Ground, ws: Workspace
+) -> float:
+    """Time at which the body first touches the ground in the step just made; infinite if it does not.
+
+    The step is that from ``ws.y`` at `t` to ``ws.y1`` at ``t + h`` with the dense output of its `regime`; in flow
+    `explicit` tells which. Uses ``ws.ys`` and the end of ``ws.spare``.
+    """
+    if ground.coefficients.shape[0] == 0:
+        return np.inf
+    y, y1 = ws.y, ws.y1
+    if regime == RIGID:
+        size = max(par[S1], par[S2], par[S3])
+        turn = np.sqrt(y1[4] ** 2 + y1[5] ** 2 + y1[6] ** 2)
+    else:
+        # no eigenvalue of S is above its trace
+        size = 1.1 * max(y[0] + y[1] + y[2], y1[0] + y1[1] + y1[2])
+        turn = 0.0
+        for i in range(6, 15):
+            turn += y1[i] ** 2
+        turn = np.sqrt(turn)
+    size = ground.unit * np.sqrt(size)
+    if size < ground.least:
+        return np.inf
+    n = ws.spare[42:45]
+    end = t + h
+    lowest = min(max(0.0, t), end)
+    if _direction(lowest, ground, n) >= size:
+        return np.inf
+    a, b = t, end
+    if _direction(t, ground, n) >= size:
+        a = _crossing(t, lowest, size, ground, n)
+    if _direction(end, ground, n) >= size:
+        b = _crossing(lowest, end, size, ground, n)
+    count = min(_MOST, _LEAST + int(_DENSE * turn * (b - a)))
+    before = f = _gap(regime, explicit, t, h, a, par, ground, ws)
+    if f <= 0.0:
+        return a
+    step = (b - a) / count
+    for j in range(1, count + 1):
+        at = a + j * step if j < count else b
+        after = _gap(regime, explicit, t, h, at, par, ground, ws)
+        if after <= 0.0:
+            return _root(at - step, at, regime, explicit, t, h, par, ground, ws)
+        # a dip between the samples, at the ends of the part also beside one
+        if (f <= before and f <= after) or (j == count and after < f):
+            low, value = _dip(max(a, at - 2.0 * step), at, regime, explicit, t, h, par, ground, ws)
+            if value <= 0.0:
+                return _root(max(a, at - 2.0 * step), low, regime, explicit, t, h, par, ground, ws)
+        before, f = f, after
+    return np.inf
+
+
+@kernel
+def _root(
+    low: float, high: float, regime: int, explicit: bool, t: float, h: float, par: Array, ground: Ground,
+    ws: Workspace,
+) -> float:  # fmt: skip
+    """The time between `low`, where the body is clear of the ground, and `high` at which it has just reached it."""
+    for _ in range(60):
+        mid = 0.5 * (low + high)
+        if _gap(regime, explicit, t, h, mid, par, ground, ws) <= 0.0:
+            high = mid
+        else:
+            low = mid
+        if high - low < 1e-15 * (1.0 + abs(mid)):
+            break
+    return high
+
+
+@kernel
+def _dip(
+    a: float, b: float, regime: int, explicit: bool, t: float, h: float, par: Array, ground: Ground,
+    ws: Workspace,
+) -> tuple[float, float]:  # fmt: skip
+    """Golden-section minimum of the gap between the times `a` and `b`: when, and how large."""
+    x1 = b - _GOLDEN * (b - a)
+    x2 = a + _GOLDEN * (b - a)
+    f1 = _gap(regime, explicit, t, h, x1, par, ground, ws)
+    f2 = _gap(regime, explicit, t, h, x2, par, ground, ws)
+    for _ in range(30):
+        if f1 > f2:
+            a = x1
+            x1, f1 = x2, f2
+            x2 = a + _GOLDEN * (b - a)
+            f2 = _gap(regime, explicit, t, h, x2, par, ground, ws)
+        else:
+            b = x2
+            x2, f2 = x1, f1
+            x1 = b - _GOLDEN * (b - a)
+            f1 = _gap(regime, explicit, t, h, x1, par, ground, ws)
+    return (x1, f1) if f1 < f2 else (x2, f2)

@@ -1,0 +1,347 @@
+"""Friction impulse: what a set-valued yield law does to a velocity gradient at one instant.
+
+``Delta L = -That S^-1`` with ``That = -Phat 1 + (k Phat + chat) Dhat``, ``Dhat`` along the deviatoric rate of
+strain *afterwards* (for the true normal on ``k(theta)``: the stress whose normal that is) and ``Phat`` such that
+``tr D`` obeys the flow rule then. If a ``That`` inside the yield surface
+brings the body to rest, it does so; if no pressure is needed, nothing happens. A symmetric ``That`` keeps the
+angular momentum, and it never raises the kinetic energy.
+
+It is the impulse with which a dispersed body comes back into contact (theory, section 3), and one step of the
+time-stepping integrator of :mod:`flybystab.core.dynamics.moreau`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flybystab.core.dynamics.state import (
+    COHESION,
+    COMPRESSION_CORNER,
+    COS_PHI,
+    EXTENSION_CORNER,
+    FACE,
+    NORMAL,
+    PART,
+    SIN_PHI,
+    SMOOTH,
+    SURFACE,
+    W_A,
+    W_B,
+    W_L,
+    W_N,
+    W_S,
+    W_SINV,
+    Buffers,
+    gradient,
+    set_gradient,
+)
+from flybystab.core.dynamics.steppers import factorise, solve
+from flybystab.core.dynamics.workspace import copy
+from flybystab.core.ellipsoid.tide import COMPONENTS
+from flybystab.core.material.flow_rule import dilatancy, dilation, flow_stress, isotropic
+from flybystab.core.material.yield_surface import (
+    MOHR_COULOMB,
+    beyond_face,
+    corner,
+    flow_direction,
+    slope_over_sine,
+)
+from flybystab.core.numerics.jit import code, kernel
+from flybystab.core.numerics.tensors import determinant, deviator, inverse, multiply, pack, unpack
+
+Array = NDArray[np.float64]
+
+# What an impulse did.
+FREE = code(0)
+REST = code(1)
+SLIDING = code(2)
+FAILED = code(3)
+
+
+@kernel
+def rest_spin(y: Array, s: Array, big_l: Array, work: Buffers, w: Array) -> None:
+    """Spin ``w[3]`` of the rigid rotation with the angular momentum of ``big_l`` (``J w = H``)."""
+    a = work.m[W_A]
+    multiply(big_l, s, a)
+    h0, h1, h2 = a[2, 1] - a[1, 2], a[0, 2] - a[2, 0], a[1, 0] - a[0, 1]
+    # J = tr S 1 - S
+    c = work.c[2]
+    c[0], c[1], c[2] = y[1] + y[2], y[0] + y[2], y[0] + y[1]
+    c[3], c[4], c[5] = -y[3], -y[4], -y[5]
+    inverse(c, a)
+    for i in range(3):
+        w[i] = a[i, 0] * h0 + a[i, 1] * h1 + a[i, 2] * h2
+
+
+@kernel
+def _residual(
+    x: Array, beta: float, cos_c: float, par: Array, work: Buffers, d_star: Array, f: Array
+) -> float:
+    """Equations of the sliding impulse; returns its strength ``Phat sin + chat cos``.
+
+    ``x`` holds the deviator of D afterwards, Phat and, on a face of Mohr-Coulomb, the place of the stress between
+    its corners. ``D - sym L* - Phat S^-1 + (Phat sin + chat cos) sym(N S^-1) = 0`` and ``tr x = 0``, with ``N`` the
+    stress deviator of `flow_stress` and ``tr D`` the `dilation` of ``x``; on a face ``x`` is normal to it.
+    """
+    n, b, sinv = work.m[W_N], work.m[W_B], work.m[W_SINV]
+    unit = work.c[2]
+    norm, _, support, _ = flow_stress(x[0:6], par, unit, n)
+    if int(par[PART]) == FACE:
+        det = determinant(unit)
+        f[7] = norm * beyond_face(par[SIN_PHI], det)
+        p1, p2, _, _, _ = corner(par[SIN_PHI], det, False)
+        isotropic(p1, p2, unit, b)
+        for i in range(3):
+            for j in range(3):
+                n[i, j] += x[7] * (b[i, j] - n[i, j])
+    multiply(n, sinv, b)
+    p = x[6]
+    strength = par[SIN_PHI] * p + cos_c
+    mean = dilation(beta, norm, support, par) / 3.0
+    f[0] = x[0] + mean - d_star[0] - p * sinv[0, 0] + strength * b[0, 0]
+    f[1] = x[1] + mean - d_star[1] - p * sinv[1, 1] + strength * b[1, 1]
+    f[2] = x[2] + mean - d_star[2] - p * sinv[2, 2] + strength * b[2, 2]
+    f[3] = x[3] - d_star[3] - p * sinv[0, 1] + 0.5 * strength * (b[0, 1] + b[1, 0])
+    f[4] = x[4] - d_star[4] - p * sinv[0, 2] + 0.5 * strength * (b[0, 2] + b[2, 0])
+    f[5] = x[5] - d_star[5] - p * sinv[1, 2] + 0.5 * strength * (b[1, 2] + b[2, 1])
+    f[6] = x[0] + x[1] + x[2]
+    return strength
+
+
+@kernel
+def friction_impulse(
+    y: Array,
+    par: Array,
+    duration: float,
+    offset: Array,
+    work: Buffers,
+    jac: Array,
+    pivots: NDArray[np.int64],
+    x: Array,
+) -> int:
+    """Apply the impulse to the state ``y[15]``; returns FREE, REST, SLIDING or FAILED.
+
+    Parameters
+    ----------
+    duration : float
+        Time over which cohesion acts; 0 for an instant.
+    offset : ndarray (6,)
+        Rate of strain that counts as rest; the friction law holds for ``D`` less this.
+    jac, pivots, x : ndarray
+        Scratch: (15, 15), int (15,), (36,).
+    """
+    s, sinv, before = work.m[W_S], work.m[W_SINV], work.m[W_L]
+    unpack(y[0:6], s)
+    volume = np.sqrt(inverse(y[0:6], sinv))
+    gradient(y, before)
+    for c, (i, j) in enumerate(COMPONENTS):
+        before[i, j] -= offset[c]
+        if i != j:
+            before[j, i] -= offset[c]
+    beta, _ = dilatancy(volume, par)
+    surface = int(par[SURFACE])
+    cos_c = par[COS_PHI] * par[COHESION] * volume * duration
+    # Rest needs the impulse That = (L - W) S; inside the yield surface it holds the body.
+    w = x[8:11]
+    rest_spin(y, s, before, work, w)
+    a = work.m[W_A]
+    n = work.m[W_N]
+    for i in range(3):
+        for j in range(3):
+            n[i, j] = before[i, j]
+    n[0, 1] += w[2]
+    n[1, 0] -= w[2]
+    n[0, 2] -= w[1]
+    n[2, 0] += w[1]
+    n[1, 2] += w[0]
+    n[2, 1] -= w[0]
+    multiply(n, s, a)
+    that = work.c[0]
+    pack(a, that)
+    p, norm, det = deviator(that, work.c[2])
+    g = slope_over_sine(surface, par[SIN_PHI], det)
+    if norm <= g * (p * par[SIN_PHI] + cos_c):
+        for i in range(6):
+            y[6 + i] = offset[i]
+        y[12], y[13], y[14] = w[0], w[1], w[2]
+        return REST
+    # Sliding. Near rest the strain starts along the deviator of the impulse that rest would need, in
+    # proportion to its excess; far from it the motion before the impulse is the better guess.
+    d_star = work.c[1]
+    for i in range(6):
+        d_star[i] = y[6 + i] - offset[i]
+    trace_sinv = sinv[0, 0] + sinv[1, 1] + sinv[2, 2]
+    mean, start, _ = deviator(d_star, work.c[2])
+    scale = start + abs(mean) + abs(p) * trace_sinv
+    excess = (norm - g * (p * par[SIN_PHI] + cos_c)) * trace_sinv / 3.0
+    hexagon = par[NORMAL] > 0.0 and surface == MOHR_COULOMB
+    if hexagon and int(par[PART]) == SMOOTH:
+        par[PART] = EXTENSION_CORNER
+    found = False
+    for part in range(3 if hexagon else 1):
+        if part > 0:
+            par[PART] = par[PART] % 3.0 + 1.0
+        for guess in range(4):
+            if guess % 2 == 0:
+                _along_rest(that, p, norm, det, excess, par, x, work)
+            elif start > 0.0:
+                for i in range(6):
+                    x[i] = d_star[i] + (mean if i < 3 else 0.0)
+                x[6] = max(0.0, 3.0 * mean / trace_sinv)
+                x[7] = 0.5
+            else:
+                continue
+            if guess < 2:
+                found = _newton(x, beta, cos_c, scale, par, work, d_star, jac, pivots)
+            else:
+                found = _by_weaker_friction(x, beta, cos_c, scale, par, work, d_star, jac, pivots)
+            found = found and (not hexagon or _belongs(x, par, work))
+            if found:
+                break
+        if found:
+            break
+    if not found:
+        return FAILED
+    strength = _residual(x, beta, cos_c, par, work, d_star, x[19:27])
+    if strength < 0.0 or (par[SIN_PHI] == 0.0 and par[COHESION] == 0.0 and x[6] < 0.0):
+        return FREE
+    # Delta L = Phat S^-1 - (Phat sin + chat cos) N S^-1; b = N S^-1 is left by the residual.
+    b = work.m[W_B]
+    for i in range(3):
+        for j in range(3):
+            before[i, j] += x[6] * sinv[i, j] - strength * b[i, j]
+    set_gradient(before, y)
+    for i in range(6):
+        y[6 + i] += offset[i]
+    return SLIDING
+
+
+@kernel
+def _along_rest(
+    that: Array, p: float, norm: float, det: float, excess: float, par: Array, x: Array, work: Buffers
+) -> None:
+    """First guess ``x[:8]``: strain as the impulse that rest would need wants it, in proportion to its excess."""
+    unit, n = work.c[2], work.m[W_N]
+    for i in range(6):
+        unit[i] = (that[i] + (p if i < 3 else 0.0)) / norm
+    a, b = 1.0, 0.0
+    if par[NORMAL] > 0.0:
+        a, b, _ = flow_direction(int(par[SURFACE]), par[SIN_PHI], det)
+    isotropic(a, b, unit, n)
+    pack(n, x[0:6])
+    for i in range(6):
+        x[i] *= excess
+    x[6] = p
+    x[7] = 0.5
+
+
+@kernel
+def _by_weaker_friction(
+    x: Array,
+    beta: float,
+    cos_c: float,
+    scale: float,
+    par: Array,
+    work: Buffers,
+    d_star: Array,
+    jac: Array,
+    pivots: NDArray[np.int64],
+) -> bool:
+    """`_newton` by way of the solutions for less friction, where the section is rounder and a first is found."""
+    full = par[SIN_PHI]
+    kept = jac[14]
+    copy(x, kept, 8)
+    share, more = 0.0, 0.5
+    for _ in range(80):
+        ahead = min(1.0, share + more)
+        par[SIN_PHI] = full * ahead
+        if _newton(x, beta, cos_c, scale, par, work, d_star, jac, pivots):
+            share = ahead
+            copy(x, kept, 8)
+            more *= 2.0
+        else:
+            copy(kept, x, 8)
+            more *= 0.5
+        if share == 1.0 or more < 1e-6:
+            break
+    par[SIN_PHI] = full
+    return share == 1.0
+
+
+@kernel
+def _belongs(x: Array, par: Array, work: Buffers) -> bool:
+    """Whether a solution lies where its part of the hexagon says: on the face, or in the fan of the corner."""
+    part = int(par[PART])
+    if part == FACE:
+        return -1e-9 <= x[7] <= 1.0 + 1e-9
+    _, _, det = deviator(x[0:6], work.c[2])
+    past = beyond_face(par[SIN_PHI], det)
+    return past >= -1e-9 if part == COMPRESSION_CORNER else past <= 1e-9
+
+
+@kernel
+def _newton(
+    x: Array,
+    beta: float,
+    cos_c: float,
+    scale: float,
+    par: Array,
+    work: Buffers,
+    d_star: Array,
+    jac: Array,
+    pivots: NDArray[np.int64],
+) -> bool:
+    """Solve `_residual` for ``x[:7]`` (``x[:8]`` on a face) from the guess in it; scratch in ``x[11:]``."""
+    trial, f, moved = x[11:19], x[19:27], x[27:35]
+    m = 8 if int(par[PART]) == FACE else 7
+    for turn in range(60):
+        _residual(x, beta, cos_c, par, work, d_star, f)
+        _, size, _ = deviator(x[0:6], work.c[2])
+        if not size > 1e-300:
+            return False
+        for j in range(m):
+            delta = 1e-7 * size if j < 6 else 1e-7 * max(abs(x[6]), 1e-6 * scale) if j == 6 else 1e-7
+            saved = x[j]
+            x[j] = saved + delta
+            delta = x[j] - saved
+            _residual(x, beta, cos_c, par, work, d_star, moved)
+            x[j] = saved
+            for i in range(m):
+                jac[i, j] = (moved[i] - f[i]) / delta
+            if turn < 8:
+                continue
+            # A strain that stays on the kink of k(theta) at a corner (a sphere without spin) has no derivative there:
+            # of one side alone the steps fall short by a part for ever.
+            x[j] = saved - delta
+            _residual(x, beta, cos_c, par, work, d_star, moved)
+            x[j] = saved
+            for i in range(m):
+                jac[i, j] = 0.5 * (jac[i, j] + (f[i] - moved[i]) / delta)
+        for i in range(m):
+            trial[i] = -f[i]
+        if not factorise(jac, m, pivots):
+            return False
+        solve(jac, m, pivots, trial)
+        step = 0.0
+        along = 0.0
+        for i in range(6):
+            weight = 1.0 if i < 3 else 2.0
+            step += weight * trial[i] * trial[i]
+            along += weight * trial[i] * x[i]
+        step = np.sqrt(step)
+        if not step < np.inf:
+            return False
+        # The direction turns by half a radian at most, and the size falls by half at most, in one turn.
+        across = np.sqrt(max(0.0, step * step - (along / size) ** 2))
+        fraction = 1.0
+        if along < -0.5 * size * size:
+            fraction = min(fraction, -0.5 * size * size / along)
+        if across > 0.5 * (size + max(0.0, along / size)):
+            fraction = min(fraction, 0.5 * (size + max(0.0, along / size)) / across)
+        for i in range(m):
+            x[i] += fraction * trial[i]
+        # On the kink the Lode angle itself, from a determinant, is known to the root of the rounding.
+        if fraction == 1.0 and step <= max(1e-12 * size, (1e-15 if turn < 20 else 1e-9) * scale):
+            return True
+    return False

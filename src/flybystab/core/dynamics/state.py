@@ -1,0 +1,186 @@
+"""The state of a body, the parameters of a run and the scratch of its rates, as flat arrays.
+
+Kernels work in the units of the body: length ``a0 = (a1 a2 a3)^(1/3)``, time ``1/sqrt(pi G rho0)`` at the
+initial density, stress in the form ``T = 5 sigma/rho``. Then ``det S = (V/V0)^2``. Two states:
+
+RIGID, 7 numbers: unit quaternion (body axes -> fixed frame, scalar first), ``omega`` along the body axes.
+Every other regime, 15 numbers, fixed frame: ``S`` (6 components), ``D = sym L`` (6), ``w``: ``W x = w x x``.
+
+The parameters of a run are one flat array, see ``SURFACE`` and the constants below it.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flybystab.core.ellipsoid.tide import COMPONENTS
+from flybystab.core.numerics.jit import code, kernel
+from flybystab.core.numerics.tensors import multiply, pack, unpack
+
+Array = NDArray[np.float64]
+
+RIGID = code(0)
+FLOWING = code(1)
+DISPERSED = code(2)
+FLUID = code(3)
+
+# Numbers in a state.
+N_RIGID = code(7)
+N_FULL = code(15)
+
+# Slots of the parameter array.
+SURFACE = 0  # code of the yield surface
+SIN_PHI = 1
+COS_PHI = 2
+BETA = 3  # dilatancy beta (not beta over k); 1 where NORMAL is on
+COHESION = 4  # 5 Y/rho0 in units of a0^2 pi G rho0
+VISCOSITY = 5  # 5 (2 mu)/rho0 in units of a0^2 sqrt(pi G rho0), FLUID only
+EXPANSION = 6  # V/V0 at which dilation has ended
+S1 = 7  # squared semi-axes of the rigid body, and its gravity K_g,i
+S2 = 8
+S3 = 9
+G1 = 10
+G2 = 11
+G3 = 12
+NORMAL = 13  # 1: associative flow on a slope k(theta), the true normal; 0: D along the stress deviator
+PART = 14  # which part of the yield section the stress is on, see the codes below
+BESIDE = 15  # angle past the normal of a Mohr-Coulomb face, rad, up to which a corner keeps the stress
+N_PARAMETERS = 16
+
+# Where the stress is on the hexagon of Mohr-Coulomb in associative flow; SMOOTH on any other section.
+SMOOTH = code(0)
+EXTENSION_CORNER = code(1)
+COMPRESSION_CORNER = code(2)
+FACE = code(3)
+
+# Matrices of `Buffers.m` that `field` fills and the rates read.
+W_SINV = 0
+W_K = 1  # K_g + K_t
+W_L = 2
+W_R = 3  # K_g + K_t - L^2
+W_S = 4
+W_N = 5  # FLOWING: stress deviator over p sin(phi) + c cos(phi)
+W_A = 6
+W_B = 7
+W_VECTORS = 8
+W_SCRATCH = 9
+W_FACE = 10  # step from the extension to the compression corner
+# Scratch of `flybystab.core.dynamics.jacobian`.
+J_RATE = 11
+J_UNIT = 12
+J_SQUARE = 13
+J_STRESS = 14
+J_SLIP = 15
+J_FACE = 16
+J_ACROSS = 17
+J_CHANGE = 18
+J_TURN = 19
+J_PRODUCT = 20
+J_NORMAL = 21
+N_WORK = 22
+
+
+# Numbers of `Buffers.s` that `field` and the rates leave.
+VOLUME = 0  # V/V0
+STRENGTH = 1  # k P + k c
+PRESSURE = 2
+DETERMINANT = 3  # of the unit stress deviator
+PLACE = 4  # of the stress on a face, between the corners (0: extension, 1: compression)
+PAST = 5  # angle of D past the normal of the face, rad
+N_NUMBERS = 6
+
+
+class Buffers(NamedTuple):
+    """Scratch of the rates: matrices ``m[N_WORK, 3, 3]``, components ``c[3, 6]`` and numbers ``s[N_NUMBERS]``."""
+
+    m: Array
+    c: Array
+    s: Array
+
+
+@kernel
+def empty_buffers() -> Buffers:
+    """Fresh scratch."""
+    return Buffers(np.zeros((N_WORK, 3, 3)), np.zeros((3, 6)), np.zeros(N_NUMBERS))
+
+
+@kernel
+def rotation_matrix(q: Array, m: Array) -> None:
+    """Rotation matrix ``m[3, 3]`` (body -> fixed) of a quaternion that need not be normalised."""
+    w, x, y, z = q[0], q[1], q[2], q[3]
+    s = 2.0 / (w * w + x * x + y * y + z * z)
+    m[0, 0] = 1.0 - s * (y * y + z * z)
+    m[1, 1] = 1.0 - s * (x * x + z * z)
+    m[2, 2] = 1.0 - s * (x * x + y * y)
+    m[0, 1] = s * (x * y - w * z)
+    m[1, 0] = s * (x * y + w * z)
+    m[0, 2] = s * (x * z + w * y)
+    m[2, 0] = s * (x * z - w * y)
+    m[1, 2] = s * (y * z - w * x)
+    m[2, 1] = s * (y * z + w * x)
+
+
+@kernel
+def rotated_to_body(q: Array, k: Array, m: Array, out: Array) -> None:
+    """Components ``out[6]`` along the body axes of a fixed-frame tensor ``k[6]``; `m` is scratch (3, 3)."""
+    rotation_matrix(q, m)
+    for a in range(3):
+        # row a of m^T K
+        u0 = m[0, a] * k[0] + m[1, a] * k[3] + m[2, a] * k[4]
+        u1 = m[0, a] * k[3] + m[1, a] * k[1] + m[2, a] * k[5]
+        u2 = m[0, a] * k[4] + m[1, a] * k[5] + m[2, a] * k[2]
+        out[a] = u0 * m[0, a] + u1 * m[1, a] + u2 * m[2, a]
+        if a == 0:
+            out[3] = u0 * m[0, 1] + u1 * m[1, 1] + u2 * m[2, 1]
+            out[4] = u0 * m[0, 2] + u1 * m[1, 2] + u2 * m[2, 2]
+        elif a == 1:
+            out[5] = u0 * m[0, 2] + u1 * m[1, 2] + u2 * m[2, 2]
+
+
+@kernel
+def to_fixed_frame(y: Array, par: Array, m: Array, shape: Array, spin: Array) -> None:
+    """Write ``S`` (``shape[6]``) and ``w`` (``spin[3]``) of a RIGID state; ``m[3, 3]`` gets the rotation."""
+    rotation_matrix(y, m)
+    s1, s2, s3 = par[S1], par[S2], par[S3]
+    for c, (i, j) in enumerate(COMPONENTS):
+        shape[c] = s1 * m[i, 0] * m[j, 0] + s2 * m[i, 1] * m[j, 1] + s3 * m[i, 2] * m[j, 2]
+    for i in range(3):
+        spin[i] = m[i, 0] * y[4] + m[i, 1] * y[5] + m[i, 2] * y[6]
+
+
+@kernel
+def gradient(y: Array, out: Array) -> None:
+    """Velocity gradient ``L = D + W`` of a 15-number state."""
+    unpack(y[6:12], out)
+    out[0, 1] -= y[14]
+    out[1, 0] += y[14]
+    out[0, 2] += y[13]
+    out[2, 0] -= y[13]
+    out[1, 2] -= y[12]
+    out[2, 1] += y[12]
+
+
+@kernel
+def set_gradient(m: Array, y: Array) -> None:
+    """Store ``D`` and ``w`` of a velocity gradient ``m[3, 3]`` in a 15-number state, or of its rate."""
+    pack(m, y[6:12])
+    y[12] = 0.5 * (m[2, 1] - m[1, 2])
+    y[13] = 0.5 * (m[0, 2] - m[2, 0])
+    y[14] = 0.5 * (m[1, 0] - m[0, 1])
+
+
+@kernel
+def angular_momentum(y: Array, work: Buffers, h: Array) -> None:
+    """Angular momentum ``H = axial(L S - S L^T)`` about the centre, per ``m/5``, of a 15-number state."""
+    big_l = work.m[W_L]
+    gradient(y, big_l)
+    unpack(y[0:6], work.m[W_S])
+    multiply(big_l, work.m[W_S], work.m[W_A])
+    a = work.m[W_A]
+    # H = int rho x x (L x) = axial vector of (L I) - (L I)^T
+    h[0] = a[2, 1] - a[1, 2]
+    h[1] = a[0, 2] - a[2, 0]
+    h[2] = a[1, 0] - a[0, 1]

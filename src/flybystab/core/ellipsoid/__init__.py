@@ -1,0 +1,1 @@
+"""A homogeneous ellipsoid: self-gravity, tide, stress of rigid rotation, surface slope, bound mass."""

@@ -1,0 +1,131 @@
+"""What a passage has left of a body: axes, spin, and the gravitationally bound share (theory, section 7)."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flybystab.constants import G
+from flybystab.core.ellipsoid.potential import gravity_coefficients, potential_coefficient
+from flybystab.core.numerics.jit import kernel
+from flybystab.core.numerics.tensors import eigensystem, inverse, multiply, pack
+
+Array = NDArray[np.float64]
+
+# Gauss-Legendre in the cosine of the polar angle, trapezoid in longitude.
+_NODES, _WEIGHTS = np.polynomial.legendre.leggauss(128)
+_LONGITUDES = 256
+
+
+@kernel
+def principal_axes(shape: Array, axes: Array, vectors: Array) -> None:
+    """Semi-axes ``axes[3]``, longest first, and their directions (columns of ``vectors[3, 3]``) of ``S[3, 3]``."""
+    c = np.empty(6)
+    v = np.empty((3, 3))
+    pack(shape, c)
+    eigensystem(c, axes, v)
+    for a in range(3):
+        most = a
+        for b in range(a + 1, 3):
+            if axes[b] > axes[most]:
+                most = b
+        axes[a], axes[most] = axes[most], axes[a]
+        for i in range(3):
+            v[i, a], v[i, most] = v[i, most], v[i, a]
+        axes[a] = np.sqrt(axes[a])
+    vectors[:] = v
+
+
+@kernel
+def spin_vector(gradient: Array, w: Array) -> None:
+    """Axial vector ``w[3]`` of the antisymmetric part of a velocity gradient."""
+    w[0] = 0.5 * (gradient[2, 1] - gradient[1, 2])
+    w[1] = 0.5 * (gradient[0, 2] - gradient[2, 0])
+    w[2] = 0.5 * (gradient[1, 0] - gradient[0, 1])
+
+
+@kernel
+def momentum(shape: Array, gradient: Array, h: Array) -> float:
+    """Angular momentum ``h[3]`` per ``m/5``; returns the effective spin rate ``2 E/H`` of rigid rotation with it."""
+    flow = np.empty((3, 3))
+    multiply(gradient, shape, flow)
+    spin_vector(flow, h)
+    for i in range(3):
+        h[i] *= 2.0
+    c = np.empty(6)
+    pack(shape, c)
+    trace = c[0] + c[1] + c[2]
+    for i in range(6):
+        c[i] = trace - c[i] if i < 3 else -c[i]
+    inverse(c, flow)
+    energy = 0.0
+    square = 0.0
+    for i in range(3):
+        square += h[i] * h[i]
+        for j in range(3):
+            energy += h[i] * flow[i, j] * h[j]
+    return energy / np.sqrt(square) if square > 0.0 else 0.0
+
+
+@kernel
+def angle_between(a: Array, b: Array) -> float:
+    """Angle between two vectors, rad; nan if one vanishes."""
+    x = a[1] * b[2] - a[2] * b[1]
+    y = a[2] * b[0] - a[0] * b[2]
+    z = a[0] * b[1] - a[1] * b[0]
+    dot = a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+    if (a[0] == 0.0 and a[1] == 0.0 and a[2] == 0.0) or (b[0] == 0.0 and b[1] == 0.0 and b[2] == 0.0):
+        return np.nan
+    return np.arctan2(np.sqrt(x * x + y * y + z * z), dot)
+
+
+@kernel
+def bound_share(shape: Array, gradient: Array, rho: float) -> float:
+    """Share of the mass bound to a homogeneous ellipsoid with velocity ``L x``; see `flybystab.flybys.verdict`.
+
+    Parameters
+    ----------
+    shape, gradient : ndarray (3, 3)
+        ``S = 5 I/m`` (m2) and ``L`` (1/s) in one frame that does not turn.
+    rho : float
+        kg/m3.
+    """
+    axes = np.empty(3)
+    vectors = np.empty((3, 3))
+    principal_axes(shape, axes, vectors)
+    potential = np.pi * G * rho
+    s1, s2, s3 = axes[0] ** 2, axes[1] ** 2, axes[2] ** 2
+    coefficients = gravity_coefficients(s1, s2, s3)
+    bound = potential * potential_coefficient(s1, s2, s3)
+    # L F with F = (axes) diag(a): the frame on the left does not matter for its square
+    flow = np.empty((3, 3))
+    multiply(gradient, vectors, flow)
+    form = np.empty((3, 3))
+    for i in range(3):
+        for j in range(3):
+            total = 0.0
+            for k in range(3):
+                total += flow[k, i] * flow[k, j]
+            form[i, j] = 0.5 * total * axes[i] * axes[j]
+        form[i, i] += potential * coefficients[i] * axes[i] ** 2
+    c = np.empty(6)
+    pack(form, c)
+    values = np.empty(3)
+    eigensystem(c, values, vectors)
+    # the polar axis is the one that escapes most
+    for i in range(2):
+        if values[i] > values[2]:
+            values[i], values[2] = values[2], values[i]
+    if values[2] < bound:
+        return 1.0
+    share = 0.0
+    for a in range(_NODES.size):
+        mu2 = _NODES[a] ** 2
+        ring = 0.0
+        for b in range(_LONGITUDES):
+            cosine2 = np.cos((b + 0.5) * np.pi / _LONGITUDES) ** 2
+            across = values[0] * cosine2 + values[1] * (1.0 - cosine2)
+            reach2 = bound / (values[2] * mu2 + (1.0 - mu2) * across)
+            ring += min(1.0, reach2 * np.sqrt(reach2))
+        share += 0.5 * _WEIGHTS[a] * ring / _LONGITUDES
+    return share

@@ -1,0 +1,1 @@
+"""The energy criterion: potential, perturbations, least critical energies."""

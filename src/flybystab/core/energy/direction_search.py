@@ -1,0 +1,309 @@
+"""Least critical energy and strain over all directions by descent from many starts.
+
+For what :mod:`flybystab.core.energy.trust_region` cannot do in closed form: third order, barrier, and any order on
+a yield surface that is not circular.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flybystab.core.energy.perturbation import (
+    LONGEST,
+    SQRT2,
+    Pile,
+    barrier,
+    direction,
+    powers,
+    rate_of_strain,
+    second_order,
+    third_order,
+)
+from flybystab.core.energy.potential import MASS
+from flybystab.core.material.yield_surface import MOHR_COULOMB
+from flybystab.core.numerics.jit import code, kernel
+from flybystab.core.numerics.tensors import eigensystem
+
+Array = NDArray[np.float64]
+
+# Flags are numpy's (:func:`flybystab.core.numerics.jit.code`): one compilation serves all orders.
+
+#: What is minimised: ``-P1`` (twice), the series, the barrier (see :func:`level`); its energy or its strain.
+BARRIER, YIELD, SECOND, THIRD = (code(i) for i in range(4))
+ENERGY, STRAIN = code(0), code(1)
+
+#: Angles of a lattice of starts, and how many of them start a descent.
+COARSE, MEDIUM, DENSE = code(6), code(12), code(24)
+THREE, FOUR = code(3), code(4)
+
+#: A minimum that needs no polish.
+ROUGH: bool = np.bool_(False)  # type: ignore[assignment]
+
+#: Sweeps over the coordinates after which a descent ends where it is.
+MOST_SWEEPS = 60
+
+#: Moves of one simplex.
+MOST_TURNS = 200
+
+
+@kernel
+def level(b: Pile, x: Array, order: int, enough: float) -> tuple[float, float]:
+    """Critical energy and strain of one direction at an order: 2, 3, or 0 for the barrier (known up to `enough`).
+
+    Order 1 is ``-P1/V`` (twice): its least value is the distance of the stress from the yield surface.
+    """
+    if order == BARRIER:
+        return barrier(b, x, LONGEST, enough)
+    p1, p2, p3 = powers(b, x)
+    if order == YIELD:
+        return -p1 / MASS, -p1 / MASS
+    if order == SECOND:
+        return second_order(p1, p2)
+    return third_order(p1, p2, p3)
+
+
+@kernel
+def _clip(x: Array, ball: bool) -> None:
+    r = np.sqrt(np.sum(x * x))
+    if not ball or r > 1.0:
+        x /= r
+
+
+@kernel
+def descent(b: Pile, x: Array, order: int, which: int, step: float, smallest: float) -> float:
+    """Minimise the critical energy (or strain) over directions by pattern search from ``x[5]``, which it moves."""
+    ball = b.associative and b.sin > 0.0
+    limit = np.inf
+    best = level(b, x, order, limit)[which]
+    trial = np.empty(5)
+    last = np.zeros(5)
+    for _ in range(MOST_SWEEPS):
+        if step <= smallest or best <= 0.0:
+            break
+        before = best
+        # the strain at a barrier does not bound the energy
+        limit = np.inf if which == STRAIN else best
+        start = x.copy()
+        for i in range(5):
+            for sign in (1.0, -1.0):
+                trial[:] = x
+                trial[i] += sign * step
+                _clip(trial, ball)
+                value = level(b, trial, order, limit)[which]
+                if value < best:
+                    best = value
+                    x[:] = trial
+                    break
+        if best < before:  # go on in the direction that the sweep has found
+            last[:] = x - start
+            for _ in range(4):
+                trial[:] = x + last
+                _clip(trial, ball)
+                value = level(b, trial, order, limit)[which]
+                if value >= best:
+                    break
+                best = value
+                x[:] = trial
+                last *= 2.0
+        if before - best <= 1e-4 * abs(best):
+            step *= 0.4
+    return best
+
+
+@kernel
+def _on_face(b: Pile, turn: Array, axes: Array, x: Array) -> None:
+    """Write the unit normal ``x[5]`` to the Mohr-Coulomb face whose principal axes are `axes` turned by ``turn[3]``.
+
+    ``f = (sigma_1 - sigma_3) + (sigma_1 + sigma_3) sin(phi)``. The columns of `axes` go from least to greatest.
+    """
+    q = np.sqrt(1.0 + np.sum(turn[:3] * turn[:3]))
+    w, u, v, r = 1.0 / q, turn[0] / q, turn[1] / q, turn[2] / q
+    rotation = np.array(
+        [
+            [1.0 - 2.0 * (v * v + r * r), 2.0 * (u * v - w * r), 2.0 * (u * r + w * v)],
+            [2.0 * (u * v + w * r), 1.0 - 2.0 * (u * u + r * r), 2.0 * (v * r - w * u)],
+            [2.0 * (u * r - w * v), 2.0 * (v * r + w * u), 1.0 - 2.0 * (u * u + v * v)],
+        ]
+    )
+    turned = rotation @ axes
+    most, least_ = 1.0 + b.sin, -(1.0 - b.sin)
+    d = np.empty(6)
+    for i in range(3):
+        d[i] = most * turned[i, 2] ** 2 + least_ * turned[i, 0] ** 2
+    d[3] = most * turned[0, 2] * turned[1, 2] + least_ * turned[0, 0] * turned[1, 0]
+    d[4] = most * turned[0, 2] * turned[2, 2] + least_ * turned[0, 0] * turned[2, 0]
+    d[5] = most * turned[1, 2] * turned[2, 2] + least_ * turned[1, 0] * turned[2, 0]
+    direction(d, x)
+    x /= np.sqrt(np.sum(x * x))
+
+
+@kernel
+def _principal(x: Array, axes: Array) -> None:
+    """Write the principal axes of a direction as columns, from least to greatest rate of strain."""
+    d = np.empty(6)
+    rate_of_strain(x, 0.0, d)
+    values = np.empty(3)
+    vectors = np.empty((3, 3))
+    eigensystem(d, values, vectors)
+    rank = np.argsort(values)
+    for j in range(3):
+        axes[:, j] = vectors[:, rank[j]]
+
+
+@kernel
+def polish(b: Pile, x: Array, order: int, which: int, size: float, smallest: float, on_face: bool) -> float:
+    """Lower the critical energy (or strain) from ``x[5]``, which it moves, by simplices (Nelder & Mead 1965).
+
+    A simplex turns into the narrow, curved valleys along which no coordinate leads down; it is set up anew and
+    smaller until a round gains nothing. `on_face` moves along the normals of the Mohr-Coulomb faces, where the
+    dissipation of associative flow, the greater of two linear functions of the greatest and the least principal
+    rate, has a kink: the bottom of a sharp valley.
+    """
+    ball = b.associative and b.sin > 0.0
+    n = 3 if on_face else 5
+    axes = np.empty((3, 3))
+    corners = np.empty((n + 1, n))
+    values = np.empty(n + 1)
+    centre = np.empty(n)
+    trial = np.empty(n)
+    other = np.empty(n)
+    y = x.copy()
+    if on_face:
+        _principal(x, axes)
+        _on_face(b, np.zeros(3), axes, y)
+    best = level(b, y, order, np.inf)[which]
+    while size > smallest and 0.0 < best < np.inf:
+        before = best
+        corners[:] = 0.0
+        if on_face:
+            _principal(y, axes)
+        else:
+            corners[:] = y
+        values[0] = best
+        for i in range(n):
+            corners[i + 1, i] += size if corners[i + 1, i] <= 0.0 else -size
+            values[i + 1] = _corner(b, corners[i + 1], order, which, ball, axes, y)
+        for _ in range(MOST_TURNS):
+            rank = np.argsort(values)
+            low, high, second = rank[0], rank[n], rank[n - 1]
+            if values[high] - values[low] <= 1e-9 * values[low]:
+                break
+            for i in range(n):
+                centre[i] = (np.sum(corners[:, i]) - corners[high, i]) / n
+            trial[:] = 2.0 * centre - corners[high]
+            value = _corner(b, trial, order, which, ball, axes, y)
+            if value < values[low]:
+                other[:] = 3.0 * centre - 2.0 * corners[high]
+                farther = _corner(b, other, order, which, ball, axes, y)
+                if farther < value:
+                    value = farther
+                    trial[:] = other
+            elif value >= values[second]:
+                inside = 0.5 if value < values[high] else -0.5
+                other[:] = centre + inside * (centre - corners[high])
+                nearer = _corner(b, other, order, which, ball, axes, y)
+                if nearer >= min(value, values[high]):
+                    for i in range(n + 1):
+                        if i != low:
+                            corners[i] = 0.5 * (corners[i] + corners[low])
+                            values[i] = _corner(b, corners[i], order, which, ball, axes, y)
+                    continue
+                value = nearer
+                trial[:] = other
+            corners[high] = trial
+            values[high] = value
+        low = np.argmin(values)
+        best = _corner(b, corners[low], order, which, ball, axes, y)
+        if before - best <= 1e-6 * before:
+            size *= 0.1
+    x[:] = y
+    return best
+
+
+@kernel
+def _corner(b: Pile, v: Array, order: int, which: int, ball: bool, axes: Array, y: Array) -> float:
+    """Value at the corner ``v`` of a simplex, which it brings into the ball; writes its direction ``y[5]``."""
+    if v.size == 3:
+        _on_face(b, v, axes, y)
+    else:
+        _clip(v, ball)
+        y[:] = v
+    return level(b, y, order, np.inf)[which]
+
+
+@kernel
+def starts(n_angles: int, ball: bool) -> Array:
+    """Directions that cover the deviators: circles through the diagonal ones and each shear; and inside the ball."""
+    out = np.zeros((n_angles * 7 + 7, 5))
+    n = 0
+    for i in range(n_angles):
+        chi = 2.0 * np.pi * i / n_angles
+        out[n, 0] = np.cos(chi)
+        out[n, 1] = np.sin(chi)
+        n += 1
+        for shear in range(2, 5):
+            for sign in (1.0, -1.0):
+                out[n, 0] = np.cos(chi) / SQRT2
+                out[n, 1] = np.sin(chi) / SQRT2
+                out[n, shear] = sign / SQRT2
+                n += 1
+    for shear in range(2, 5):
+        for sign in (1.0, -1.0):
+            out[n, shear] = sign
+            n += 1
+    if ball:
+        n += 1  # the centre: pure dilation
+    return out[:n]
+
+
+@kernel
+def least(
+    b: Pile,
+    order: int,
+    which: int,
+    seeds: Array,
+    n_angles: int,
+    tries: int,
+    smallest: float,
+    fine: bool,
+    x: Array,
+) -> tuple[float, float]:
+    """Least critical energy (or strain) at an order, with its strain (or energy); writes the direction ``x[5]``.
+
+    The best `tries` of the `seeds` and of a lattice of directions each start a descent; `fine` polishes the best.
+    """
+    ball = b.associative and b.sin > 0.0
+    edged = ball and b.code == MOHR_COULOMB
+    lattice = starts(n_angles, ball)
+    n = seeds.shape[0] + lattice.shape[0]
+    values = np.empty(n)
+    enough = np.inf
+    for i in range(n):
+        y = seeds[i] if i < seeds.shape[0] else lattice[i - seeds.shape[0]]
+        values[i] = level(b, y, order, enough)[which]
+        if which == ENERGY:
+            enough = min(enough, 2.0 * values[i])
+    best = np.inf
+    rank = np.argsort(values)
+    x[:] = lattice[0]
+    trial = np.empty(5)
+    for r in range(min(tries, n)):
+        i = rank[r]
+        if not values[i] < np.inf:
+            break
+        trial[:] = seeds[i] if i < seeds.shape[0] else lattice[i - seeds.shape[0]]
+        value = descent(b, trial, order, which, 0.2, smallest)
+        if value < best:
+            best = value
+            x[:] = trial
+    if best == np.inf:
+        return np.inf, np.inf
+    for face in range(2):
+        if fine if face == 0 else edged:
+            trial[:] = x
+            value = polish(b, trial, order, which, 0.1, 3e-4, face == 1)
+            if value < best:
+                best = value
+                x[:] = trial
+    return best, level(b, x, order, np.inf)[1 - which]

@@ -1,0 +1,283 @@
+"""The stability of one granular ellipsoid, and of many, as one row of numbers each.
+
+Columns are named by the constants below. Units as in :mod:`flybystab.core.energy.potential`.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flybystab.core.ellipsoid.rigid_stress import demand, invariants, overload, rigid_stress
+from flybystab.core.energy.direction_search import (
+    BARRIER,
+    COARSE,
+    DENSE,
+    ENERGY,
+    FOUR,
+    MEDIUM,
+    ROUGH,
+    SECOND,
+    STRAIN,
+    THIRD,
+    THREE,
+    YIELD,
+    least,
+)
+from flybystab.core.energy.perturbation import (
+    Pile,
+    direction,
+    pile,
+    powers,
+    rate_of_strain,
+    slope_of_flow,
+)
+from flybystab.core.energy.potential import MASS, energy_derivatives
+from flybystab.core.energy.trust_region import curvature_form, least_second_order, trust_region
+from flybystab.core.material.yield_surface import DRUCKER_PRAGER, EXTENSION_CONE
+from flybystab.core.numerics.jit import kernel
+from flybystab.core.numerics.tensors import eigensystem
+
+Array = NDArray[np.float64]
+
+(
+    FRICTION,  # required friction angle, rad
+    PRESSURE,
+    COHESION,  # required at the given friction angle
+    OVERLOAD,  # |s| sin/k - p sin - Y cos: the body is admissible where it is not positive
+    LEVEL,  # 0 inadmissible, 1 admissible, 2 stable to infinitesimal pushes, 3 to any push at second order
+    CURVATURE,  # Phi''/(p V) along D* with the required friction mobilised
+    ENERGY_2,
+    STRAIN_2,
+    ENERGY_3,
+    STRAIN_3,
+    ENERGY_B,
+    STRAIN_B,
+    KAPPA,  # kappa_crit
+    SOFTEST,  # greatest P2/V over all directions
+) = range(14)
+COLUMNS = 14
+
+#: Rows of the directions: second order by energy and by strain, third order by energy and by strain, barrier.
+DIRECTIONS = 5
+
+#: A stress this close to the yield surface, relative to the pressure, counts as being on it.
+ON_YIELD = 1e-9
+
+
+@kernel
+def _circular(code: int) -> bool:
+    return code in (DRUCKER_PRAGER, EXTENSION_CONE)
+
+
+@kernel
+def first_to_flow(b: Pile, x: Array) -> float:
+    """Greatest ``P1/V`` over all directions and the unit direction ``x[5]`` that has it."""
+    size = np.sqrt(np.sum(b.stress * b.stress))
+    if _circular(b.code):
+        if size > 0.0:
+            x[:] = b.stress / size
+        else:
+            x[:] = 0.0
+            x[0] = 1.0
+    else:
+        seeds = np.zeros((2, 5))
+        seeds[0, 0] = seeds[1, 0] = 1.0
+        if size > 0.0:
+            seeds[0] = b.stress / size
+            _face_normal(b, seeds[1])
+        least(b, YIELD, ENERGY, seeds, DENSE, THREE, 1e-7, ROUGH, x)
+        x /= np.sqrt(np.sum(x * x))
+    p1, _, _ = powers(b, x)
+    return p1 / MASS
+
+
+@kernel
+def _face_normal(b: Pile, x: Array) -> None:
+    """Unit deviator ``x[5]`` of the normal to the Mohr-Coulomb face that the stress is under.
+
+    ``f = (sigma_1 - sigma_3) + (sigma_1 + sigma_3) sin(phi)``: ``P1`` has a kink there, which a descent misses.
+    """
+    stress = np.empty(6)
+    rate_of_strain(b.stress, 0.0, stress)
+    values = np.empty(3)
+    vectors = np.empty((3, 3))
+    eigensystem(stress, values, vectors)
+    top = np.argmax(values)
+    low = np.argmin(values)
+    d = np.empty(6)
+    for i in range(3):
+        d[i] = (1.0 + b.sin) * vectors[i, top] ** 2 - (1.0 - b.sin) * vectors[i, low] ** 2
+    for k in range(3):
+        i = 0 if k < 2 else 1
+        j = k + 1 if k < 2 else 2
+        d[3 + k] = (1.0 + b.sin) * vectors[i, top] * vectors[j, top]
+        d[3 + k] -= (1.0 - b.sin) * vectors[i, low] * vectors[j, low]
+    direction(d, x)
+    x /= np.sqrt(np.sum(x * x))
+
+
+@kernel
+def mobilised_curvature(
+    s: Array, spin: Array, code: int, friction: float, cohesion: float, pressure: float
+) -> float:
+    """``Phi''/(p V)`` along the associative ``D*`` when exactly the `friction` that is required is there.
+
+    Positive: the body is stable to infinitesimal pushes even with its friction fully mobilised. nan where
+    there is no deviator (``D*`` is undefined), no pressure or no sufficient friction.
+    """
+    b = pile(s[0], s[1], s[2], spin, code, friction, cohesion, 1.0, 0.0)
+    if not friction < np.inf or pressure <= 0.0 or np.sum(b.stress * b.stress) <= 1e-28 * pressure * pressure:
+        return np.nan
+    x = np.empty(5)
+    first_to_flow(b, x)
+    _, beta = slope_of_flow(b, x)
+    d = np.empty(6)
+    rate_of_strain(x, beta, d)
+    _, f2, _ = energy_derivatives(b.s[0], b.s[1], b.s[2], b.one, b.two, b.three, b.spin, d)
+    return f2 / (pressure * MASS)
+
+
+@kernel
+def classify(
+    s1: float,
+    s2: float,
+    s3: float,
+    spin: Array,
+    code: int,
+    phi: float,
+    cohesion: float,
+    dilatancy: float,
+    kappa: float,
+    depth: int,
+    row: Array,
+    directions: Array,
+) -> None:
+    """Write ``row[COLUMNS]`` and ``directions[DIRECTIONS, 5]``.
+
+    `depth` 0 stops at the required friction, 1 at infinitesimal stability, 2 at the second order, 3 at the third,
+    4 goes on to the barrier, 5 also minimises the strains of third order on their own. What is not reached is nan.
+    """
+    row[:] = np.nan
+    directions[:] = np.nan
+    scale = np.cbrt(s1 * s2 * s3)
+    s = np.empty(3)
+    s[0] = s1 / scale
+    s[1] = s2 / scale
+    s[2] = s3 / scale
+    stress = np.empty(6)
+    rigid_stress(s[0], s[1], s[2], 1.0, 1.0, spin, np.zeros(6), stress)
+    p, size, _ = invariants(stress)
+    row[PRESSURE] = p
+    row[FRICTION], row[COHESION] = demand(code, phi, cohesion, stress)
+    row[OVERLOAD] = overload(code, phi, cohesion, stress)
+    tolerance = ON_YIELD * max(abs(p), cohesion)
+    admissible = row[OVERLOAD] <= tolerance
+    row[LEVEL] = 1.0 if admissible else 0.0
+    if depth < 1:
+        return
+    row[CURVATURE] = mobilised_curvature(s, spin, code, row[FRICTION], cohesion, p)
+    if not admissible:
+        for i in range(ENERGY_2, STRAIN_B + 1):
+            row[i] = 0.0
+        return
+    b = pile(s[0], s[1], s[2], spin, code, phi, cohesion, dilatancy, kappa)
+    x = np.empty(5)
+    push = first_to_flow(b, x)
+    _, p2, _ = powers(b, x)
+    f = np.empty((6, 6))
+    curvature_form(b, f)
+    y = np.zeros(5)
+    g, beta = slope_of_flow(b, x)
+    k = g * b.sin
+    if 0.0 < beta < k and not b.associative and size > 0.0:
+        direction(stress, y)
+        y /= np.sqrt(np.sum(y * y))
+        d = np.empty(6)
+        rate_of_strain(y, beta, d)
+        _, f2, _ = energy_derivatives(b.s[0], b.s[1], b.s[2], b.one, b.two, b.three, b.spin, d)
+        g, _ = slope_of_flow(b, y)
+        k = g * b.sin
+        row[KAPPA] = p + (f2 / MASS + beta * g * b.cohesion) / (beta * (k - beta))
+    if push < -tolerance:
+        stable = True
+    elif size <= ON_YIELD * abs(p) and k * p <= tolerance:
+        # neither deviator nor friction: a fluid, to be tested in every direction that keeps the volume
+        stable = trust_region(f[:5, :5].copy(), np.zeros(5), False, y) > 0.0
+    else:
+        stable = push <= tolerance and p2 < 0.0
+    if stable:
+        row[LEVEL] = 2.0
+    if depth < 2:
+        return
+    seeds = np.zeros((3, 5))
+    xs = np.empty(5)
+    if _circular(code):
+        xe = x.copy()
+        row[ENERGY_2], row[STRAIN_2], most = least_second_order(b, xe, xs)
+        row[SOFTEST] = most / MASS
+        if push >= -tolerance and not stable:
+            row[ENERGY_2] = row[STRAIN_2] = 0.0
+    else:
+        xe = x.copy()
+        seeds[:] = x
+        row[ENERGY_2], _ = least(b, SECOND, ENERGY, seeds, DENSE, FOUR, 1e-6, depth > 4, xe)
+        row[STRAIN_2], _ = least(b, SECOND, STRAIN, seeds, DENSE, FOUR, 1e-6, depth > 4, xs)
+    directions[0] = xe
+    directions[1] = xs
+    if stable and row[ENERGY_2] == np.inf:
+        row[LEVEL] = 3.0
+    if depth < 3:
+        return
+    seeds[0] = xe
+    seeds[1] = xs
+    seeds[2] = x
+    row[ENERGY_3], row[STRAIN_3] = least(b, THIRD, ENERGY, seeds, MEDIUM, THREE, 1e-4, depth > 4, xe)
+    directions[2] = xe
+    if depth > 4:
+        row[STRAIN_3], _ = least(b, THIRD, STRAIN, seeds, MEDIUM, THREE, 1e-4, depth > 4, xs)
+        directions[3] = xs
+    if depth < 4:
+        return
+    seeds[2] = xe
+    row[ENERGY_B], row[STRAIN_B] = least(
+        b, BARRIER, ENERGY, seeds, MEDIUM if depth > 4 else COARSE, THREE, 1e-3, depth > 4, xe
+    )
+    directions[4] = xe
+
+
+@kernel
+def classify_many(
+    s: Array,
+    spin: Array,
+    code: int,
+    phi: Array,
+    cohesion: Array,
+    dilatancy: float,
+    kappa: Array,
+    depth: int,
+    out: Array,
+) -> None:
+    """:func:`classify` for every row of ``s[n, 3]``, ``spin[n, 3]``, ``phi[n]``, ...; writes ``out[n, COLUMNS]``.
+
+    Rows whose squared axes are not positive numbers stay nan.
+    """
+    directions = np.empty((DIRECTIONS, 5))
+    for i in range(s.shape[0]):
+        if s[i, 0] > 0.0 and s[i, 1] > 0.0 and s[i, 2] > 0.0:
+            classify(
+                s[i, 0],
+                s[i, 1],
+                s[i, 2],
+                spin[i],
+                code,
+                phi[i],
+                cohesion[i],
+                dilatancy,
+                kappa[i],
+                depth,
+                out[i],
+                directions,
+            )
+        else:
+            out[i] = np.nan

@@ -1,0 +1,1 @@
+"""Yield surfaces and the flow rule of a granular material."""

@@ -1,0 +1,317 @@
+"""Yield surfaces ``|s| <= k(theta) (p + Y cot phi)`` of a granular material (theory, section 3).
+
+Stress is positive in tension, ``p = -tr(sigma)/3``, ``s`` the deviator, ``|s|^2 = s:s``. The Lode angle
+``theta = asin(-3 sqrt6 det(s/|s|))/3`` runs from -30 deg (triaxial extension) to +30 deg (compression).
+
+============  ============================  =============================================================
+code          name                          slope k
+============  ============================  =============================================================
+0             drucker-prager                ``2 sqrt6 sin/(3 - sin)``, meets Mohr-Coulomb in compression
+1             drucker-prager-extension      ``2 sqrt6 sin/(3 + sin)``, meets it in extension
+2             mohr-coulomb                  ``sqrt2 sin/(cos theta - sin theta sin/sqrt3)``
+3             matsuoka-nakai                smallest positive root of
+                                            ``eta d k^3 + (eta-3)/2 k^2 - (eta-9) = 0``, d = det(s/|s|),
+                                            ``eta = I1 I2/I3 = 9 + 8 tan^2``; meets it at both ends
+============  ============================  =============================================================
+
+Associative flow needs the yield section from the side of the rate of strain: the stress deviator whose normal a
+given ``D'`` is (`normal`), and the dilation ``tr D = m(D')`` that goes with it, ``m`` the support function of the
+section. Both are written with the gauge ``gamma = sin(phi)/k``: the section is ``|s| gamma(theta) <= p sin(phi)``
+(+ ``Y cos(phi)``), its normal at ``theta`` is turned by ``atan(gamma'/gamma)`` from the radius, and convexity is
+``gamma + gamma'' >= 0``.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flybystab.core.numerics.jit import kernel
+
+Array = NDArray[np.float64]
+
+SQRT2 = np.sqrt(2.0)
+SQRT3 = np.sqrt(3.0)
+SQRT6 = np.sqrt(6.0)
+
+DRUCKER_PRAGER = 0
+EXTENSION_CONE = 1
+MOHR_COULOMB = 2
+MATSUOKA_NAKAI = 3
+
+
+@kernel
+def lode_angle(det: float) -> float:
+    """Lode angle, rad, from the determinant of the unit deviator."""
+    return np.arcsin(min(1.0, max(-1.0, -3.0 * SQRT6 * det))) / 3.0
+
+
+@kernel
+def slope_over_sine(code: int, sin_phi: float, det: float) -> float:
+    """``k / sin(phi)`` in the direction of a unit deviator with determinant `det`; finite at ``phi = 0``."""
+    if code == DRUCKER_PRAGER:
+        return 2.0 * SQRT6 / (3.0 - sin_phi)
+    if code == EXTENSION_CONE:
+        return 2.0 * SQRT6 / (3.0 + sin_phi)
+    if code == MOHR_COULOMB:
+        theta = lode_angle(det)
+        return SQRT2 / (np.cos(theta) - np.sin(theta) * sin_phi / SQRT3)
+    # x = 1/k solves x^3 - x (eta-3)/(2(eta-9)) - eta det/(eta-9) = 0; with t = tan phi and
+    # eta - 9 = 8 t^2 the largest root is 2 sqrt(a/3) cos(acos(b)/3), a = (eta-3)/(2(eta-9)).
+    t2 = sin_phi * sin_phi / (1.0 - sin_phi * sin_phi)
+    eta = 9.0 + 8.0 * t2
+    half = 0.5 * (eta - 3.0)
+    # b = (3 eta det / (2 (eta-9))) / (a sqrt(a/3))  written without dividing by t2
+    b = 1.5 * eta * det * np.sqrt(8.0 * t2) / (half * np.sqrt(half / 3.0))
+    largest = 2.0 * np.sqrt(half / 3.0) * np.cos(np.arccos(min(1.0, max(-1.0, b))) / 3.0)
+    # k = sqrt(8) tan(phi) / largest
+    return np.sqrt(8.0 / (1.0 - sin_phi * sin_phi)) / largest
+
+
+@kernel
+def slope(code: int, sin_phi: float, det: float) -> float:
+    """Slope ``k(theta)`` of the yield surface in the direction of a unit deviator."""
+    return sin_phi * slope_over_sine(code, sin_phi, det)
+
+
+@kernel
+def gauge(code: int, sin_phi: float, theta: float) -> tuple[float, float, float]:
+    """``gamma = sin(phi)/k``, ``gamma'`` and ``gamma + gamma''`` at a Lode angle, rad."""
+    if code == MOHR_COULOMB:
+        t = sin_phi / SQRT3
+        c, s = np.cos(theta), np.sin(theta)
+        return (c - s * t) / SQRT2, -(s + c * t) / SQRT2, 0.0
+    if code != MATSUOKA_NAKAI:
+        g = 1.0 / slope_over_sine(code, sin_phi, 0.0)
+        return g, 0.0, g
+    # gamma = size cos(psi/3) with cos psi = -b sin(3 theta), see `slope_over_sine`
+    cos2 = 1.0 - sin_phi * sin_phi
+    t2 = sin_phi * sin_phi / cos2
+    eta = 9.0 + 8.0 * t2
+    half = 0.5 * (eta - 3.0)
+    b = 1.5 * eta * np.sqrt(8.0 * t2) / (half * np.sqrt(half / 3.0)) / (3.0 * SQRT6)
+    size = 2.0 * np.sqrt(half / 3.0) * np.sqrt(cos2 / 8.0)
+    s3, c3 = np.sin(3.0 * theta), np.cos(3.0 * theta)
+    x = -b * s3
+    root2 = max(1e-300, 1.0 - x * x)
+    root = np.sqrt(root2)
+    third = np.arccos(min(1.0, max(-1.0, x))) / 3.0
+    first = b * c3 / root  # psi'/3
+    second = -3.0 * b * s3 / root * (1.0 - (b * c3) ** 2 / root2)
+    c, s = np.cos(third), np.sin(third)
+    value = size * c
+    return value, -size * s * first, value - size * (c * first * first + s * second)
+
+
+@kernel
+def _turned(theta: float, s3: float, c3: float, angle: float) -> tuple[float, float]:
+    """Coefficients of ``u`` and ``u^2 - 1/3`` in the unit deviator `u` at `theta` turned by a Lode `angle`.
+
+    The unit deviator of increasing theta is ``-(sqrt6 (u^2 - 1/3) + sin(3 theta) u)/cos(3 theta)``.
+    """
+    ratio = np.sin(angle) / c3
+    return np.cos(angle) - ratio * s3, -SQRT6 * ratio
+
+
+@kernel
+def corner(sin_phi: float, det: float, extension: bool) -> tuple[float, float, float, float, float]:
+    """As `normal`, with the stress at one of the corners of Mohr-Coulomb whatever the direction of ``u``.
+
+    Right in the fan of normals of that corner (for extension: Lode angles of ``u`` below that of the face); its
+    smooth continuation beyond.
+    """
+    s3 = min(1.0 - 5e-13, max(5e-13 - 1.0, -3.0 * SQRT6 * det))
+    c3 = np.sqrt(1.0 - s3 * s3)
+    flow = np.arcsin(s3) / 3.0
+    theta = -np.pi / 6.0 if extension else np.pi / 6.0
+    g = 1.0 / gauge(MOHR_COULOMB, sin_phi, theta)[0]
+    a, b = _turned(flow, s3, c3, theta - flow)
+    return a * g, b * g, np.cos(theta - flow) * g, g, -np.sin(3.0 * theta) / (3.0 * SQRT6)
+
+
+@kernel
+def beyond_face(sin_phi: float, det: float) -> float:
+    """Lode angle, rad, of a rate of strain less that of the normal of a Mohr-Coulomb face.
+
+    Positive in the fan of the compression corner, negative in that of the extension corner.
+    """
+    return lode_angle(det) + np.arctan(sin_phi / SQRT3)
+
+
+@kernel
+def onto_face(sin_phi: float, det: float) -> tuple[float, float, float]:
+    """Coefficients of ``u`` and ``u^2 - 1/3`` in the normal of a Mohr-Coulomb face nearest to a unit deviator ``u``.
+
+    With the determinant of that normal.
+    """
+    s3 = min(1.0 - 5e-13, max(5e-13 - 1.0, -3.0 * SQRT6 * det))
+    a, b = _turned(np.arcsin(s3) / 3.0, s3, np.sqrt(1.0 - s3 * s3), -beyond_face(sin_phi, det))
+    return a, b, np.sin(3.0 * np.arctan(sin_phi / SQRT3)) / (3.0 * SQRT6)
+
+
+@kernel
+def normal(code: int, sin_phi: float, det: float) -> tuple[float, float, float, float, float]:
+    """Stress on the yield section whose outward normal is a unit deviator ``u`` of determinant `det`.
+
+    Returns ``a, b``: the stress deviator over ``p sin(phi) + Y cos(phi)`` is ``a u + b (u^2 - 1/3)``; the support
+    ``m/sin(phi) = a + 3 b det`` of the section in the direction ``u``; and ``k/sin(phi)`` and the unit determinant
+    of that stress.
+
+    Matsuoka-Nakai: the root of ``gamma' cos(y) - gamma sin(y) = 0`` with ``y`` = (Lode angle of u) - theta is unique,
+    since this grows with theta for a convex section. Mohr-Coulomb: a corner, see `corner`; in the one direction
+    that is normal to a face, ``theta = -atan(sin(phi)/sqrt3)``, the support is right and the stress is one end
+    of the face.
+    """
+    if code == MOHR_COULOMB:
+        return corner(sin_phi, det, beyond_face(sin_phi, det) <= 0.0)
+    if code != MATSUOKA_NAKAI:
+        g = slope_over_sine(code, sin_phi, det)
+        return g, 0.0, g, g, det
+    s3 = min(1.0 - 5e-13, max(5e-13 - 1.0, -3.0 * SQRT6 * det))
+    c3 = np.sqrt(1.0 - s3 * s3)
+    flow = np.arcsin(s3) / 3.0
+    low, high = -np.pi / 6.0, np.pi / 6.0
+    theta = flow
+    for _ in range(60):
+        value, first, bend = gauge(code, sin_phi, theta)
+        y = flow - theta
+        f = first * np.cos(y) - value * np.sin(y)
+        if f > 0.0:
+            high = theta
+        else:
+            low = theta
+        step = f / (bend * np.cos(y)) if bend > 0.0 else np.inf
+        if abs(step) < 1e-15:
+            break
+        new = theta - step
+        if not (low < new < high):
+            new = 0.5 * (low + high)
+        if new == theta:
+            break
+        theta = new
+    g = 1.0 / gauge(code, sin_phi, theta)[0]
+    a, b = _turned(flow, s3, c3, theta - flow)
+    return a * g, b * g, np.cos(theta - flow) * g, g, -np.sin(3.0 * theta) / (3.0 * SQRT6)
+
+
+@kernel
+def flow_direction(code: int, sin_phi: float, det: float) -> tuple[float, float, float]:
+    """Normal of the yield section at a stress whose unit deviator ``u`` has determinant `det`.
+
+    Returns ``a, b, m/sin(phi)``: the unit normal is ``a u + b (u^2 - 1/3)``, ``m`` the support. At a corner the
+    middle of the fan, which is ``u`` itself.
+    """
+    s3 = min(1.0, max(-1.0, -3.0 * SQRT6 * det))
+    c3 = np.sqrt(1.0 - s3 * s3)
+    theta = np.arcsin(s3) / 3.0
+    value, first, _ = gauge(code, sin_phi, theta)
+    if c3 < 1e-9 or first == 0.0:
+        return 1.0, 0.0, 1.0 / value
+    angle = np.arctan(first / value)
+    a, b = _turned(theta, s3, c3, angle)
+    return a, b, np.cos(angle) / value
+
+
+@kernel
+def least_slope(code: int, sin_phi: float) -> float:
+    """Smallest ``k`` over the Lode angle: the largest dilatancy that creates no energy."""
+    if code == DRUCKER_PRAGER:
+        return 2.0 * SQRT6 * sin_phi / (3.0 - sin_phi)
+    if code == MOHR_COULOMB:  # at tan(theta) = -sin(phi)/sqrt3
+        return SQRT2 * sin_phi / np.sqrt(1.0 + sin_phi * sin_phi / 3.0)
+    return 2.0 * SQRT6 * sin_phi / (3.0 + sin_phi)
+
+
+@kernel
+def required_friction(code: int, cohesion: float, s: float, p: float, det: float) -> float:
+    """Mobilised friction angle, rad: the least ``phi`` that bears a stress; inf where none does.
+
+    Parameters
+    ----------
+    code : int
+        Yield surface.
+    cohesion : float
+        Mohr-Coulomb cohesion ``Y``, in the unit of `s` and `p`.
+    s, p : float
+        Norm of the deviator and pressure.
+    det : float
+        Determinant of the unit deviator (0 where ``s = 0``).
+
+    Notes
+    -----
+    The first three surfaces read ``A sin(phi) + B cos(phi) = C``; Matsuoka-Nakai without cohesion is
+    ``tan^2(phi) = (I1 I2/I3 - 9)/8`` and is bisected with it.
+    """
+    if s == 0.0:
+        return 0.0 if p + cohesion >= 0.0 else np.inf
+    if code == MATSUOKA_NAKAI:
+        if cohesion == 0.0:
+            if p <= 0.0:
+                return np.inf
+            k = s / p
+            i3 = 1.0 - 0.5 * k * k - det * k * k * k
+            # all principal stresses compressive: I2 > 0 and I3 > 0
+            if i3 <= 0.0 or 3.0 - 0.5 * k * k <= 0.0:
+                return np.inf
+            tan2 = (9.0 - 1.5 * k * k - 9.0 * i3) / (8.0 * i3)
+            return np.arctan(np.sqrt(max(0.0, tan2)))
+        # Cohesion counts for less as phi grows, so that a stress may be borne on an interval of phi only.
+        if _bears(code, 0.0, cohesion, s, p, det):
+            return 0.0
+        step = 0.5 * np.pi * (1.0 - 1e-4) / 128.0  # tan^2 must stay finite
+        n = 1
+        while n <= 128 and not _bears(code, n * step, cohesion, s, p, det):
+            n += 1
+        if n > 128:
+            return np.inf
+        low = (n - 1) * step
+        high = n * step
+        for _ in range(100):
+            mid = 0.5 * (low + high)
+            if mid in (low, high):
+                break
+            if _bears(code, mid, cohesion, s, p, det):
+                high = mid
+            else:
+                low = mid
+        return high
+    if code == MOHR_COULOMB:
+        theta = lode_angle(det)
+        a = SQRT2 * p + s * np.sin(theta) / SQRT3
+        b = SQRT2 * cohesion
+        c = s * np.cos(theta)
+    else:
+        sign = 1.0 if code == DRUCKER_PRAGER else -1.0
+        a = 2.0 * SQRT6 * p + sign * s
+        b = 2.0 * SQRT6 * cohesion
+        c = 3.0 * s
+    if c <= b:
+        return 0.0
+    r = np.hypot(a, b)
+    if a <= 0.0 or c > r:  # a <= 0: the left side falls from b < c as phi grows
+        return np.inf
+    # r sin(phi + psi) = c, psi = atan2(b, a): the smaller root
+    phi = np.arcsin(c / r) - np.arctan2(b, a)
+    return phi if phi < 0.5 * np.pi else np.inf
+
+
+@kernel
+def required_frictions(code: int, cohesion: float, s: Array, p: Array, det: Array) -> Array:
+    """`required_friction` of each of a row of stresses."""
+    out = np.empty(len(s))
+    for i in range(len(s)):
+        out[i] = required_friction(code, cohesion, s[i], p[i], det[i])
+    return out
+
+
+@kernel
+def _bears(code: int, phi: float, cohesion: float, s: float, p: float, det: float) -> bool:
+    g = slope_over_sine(code, np.sin(phi), det)
+    return s <= g * (p * np.sin(phi) + cohesion * np.cos(phi))
+
+
+@kernel
+def required_cohesion(code: int, phi: float, s: float, p: float, det: float) -> float:
+    """Least cohesion ``Y = tan(phi) max(0, |s|/k - p)`` that bears a stress, in the unit of `s` and `p`."""
+    g = slope_over_sine(code, np.sin(phi), det)
+    return max(0.0, (s / g - p * np.sin(phi)) / np.cos(phi))

@@ -1,0 +1,1 @@
+"""Compilation of kernels, their cache, 3x3 tensors and threads."""

@@ -1,0 +1,66 @@
+"""The one way in which the package compiles a kernel.
+
+``kernel`` is ``numba.njit`` with the on-disk cache, without the GIL and with IEEE division (a zero
+divisor gives inf or nan, which the callers test for, instead of an exception inside a kernel).
+``fastmath`` stays off: compensated sums and sign tests rely on the order of operations. ``summing_kernel`` is for
+the few inner loops that are plain sums: there the compiler may reorder additions and fuse products, which lets it
+use vector instructions; infinities and nan keep their meaning. ``pasted_kernel`` is one that is pasted into its
+caller. A kernel on disk is compiled anew when any file that it is made from has changed
+(:mod:`flybystab.core.numerics.kernel_cache`). Where the cache
+cannot be written anywhere (read-only package and home) each process compiles for itself.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numba import config, njit
+from numba.core import cgutils
+from numba.extending import intrinsic
+from numba.np.arrayobj import make_array
+
+from flybystab.core.numerics.kernel_cache import watch
+
+watch()
+
+
+def _cacheable() -> bool:
+    """Whether numba finds a place for its cache; it refuses to define a cached kernel where it does not."""
+    try:
+        njit(cache=True)(lambda: 0)
+    except RuntimeError:
+        return False
+    return True
+
+
+#: Whether compiled kernels are kept on disk.
+CACHE = _cacheable()
+kernel = njit(cache=CACHE, nogil=True, error_model="numpy")
+_SUMS: Any = {"fastmath": {"reassoc", "contract", "nsz"}}
+summing_kernel = njit(cache=CACHE, nogil=True, error_model="numpy", **_SUMS)
+# Handing over a tuple of arrays costs more than the few sums inside.
+pasted_kernel = njit(cache=CACHE, nogil=True, error_model="numpy", inline="always", **_SUMS)
+
+#: A kernel that becomes part of its callers: those that only pass large ones on would compile them once more.
+inlined = njit(cache=CACHE, nogil=True, error_model="numpy", inline="always")
+
+
+def code(n: int) -> int:
+    """An integer constant for kernels: numba compiles anew for each literal int, but not for numpy's."""
+    return np.int64(n)  # type: ignore[return-value]
+
+
+def _borrowed(context, array):  # type: ignore[no-untyped-def]
+    def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
+        view = make_array(signature.return_type)(context, builder, args[0])
+        view.meminfo = cgutils.get_null_value(view.meminfo.type)
+        return view._getvalue()
+
+    return array(array), generate
+
+
+#: Inside a kernel: the same array without its reference count. Counting costs an atomic instruction at each use,
+#: which in a loop over bodies is most of the time. Only an argument may be borrowed, as its caller keeps it alive: a
+#: local is freed after its last use, and the next array would lie in its place.
+borrowed: Any = (lambda array: array) if getattr(config, "DISABLE_JIT", 0) else intrinsic(_borrowed)

@@ -1,0 +1,68 @@
+"""Attitudes of bodies at the start of an encounter, as rotation matrices."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flybystab.encounter.encounter import Encounter
+from flybystab.errors import InvalidInput
+
+Array = NDArray[np.float64]
+
+#: How far ``A A^T`` of an attitude may be from 1.
+ORTHOGONAL = 1e-8
+
+
+def periapsis_axes(encounter: Encounter) -> Array:
+    """Rotation matrix, frame of the encounter -> periapsis frame (x periapsis, z angular momentum).
+
+    An attitude ``A`` (body axes -> ICRF) of a real encounter is ``periapsis_axes(encounter) @ A`` to `flyby`.
+    """
+    return encounter.periapsis_axes
+
+
+def attitude_matrix(attitude: Any) -> Array:
+    """Rotation matrix (3, 3), checked, of a matrix or scipy Rotation; the identity for None."""
+    if attitude is None:
+        return np.eye(3)
+    matrix = attitude.as_matrix() if hasattr(attitude, "as_matrix") else attitude
+    try:
+        matrix = np.asarray(matrix, dtype=float)
+    except (TypeError, ValueError):
+        raise InvalidInput("attitude", attitude, "a rotation matrix or a scipy Rotation") from None
+    if matrix.shape != (3, 3) or not np.all(np.isfinite(matrix)):
+        raise InvalidInput("attitude", attitude, "a (3, 3) rotation matrix of finite numbers")
+    off = np.abs(matrix @ matrix.T - np.eye(3)).max()
+    if off > ORTHOGONAL or np.linalg.det(matrix) < 0.0:
+        expected = f"a proper rotation: A A^T = 1 to {ORTHOGONAL:g}, det A = +1"
+        if ORTHOGONAL < off < 1e-5:
+            expected += f" (A A^T is off by {off:.1g}: single precision?)"
+        raise InvalidInput("attitude", attitude, expected)
+    return matrix
+
+
+def attitude_matrices(attitudes: Sequence[Any] | None, n: int) -> tuple[Array, NDArray[np.object_]]:
+    """Rotation matrices (n, 3, 3) of attitudes, and why those that are none are none."""
+    out = np.broadcast_to(np.eye(3), (n, 3, 3)).copy()
+    failures = np.full(n, "", dtype=object)
+    if attitudes is None:
+        return out, failures
+    suspect = []
+    for i, attitude in enumerate(attitudes):
+        if isinstance(attitude, np.ndarray) and attitude.shape == (3, 3) and attitude.dtype == np.float64:
+            out[i] = attitude
+        elif attitude is not None:
+            suspect.append(i)
+    with np.errstate(invalid="ignore"):
+        off = np.abs(out @ np.swapaxes(out, 1, 2) - np.eye(3)).max(axis=(1, 2), initial=0.0)
+        good = (off <= ORTHOGONAL) & (np.linalg.det(out) > 0.0)
+    for i in (*suspect, *map(int, np.flatnonzero(~good))):
+        try:
+            out[i] = attitude_matrix(attitudes[i])
+        except InvalidInput as reason:
+            failures[i] = str(reason)
+    return out, failures

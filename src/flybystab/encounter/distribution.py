@@ -1,0 +1,374 @@
+"""An uncertain orbit at an encounter: distances, target-plane points and impacts of its clones.
+
+Two routes that share nothing but the integrator: clones, which need no assumption beyond the normal law at the
+epoch and carry a sampling error; and the linear map of the covariance to the target plane, where the law stays
+normal as long as the map is linear, which is measured.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import astropy.units as u
+import numpy as np
+from astropy.table import QTable
+from astropy.time import Time
+from astropy.units import Quantity
+from numpy.typing import NDArray
+from scipy.stats import binomtest
+
+from flybystab.encounter.linear_target_plane import LinearPlane, ellipse, linear_plane
+from flybystab.encounter.reach import far_enough
+from flybystab.errors import InvalidInput, NoEncounter
+from flybystab.orbit.ephemeris import Ephemeris
+from flybystab.orbit.orbit import Orbit, later
+from flybystab.orbit.planets import Planet, planet
+from flybystab.orbit.search.encounter_finder import find_encounters
+from flybystab.units import brief, to_si
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class EncounterDistribution:
+    """Clones of an orbit at one encounter.
+
+    Attributes
+    ----------
+    planet : Planet
+    time : Time
+        Closest approach of the nominal orbit, TDB.
+    nominal : QTable Row
+        The row of :func:`flybystab.find_encounters` for the nominal orbit.
+    clones : tuple of Orbit, length n
+    found : ndarray of bool, shape (n,)
+        Clones that have a closest approach near this time; the others passed at another time or not at all,
+        and their rows below are nan.
+    time_offset : Quantity, shape (n,)
+        Closest approach after that of the nominal orbit.
+    distance, v_inf : Quantity, shape (n,)
+        Distance between the centres (impacts: of the two-body orbit without a surface), speed far away.
+    b : Quantity, shape (n, 2)
+        ``(B.T, B.R)``, :mod:`flybystab.orbit.target_plane`.
+    position, velocity : Quantity, shape (n, 3)
+        ICRF, relative to the planet, at closest approach (impacts: at the last step outside).
+    impact : ndarray of bool, shape (n,)
+        Surface or atmosphere reached.
+    linear : LinearPlane or None
+        The linear map; None where a point at one sigma has no passage, or a bound one.
+    source : str
+        The covariance.
+    correlated : bool
+        Whether the covariance had correlations.
+    """
+
+    planet: Planet
+    time: Time
+    nominal: Any = field(repr=False)
+    clones: tuple[Orbit, ...] = field(repr=False)
+    found: NDArray[np.bool_] = field(repr=False)
+    time_offset: Quantity = field(repr=False)
+    distance: Quantity = field(repr=False)
+    v_inf: Quantity = field(repr=False)
+    b: Quantity = field(repr=False)
+    position: Quantity = field(repr=False)
+    velocity: Quantity = field(repr=False)
+    impact: NDArray[np.bool_] = field(repr=False)
+    linear: LinearPlane | None
+    source: str
+    correlated: bool
+
+    def __len__(self) -> int:
+        return len(self.clones)
+
+    @property
+    def impact_probability(self) -> float:
+        """Share of the clones that reach atmosphere or surface."""
+        return float(np.mean(self.impact))
+
+    def impact_interval(self, level: float = 0.95) -> tuple[float, float]:
+        """Clopper-Pearson interval of the impact probability: the error of sampling alone."""
+        test = binomtest(int(self.impact.sum()), len(self))
+        interval = test.proportion_ci(confidence_level=level, method="exact")
+        return float(interval.low), float(interval.high)
+
+    @property
+    def distance_sigma(self) -> Quantity:
+        """Standard deviation of the distance over the clones that were found."""
+        return np.std(self.distance[self.found], ddof=1)
+
+    @property
+    def time_sigma(self) -> Quantity:
+        """Standard deviation of the time of closest approach over the clones that were found."""
+        return np.std(self.time_offset[self.found], ddof=1)
+
+    def distance_interval(self, level: float = 0.9973) -> Quantity:
+        """Quantiles of the distance that leave out ``(1 - level)/2`` on either side, shape (2,)."""
+        return np.quantile(self.distance[self.found], [0.5 - 0.5 * level, 0.5 + 0.5 * level])
+
+    @property
+    def b_covariance(self) -> Quantity:
+        """Sample covariance of ``(B.T, B.R)``, shape (2, 2), over the unbound clones."""
+        points = self.b.to_value(u.km)
+        points = points[np.isfinite(points).all(axis=1)]
+        return (np.cov(points.T) if len(points) > 1 else np.full((2, 2), np.nan)) * u.km**2
+
+    def __repr__(self) -> str:
+        near = int(self.found.sum())
+        sigma = f", {brief(np.median(self.distance[self.found]), u.km)}" if near else ""
+        sigma += f" +- {brief(self.distance_sigma, u.km)}" if near > 1 else ""
+        return (
+            f"<EncounterDistribution {self.planet.name}, {self.time.tdb.iso[:10]}: {len(self)} clones{sigma}, "
+            f"impact probability {self.impact_probability:.3g}>"
+        )
+
+
+def encounter_distribution(
+    orbit: Any,
+    planet: str | Planet,
+    time: Time,
+    *,
+    n: int = 1000,
+    seed: int = 0,
+    search: Quantity = 10 * u.d,
+    within: Quantity | None = None,
+    ephemeris: str | Ephemeris | None = None,
+    tolerance: float = 1e-12,
+    threads: int | None = None,
+) -> EncounterDistribution:
+    """Clones of an orbit through one encounter.
+
+    Parameters
+    ----------
+    orbit : Orbit
+        Or anything with an attribute ``orbit``; it must have a covariance.
+    planet : str or Planet
+        The body encountered.
+    time : Time
+        Near closest approach; the nominal orbit's minimum of distance nearest to it counts.
+    n, seed : int
+        Number of clones and seed: see :meth:`flybystab.Orbit.clones`.
+    search : Quantity
+        How far from the time of the nominal passage those of the clones may be.
+    within : Quantity, optional
+        Largest distance that counts as a passage; by default 20 Hill radii, at most 1 au.
+    ephemeris, tolerance, threads
+        As in :func:`flybystab.find_encounters`.
+
+    Raises
+    ------
+    NoEncounter
+        The nominal orbit has no passage there.
+    OutOfSpan
+        The ephemeris covers the passage or the epoch of the covariance not at all.
+    InvalidInput, UnitMismatch, UnknownName
+    """
+    path = _path(orbit)
+    if not isinstance(time, Time) or time.shape != ():
+        raise InvalidInput("time", time, "one astropy Time")
+    body = _planet(planet)
+    reach = to_si(search, u.s, "search", low=0.0, open_low=True)
+    largest = far_enough(body) if within is None else to_si(within, u.m, "within", low=0.0, open_low=True)
+    table = find_encounters(
+        path,
+        later(time, -reach),
+        later(time, reach),
+        [body.name],
+        largest * u.m,
+        ephemeris=ephemeris,
+        tolerance=tolerance,
+        threads=threads,
+    )
+    if not len(table):
+        raise NoEncounter(
+            f"{path.name or 'the orbit'} has no minimum of distance to {body.name} within "
+            f"{search.to(u.d):g} of {time.tdb.iso} TDB and {(largest * u.m).to(u.au):.4g}"
+        )
+    row = int(np.argmin(np.abs((table["time"] - time).to_value(u.s))))
+    return distributions(
+        path,
+        table[row : row + 1],
+        n=n,
+        seed=seed,
+        search=search,
+        within=largest * u.m,
+        ephemeris=ephemeris,
+        tolerance=tolerance,
+        threads=threads,
+    )[0]
+
+
+def distributions(
+    orbit: Any,
+    table: QTable,
+    *,
+    n: int = 1000,
+    seed: int = 0,
+    search: Quantity = 10 * u.d,
+    within: Quantity | None = None,
+    ephemeris: str | Ephemeris | None = None,
+    tolerance: float = 1e-12,
+    threads: int | None = None,
+) -> list[EncounterDistribution]:
+    """Clones of an orbit through several encounters, in one integration.
+
+    Parameters
+    ----------
+    orbit, n, seed, search, within, ephemeris, tolerance, threads
+        As in :func:`encounter_distribution`.
+    table : QTable
+        The encounters of the nominal orbit, from :func:`flybystab.find_encounters`.
+
+    Returns
+    -------
+    list of EncounterDistribution
+        One for each row. A clone that hits a planet is missing from the later ones.
+    """
+    path = _path(orbit)
+    reach = to_si(search, u.s, "search", low=0.0, open_low=True)
+    if not len(table):
+        return []
+    clones = path.clones(n, seed, ephemeris)
+    points = [o for pair in path.sigma_points(ephemeris) for o in pair]
+    bodies = list(dict.fromkeys(np.asarray(table["planet"]).tolist()))
+    far = [far_enough(planet(b)) if within is None else within.to_value(u.m) for b in bodies]
+    found = find_encounters(
+        [*clones, *points],
+        later(table["time"].min(), -reach),
+        later(table["time"].max(), reach),
+        bodies,
+        far * u.m,
+        ephemeris=ephemeris,
+        tolerance=tolerance,
+        threads=threads,
+    )
+    return [_distribution(path, row, clones, len(points), found, reach) for row in table]
+
+
+def clone_passages(
+    clones: Sequence[Orbit],
+    planet: str | Planet,
+    time: Time,
+    *,
+    search: Quantity,
+    within: Quantity,
+    ephemeris: str | Ephemeris | None = None,
+    tolerance: float = 1e-12,
+    threads: int | None = None,
+) -> tuple[Array, Array, Array]:
+    """The passages of some clones that belong to one of the nominal orbit, at `time`.
+
+    Other arguments as of :func:`encounter_distribution`, of which this is a part: the answer for a clone does not
+    depend on the others.
+
+    Returns
+    -------
+    time_offset, distance, v_inf : ndarray (n,)
+        s, m, m/s; nan for a clone without a passage there.
+    """
+    body = _planet(planet)
+    reach = to_si(search, u.s, "search", low=0.0, open_low=True)
+    start, stop = later(time, -reach), later(time, reach)
+    found = find_encounters(
+        list(clones),
+        start,
+        stop,
+        [body.name],
+        within,
+        ephemeris=ephemeris,
+        tolerance=tolerance,
+        threads=threads,
+    )
+    columns = _belonging(found, body, time, len(clones), reach)
+    return columns[:, 0], columns[:, 1], columns[:, 4]
+
+
+def _distribution(
+    orbit: Orbit, nominal: Any, clones: tuple[Orbit, ...], points: int, found: QTable, reach: float
+) -> EncounterDistribution:
+    """The passages that belong to one of the nominal orbit; `found` has the clones, then the sigma points."""
+    covariance = orbit.covariance
+    assert covariance is not None
+    body = planet(str(nominal["planet"]))
+    columns = _belonging(found, body, nominal["time"], len(clones) + points, reach)
+    first = columns[: len(clones)]
+    return EncounterDistribution(
+        planet=body,
+        time=nominal["time"],
+        nominal=nominal,
+        clones=clones,
+        found=np.isfinite(first[:, 0]),
+        time_offset=first[:, 0] * u.s,
+        distance=(first[:, 1] * u.m).to(u.km),
+        v_inf=(first[:, 4] * u.m / u.s).to(u.km / u.s),
+        b=(first[:, 2:4] * u.m).to(u.km),
+        position=(first[:, 6:9] * u.m).to(u.km),
+        velocity=(first[:, 9:12] * u.m / u.s).to(u.km / u.s),
+        impact=first[:, 5] > 0.0,
+        linear=linear_plane(columns[len(clones) :], nominal, body),
+        source=covariance.source,
+        correlated=covariance.correlated,
+    )
+
+
+def _belonging(found: QTable, body: Planet, time: Time, n: int, reach: float) -> Array:
+    """Of `n` orbits the passages that belong to the one at `time`, SI; nan without one.
+
+    Columns: time offset, distance, b_t, b_r, v_inf, impact, position and velocity.
+    """
+    columns = np.full((n, 12), np.nan)
+    if len(found):
+        offset = (found["time"] - time).to_value(u.s)
+        here = np.flatnonzero((found["planet"] == body.name) & (np.abs(offset) <= reach))
+        # The last one written stays: an impact before any other minimum, then the one nearest in time.
+        order = here[np.lexsort((np.abs(offset[here]), ~found["impact"][here]))[::-1]]
+        every = [offset, *(found[c].to_value(u.m) for c in ("distance", "b_t", "b_r"))]
+        every += [found["v_inf"].to_value(u.m / u.s), found["impact"]]
+        every += [*found["position"].to_value(u.m).T, *found["velocity"].to_value(u.m / u.s).T]
+        columns[found["index"][order]] = np.column_stack(every)[order]
+    return columns
+
+
+def _path(orbit: Any) -> Orbit:
+    path = getattr(orbit, "orbit", orbit)
+    if not isinstance(path, Orbit):
+        raise InvalidInput("orbit", orbit, "an Orbit, or an object with one as its attribute 'orbit'")
+    if path.covariance is None:
+        raise InvalidInput("covariance", None, "an orbit with one: clones are drawn from it")
+    return path
+
+
+def add_clones(table: QTable, found: Sequence[EncounterDistribution | None]) -> None:
+    """Add what clones say to a table of encounters, one distribution a row; None where there is no covariance.
+
+    Columns: ``clones`` (number), ``clones_found`` (with a passage near this time), ``distance_sigma``,
+    ``distance_low``, ``distance_high`` (99.73 % of those found; km), ``time_sigma`` (s), ``b_major``,
+    ``b_minor`` (km) and ``b_angle`` (deg from +T to +R) of the one-sigma ellipse, ``p_impact`` with its 95 %
+    interval ``p_impact_low``, ``p_impact_high``, and ``p_impact_linear``. nan where fewer than two were found.
+    """
+
+    def column(value: Callable[[EncounterDistribution], Any], least: int = 2) -> Array:
+        return np.array(
+            [value(d) if d is not None and d.found.sum() >= least else np.nan for d in found], dtype=float
+        )
+
+    table["clones"] = np.array([0 if d is None else len(d) for d in found], dtype=int)
+    table["clones_found"] = np.array([0 if d is None else d.found.sum() for d in found], dtype=int)
+    table["distance_sigma"] = column(lambda d: d.distance_sigma.to_value(u.km)) * u.km
+    table["distance_low"] = column(lambda d: d.distance_interval()[0].to_value(u.km)) * u.km
+    table["distance_high"] = column(lambda d: d.distance_interval()[1].to_value(u.km)) * u.km
+    table["time_sigma"] = column(lambda d: d.time_sigma.to_value(u.s)) * u.s
+    table["b_major"] = column(lambda d: ellipse(d.b_covariance)[0].to_value(u.km)) * u.km
+    table["b_minor"] = column(lambda d: ellipse(d.b_covariance)[1].to_value(u.km)) * u.km
+    table["b_angle"] = column(lambda d: ellipse(d.b_covariance)[2].to_value(u.deg)) * u.deg
+    table["p_impact"] = column(lambda d: d.impact_probability, 0)
+    table["p_impact_low"] = column(lambda d: d.impact_interval()[0], 0)
+    table["p_impact_high"] = column(lambda d: d.impact_interval()[1], 0)
+    table["p_impact_linear"] = column(lambda d: d.linear.impact_probability if d.linear else np.nan, 0)
+    table.meta["covariances"] = sorted({d.source for d in found if d is not None})
+
+
+def _planet(name: str | Planet) -> Planet:
+    return planet(name)

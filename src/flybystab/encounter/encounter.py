@@ -1,0 +1,329 @@
+"""One close passage of an asteroid by a planet, scripted or real: its path and the tide that it feels."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Protocol
+
+import astropy.units as u
+import numpy as np
+from astropy.time import Time
+from astropy.units import Quantity
+from numpy.typing import NDArray
+
+from flybystab.core.dynamics.ground import Ground
+from flybystab.core.ellipsoid.tide import TidePanels, tide_panels
+from flybystab.encounter.reach import SETTLE, far_enough
+from flybystab.errors import InvalidInput
+from flybystab.orbit.ephemeris import BODIES, Ephemeris
+from flybystab.orbit.orbit import Orbit
+from flybystab.orbit.planets import Planet, planet
+from flybystab.orbit.predictability import Predictability
+from flybystab.orbit.target_plane import NORTH, checked, target_plane
+from flybystab.units import brief, to_si
+
+Array = NDArray[np.float64]
+
+
+class Track(Protocol):
+    """Motion of the asteroid relative to the planet."""
+
+    def states(self, t: Array) -> Array:
+        """Position (m) and velocity (m/s), shape (n, 6), at ``t`` s from closest approach, shape (n,)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Encounter:
+    """A close passage by one planet.
+
+    Made by :meth:`hyperbolic` (scripted, frame ``"periapsis"``) or from a real orbit (frame ``"ICRF"``).
+    Times are counted from closest approach.
+
+    Attributes
+    ----------
+    planet : Planet
+        The body encountered.
+    time : Time or None
+        Closest approach, TDB; None for a scripted encounter.
+    distance : Quantity
+        Distance between the centres at closest approach; of the unhindered orbit if it hits the planet.
+    v_inf : Quantity
+        Speed far from the planet, of the two-body orbit at closest approach; 0 for a bound one.
+    v_periapsis : Quantity
+        Relative speed at closest approach.
+    start_distance : Quantity
+        Distance at which the encounter starts, inbound.
+    impact : bool
+        Whether the orbit reaches the atmosphere or the surface.
+    impact_level : str or None
+        ``"surface"``, ``"atmosphere"`` (passes above the surface but below its top) or None.
+    impact_time : float or None
+        First contact with the top of the atmosphere (surface, if there is none), s from closest approach.
+    frame : str
+        ``"periapsis"``: x from the planet's centre toward periapsis, z along the orbital angular momentum;
+        or ``"ICRF"``. The planet is the origin of both.
+    forces : tuple of str
+        What moves the asteroid and what makes its tide.
+    left_out : tuple of (str, float)
+        What was left out, each with its estimated largest share. Names that begin with "orbit:" concern the
+        path: share of the acceleration (scripted) or displacement over distance (real); the others the tide.
+    tide_error : float
+        Largest difference between the stored tide and the exact one at points between the nodes, over the
+        peak of the tide.
+    t_start, t_stop : float
+        Start, and orbit back at `start_distance` plus the time to settle, s from closest approach.
+    t_periapsis : float
+        Zero.
+    tide : TidePanels
+        Tidal tensor in `frame` against s from closest approach, from `t_start` to 100 h after `t_stop`.
+        On an impact both it and the track end there, and `t_stop` is the time of it.
+    distance_error, time_error : Quantity or None
+        For a real orbit: change of distance and time of closest approach when the integration is made 100
+        times tighter plus the change when every known force is on; infinite if the encounter vanishes then.
+        Behind an earlier encounter also 0.1 km, which ephemerides and masses leave, grown as a neighbour of the
+        orbit grew past it. The orbit's own uncertainty is not in it.
+    ephemeris : str or None
+        Where the planets of a real orbit are from; None for a scripted encounter.
+    displacement : Quantity or None
+        For a real orbit: how far a neighbour of the orbit is away at closest approach: one sigma of the
+        covariance in the direction least known by then, or 1 m at the epoch where there is no covariance.
+    growth : float or None
+        That over the distance between the two at the epoch.
+    neighbour : str
+        What the neighbour is.
+    predictability : Predictability or None
+        What displacement and errors say of the encounter: ``determined``, ``uncertain`` or ``one of many``
+        (:mod:`flybystab.orbit.predictability`).
+    """
+
+    planet: Planet
+    time: Time | None
+    distance: Quantity
+    v_inf: Quantity
+    v_periapsis: Quantity
+    start_distance: Quantity
+    impact: bool
+    impact_level: str | None
+    impact_time: float | None
+    frame: str
+    forces: tuple[str, ...]
+    left_out: tuple[tuple[str, float], ...]
+    tide_error: float
+    t_start: float
+    t_stop: float
+    tide: TidePanels = field(repr=False)
+    track: Track = field(repr=False)
+    t_periapsis: float = 0.0
+    distance_error: Quantity | None = None
+    time_error: Quantity | None = None
+    displacement: Quantity | None = None
+    growth: float | None = None
+    neighbour: str = ""
+    predictability: Predictability | None = None
+    ephemeris: str | None = None
+
+    def position(self, t: Array | float) -> Array:
+        """Asteroid from the planet's centre, m, shape (n, 3), in `frame`, ``t`` s from closest approach."""
+        return self.track.states(np.atleast_1d(np.asarray(t, dtype=float)))[:, :3]
+
+    def velocity(self, t: Array | float) -> Array:
+        """Velocity relative to the planet, m/s, shape (n, 3), in `frame`, ``t`` s from closest approach."""
+        return self.track.states(np.atleast_1d(np.asarray(t, dtype=float)))[:, 3:]
+
+    def radius(self, t: Array | float) -> Array:
+        """Distance from the planet's centre, m, shape (n,), at ``t`` s from closest approach."""
+        return np.sqrt(np.sum(self.position(t) ** 2, axis=1))
+
+    @property
+    def height(self) -> float:
+        """Least height of the centre above atmosphere or surface, m; minus infinity on an impact of the centre."""
+        if self.impact:
+            return -np.inf
+        return float(self.distance.to_value(u.m)) - self.planet.impact_distance
+
+    @cached_property
+    def ground(self) -> Ground:
+        """The ground along the way: top of the atmosphere, or the surface if there is none."""
+        tide = self.tide
+        end = tide.tau * float(np.sinh(tide.start + tide.width * len(tide.coefficients)))
+        stop = self.t_stop if self.impact else end
+        way, _ = tide_panels(self.position, self.t_start, stop, tide.tau, width=min(tide.width, 0.5))
+        return Ground(
+            way.tau, way.start, way.width, self.planet.impact_distance, self.height, 1.0, way.coefficients
+        )
+
+    @cached_property
+    def periapsis_axes(self) -> Array:
+        """Rotation matrix, `frame` -> periapsis frame: x to the asteroid, z along the angular momentum."""
+        # A track that ends on the planet has no periapsis: that of the two-body orbit it ends on.
+        ended = self.impact and self.t_stop < 0.0
+        state = self.track.states(np.array([self.t_stop if ended else 0.0]))[0]
+        r, v = state[:3], state[3:]
+        h = np.cross(r, v)
+        x = np.cross(v, h) / self.planet.gm - r / np.linalg.norm(r) if ended else r
+        x, z = x / np.linalg.norm(x), h / np.linalg.norm(h)
+        return np.stack([x, np.cross(z, x), z])
+
+    def b_plane(self, north: Sequence[float] = NORTH) -> Quantity:
+        """Target-plane coordinates ``(B.T, B.R)`` of the two-body hyperbola at closest approach, shape (2,).
+
+        Parameters
+        ----------
+        north : sequence of float
+            The direction N in `frame` (:mod:`flybystab.orbit.target_plane`): +z, in ICRF the Earth's equator.
+
+        Raises
+        ------
+        InvalidInput
+            For a bound passage, which has no target plane, or if the asymptote points north.
+        """
+        when = 0.0 if self.impact_time is None else min(0.0, self.impact_time)
+        b, v_inf = target_plane(self.track.states(np.array([when])), self.planet.gm, north)
+        return (checked(b[0], float(v_inf[0]), north) * u.m).to(u.km)
+
+    @classmethod
+    def hyperbolic(
+        cls,
+        planet: str | Planet,
+        periapsis: Quantity,
+        v_inf: Quantity,
+        start_distance: Quantity | None = None,
+        settle: Quantity = SETTLE * u.s,
+        j2: bool = False,
+        pole: tuple[float, float, float] = (0.0, 0.0, 1.0),
+    ) -> Encounter:
+        """Scripted encounter on a two-body hyperbola, or parabola if ``v_inf`` is zero.
+
+        Parameters
+        ----------
+        planet : str or Planet
+            The body encountered.
+        periapsis : Quantity
+            Distance of closest approach from the planet's centre; inside the planet it is an impact, not
+            an error.
+        v_inf : Quantity
+            Speed far from the planet, zero or more.
+        start_distance : Quantity, optional
+            Where the encounter starts; 10 planet radii by default, or 10 periapsis distances if larger.
+        settle : Quantity
+            Time added after the orbit is back at `start_distance`.
+        j2 : bool
+            Whether the planet's J2 adds to the tide. The orbit stays a two-body one.
+        pole : tuple of float
+            Direction of the planet's pole in the frame of the encounter, for `j2`; an equatorial prograde
+            orbit by default.
+
+        Raises
+        ------
+        UnitMismatch, InvalidInput, UnknownName
+            For a bad argument, with its value.
+        """
+        body = _planet(planet)
+        q = to_si(periapsis, u.m, "periapsis", low=0.0, open_low=True)
+        v = to_si(v_inf, u.m / u.s, "v_inf", low=0.0)
+        wait = to_si(settle, u.s, "settle", low=0.0)
+        if start_distance is None:
+            start = 10.0 * max(body.radius, q)
+        else:
+            start = to_si(start_distance, u.m, "start_distance")
+            if start <= q:
+                raise InvalidInput("start_distance", start_distance, f"more than the periapsis, {periapsis}")
+        axis = _unit_vector(pole)
+
+        from flybystab.encounter.hyperbolic import scripted
+
+        return scripted(cls, body, q, v, start, wait, j2, axis)
+
+    @classmethod
+    def from_orbit(
+        cls,
+        orbit: Orbit,
+        planet: str | Planet,
+        time: Time,
+        *,
+        error: Quantity = 0.1 * u.km,
+        start_distance: Quantity | None = None,
+        settle: Quantity = SETTLE * u.s,
+        search: Quantity = 30 * u.d,
+        within: Quantity | None = None,
+        ephemeris: str | Ephemeris | None = None,
+        forces: tuple[str, ...] | None = None,
+    ) -> Encounter:
+        """Encounter on a real orbit: rebound among the bodies of an ephemeris, with the tide along the way.
+
+        Parameters
+        ----------
+        orbit : Orbit
+            Or anything with an attribute ``orbit``.
+        planet : str or Planet
+            The body encountered.
+        time : Time
+            Near closest approach; the minimum of distance nearest to it counts.
+        error : Quantity
+            Displacement asked for: forces whose estimated share is larger are modelled, the rest is listed.
+            Sources of tide are modelled down to a tenth of the relative error that this means for the tide.
+        start_distance : Quantity, optional
+            Where the encounter starts; by default 10 planet radii or, if larger, 10 times the distance
+            but no more than the planet's Hill radius (and at least 1.5 times the closest distance). An orbit
+            that comes from less far (a temporary capture) starts at its apoapsis.
+        settle : Quantity
+            Time added after the orbit is back at `start_distance`.
+        search : Quantity
+            How far from `time` to look for the closest approach.
+        within : Quantity, optional
+            Largest distance that counts as an encounter; by default 20 Hill radii, at most 1 au.
+        ephemeris : str or Ephemeris, optional
+            ``"de421"``, ``"de440"``; the best installed by default.
+        forces : tuple of str, optional
+            Exactly these forces, names as in ``flybystab.orbit.forces.FORCES``, instead of choosing by `error`.
+
+        Raises
+        ------
+        NoEncounter
+            No minimum of distance below `within` near `time`.
+        OutOfSpan
+            The ephemeris does not cover the way.
+        UnitMismatch, InvalidInput, UnknownName
+        """
+        path = getattr(orbit, "orbit", orbit)
+        if not isinstance(path, Orbit):
+            raise InvalidInput("orbit", orbit, "an Orbit, or an object with one as its attribute 'orbit'")
+        if not isinstance(time, Time) or time.shape != ():
+            raise InvalidInput("time", time, "one astropy Time")
+        body = _planet(planet)
+        if body.name not in BODIES or body.name == "sun":
+            raise InvalidInput("planet", body.name, f"one of {', '.join(BODIES[1:])}")
+        reach = to_si(search, u.s, "search", low=0.0, open_low=True)
+        largest = far_enough(body) if within is None else to_si(within, u.m, "within", low=0.0, open_low=True)
+        accuracy = to_si(error, u.m, "error", low=0.0, open_low=True)
+        wait = to_si(settle, u.s, "settle", low=0.0)
+        start = None if start_distance is None else to_si(start_distance, u.m, "start_distance", low=0.0)
+        from flybystab.encounter.from_orbit import followed
+
+        return followed(cls, path, body, time.tdb, accuracy, start, wait, reach, largest, ephemeris, forces)
+
+    def __repr__(self) -> str:
+        when = "scripted" if self.time is None else f"{self.time.tdb.iso[:16]} TDB"
+        hit = f", reaches the {self.impact_level}" if self.impact_level else ""
+        radii = self.distance.to_value(u.m) / self.planet.radius
+        return (
+            f"<Encounter {self.planet.name}, {when}: {brief(self.distance, u.km)} ({radii:.4g} radii), "
+            f"v_inf {brief(self.v_inf, u.km / u.s)}{hit}>"
+        )
+
+
+def _planet(name: str | Planet) -> Planet:
+    return planet(name)
+
+
+def _unit_vector(pole: tuple[float, float, float]) -> Array:
+    try:
+        axis = np.asarray(pole, dtype=float)
+        norm = float(np.linalg.norm(axis))
+    except (TypeError, ValueError):
+        norm = 0.0
+    if not (np.isfinite(norm) and norm > 0.0 and axis.shape == (3,)):
+        raise InvalidInput("pole", pole, "a direction: three finite numbers, not all zero")
+    return axis / norm

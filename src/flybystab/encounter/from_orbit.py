@@ -1,0 +1,333 @@
+"""An encounter on a real orbit: its closest approach, found and followed by rebound, and how well it is known."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import astropy.units as u
+import numpy as np
+from astropy.time import Time
+from numpy.typing import NDArray
+
+from flybystab.constants import AU, DAY, HOUR
+from flybystab.core.ellipsoid.tide import tide_panels
+from flybystab.encounter.encounter import Encounter
+from flybystab.encounter.reach import TAIL, usual_start
+from flybystab.encounter.tide_sources import chosen_sources, tide_of
+from flybystab.errors import InvalidInput, NoEncounter
+from flybystab.orbit.closest_approach import (
+    between,
+    crossings,
+    nearest_minimum,
+    panel_track,
+    periapsis_time,
+    relative,
+)
+from flybystab.orbit.ephemeris import BODIES, Ephemeris, Window
+from flybystab.orbit.forces import FORCES, model, shares
+from flybystab.orbit.ias15 import LOG_WIDTH, Flight
+from flybystab.orbit.kepler import time_at_distance
+from flybystab.orbit.orbit import Orbit, _ephemeris, later, seconds
+from flybystab.orbit.planets import Planet
+from flybystab.orbit.predictability import (
+    Neighbour,
+    Predictability,
+    common_error,
+    neighbour,
+    neighbour_epoch,
+    predictability,
+)
+from flybystab.orbit.search.encounter_finder import starts_inside
+
+Array = NDArray[np.float64]
+
+#: Crossings of the surface within this time of a passage are its own, s.
+_OWN = 2.0 * HOUR
+
+
+@dataclass(frozen=True)
+class _Passage:
+    """Closest approach on one integration: time (s), relative state, log of steps, step of it, way from the epoch."""
+
+    t: float
+    state: Array
+    log: Array
+    step: int
+    way: Array
+    forces: tuple[str, ...]
+
+    @property
+    def distance(self) -> float:
+        return float(np.linalg.norm(self.state[:3]))
+
+
+def _passage(
+    orbit: Orbit, window: Window, index: int, forces: tuple[str, ...], reach: float, epsilon: float
+) -> _Passage | None:
+    """The minimum of distance nearest to the epoch of the window, or None."""
+    flight = orbit.flight(window, forces, epsilon)
+    before = flight.t
+    way = flight.log_to(-reach) if before != -reach else np.empty((0, LOG_WIDTH))
+    log = flight.log_to(reach)
+    hit = nearest_minimum(log, window, index, 0.0)
+    if hit is None:
+        return None
+    t, _, step = hit
+    again = Flight(model(window, forces, orbit.nongrav), log[step, 0], log[step, 1:7], epsilon)
+    t, state = periapsis_time(_relative_to(again, window, index), t)
+    if before < -reach:
+        log = np.concatenate([way[:-1], log])
+        step += len(way) - 1
+    if before <= -reach:
+        way = log
+    elif before < t:
+        way = log[max(int(np.searchsorted(log[:, 0], before)) - 1, 0) :]
+    else:
+        way = way[::-1]
+    return _Passage(t, state, log, step, way, forces)
+
+
+def _path(way: Array, start: float, stop: float) -> tuple[Array, Array]:
+    """Times from `start` to `stop` (s, either order) and barycentric states, along a log, dense enough to sum."""
+    low, high = min(start, stop), max(start, stop)
+    inside = way[(way[:, 0] > low) & (way[:, 0] < high), 0]
+    t = np.unique(np.concatenate([np.linspace(low, high, 129), inside]))
+    t = t[(t >= way[0, 0]) & (t <= way[-1, 0])]
+    states = np.empty((t.size, 6))
+    for n, time in enumerate(t):
+        k = min(max(int(np.searchsorted(way[:, 0], time, side="right")) - 1, 0), len(way) - 2)
+        between(way, k, float(time), states[n])
+    return (t, states) if start <= stop else (t[::-1], states[::-1])
+
+
+def _relative_to(flight: Flight, window: Window, index: int, zero: float = 0.0) -> Callable[[float], Array]:
+    def state_at(t: float) -> Array:
+        return flight.to(t + zero) - window.states(index, np.array([t + zero]))[0]
+
+    return state_at
+
+
+def followed(
+    cls: type[Encounter],
+    orbit: Orbit,
+    body: Planet,
+    near: Time,
+    accuracy: float,
+    start: float | None,
+    wait: float,
+    reach: float,
+    largest: float,
+    ephemeris: str | Ephemeris | None,
+    forces: tuple[str, ...] | None,
+) -> Encounter:
+    """The encounter nearest to a time; arguments as checked by :meth:`Encounter.from_orbit`, in SI."""
+    index = BODIES.index(body.name)
+    epoch = seconds(orbit.epoch, near)
+    epochs = (epoch, seconds(neighbour_epoch(orbit), near))
+    window = _ephemeris(ephemeris).window(
+        near, min(*epochs, -reach), max(*epochs, reach + wait + TAIL + 10.0 * DAY)
+    )
+    away = orbit.barycentric(window) - window.states(index, np.array([epoch]))[0]
+    if np.linalg.norm(away[:3]) < body.impact_distance:
+        raise starts_inside(orbit.name, orbit.epoch, body)
+    everything = tuple(n for n in FORCES if n != "non-gravitational" or any(orbit.nongrav.a))
+    first = _passage(orbit, window, index, forces or everything, reach, 1e-9)
+    if first is not None:
+        _check_way(orbit, body, window, first, epoch)
+    beside = neighbour(orbit, near if first is None else later(near, first.t), ephemeris)
+    if first is None or first.distance > largest:
+        closest = (
+            "no minimum of distance" if first is None else f"{first.distance / AU:.4f} au at the closest"
+        )
+        raise NoEncounter(
+            f"no encounter with {body.name} within {largest / AU:.4f} au and {reach / DAY:g} d of "
+            f"{near.iso} TDB: {closest}{_horizon(orbit, beside, window, forces or everything, largest)}"
+        )
+    size = shares(window, *_path(first.way, epoch, first.t), orbit.nongrav)
+    if forces is None:
+        forces = tuple(n for n in everything if size[n] >= accuracy)
+    chosen = _passage(orbit, window, index, forces, reach, 1e-9)
+    if chosen is None:
+        raise NoEncounter(
+            f"the closest approach to {body.name} vanishes with the forces {', '.join(forces)}"
+            + _horizon(orbit, beside, window, everything, largest)
+        )
+    tight = _passage(orbit, window, index, forces, reach, 1e-11)
+    gaps = [
+        (abs(chosen.distance - other.distance), abs(chosen.t - other.t)) if other else (np.inf, np.inf)
+        for other in (first, tight)
+    ]
+    place = chosen.state[:3] + window.states(index, np.array([chosen.t]))[0, :3]
+    there = beside.orbit.flight(window, forces).to(chosen.t)[:3]
+    displacement = float(np.linalg.norm(there - place))
+    common = common_error(orbit, beside, window, forces, chosen.t, displacement, ephemeris)
+    growth = _Growth(
+        distance=gaps[0][0] + gaps[1][0] + common,
+        time=gaps[0][1] + gaps[1][1] + common / float(np.linalg.norm(chosen.state[3:])),
+        displacement=displacement,
+        beside=beside,
+    )
+    return _around(cls, orbit, body, window, chosen, accuracy, start, wait, reach, size, growth)
+
+
+def _check_way(orbit: Orbit, body: Planet, window: Window, passage: _Passage, epoch: float) -> None:
+    """Raise NoEncounter if the asteroid hits the planet between its epoch and a passage."""
+    index = BODIES.index(body.name)
+    found, _ = crossings(passage.way, window.head, window.data, window.gm, index, body.impact_distance, 8)
+    low, high = sorted((epoch, passage.t))
+    hits = found[(found[:, 0] > low) & (found[:, 0] < high) & (np.abs(found[:, 0] - passage.t) > _OWN), 0]
+    if hits.size:
+        first = hits[np.argmin(np.abs(hits - epoch))]
+        raise NoEncounter(
+            f"{orbit.name or 'the orbit'} meets {body.name} at {later(window.epoch, float(first)).iso} TDB on its way "
+            f"from {orbit.epoch.tdb.iso[:10]}: what is asked for lies beyond that impact"
+        )
+
+
+@dataclass(frozen=True)
+class _Growth:
+    """What other runs made of a closest approach: distance (m), time (s), displacement of the neighbour (m)."""
+
+    distance: float
+    time: float
+    displacement: float
+    beside: Neighbour
+
+
+def _horizon(orbit: Orbit, beside: Neighbour, window: Window, forces: tuple[str, ...], largest: float) -> str:
+    """What to add to "no encounter" where the orbit cannot be followed that far, else nothing."""
+    places = [o.flight(window, forces).to(0.0)[:3] for o in (orbit, beside.orbit)]
+    gap = float(np.linalg.norm(places[0] - places[1]))
+    if predictability(largest, gap) is Predictability.DETERMINED:
+        return ""
+    return (
+        f"; the orbit cannot be predicted that far: {beside.label} at {beside.orbit.epoch.iso[:10]} is "
+        f"{gap / AU:.2g} au there, so that an encounter at this time is one of many possible"
+    )
+
+
+def _around(
+    cls: type[Encounter],
+    orbit: Orbit,
+    body: Planet,
+    window: Window,
+    passage: _Passage,
+    accuracy: float,
+    start: float | None,
+    wait: float,
+    reach: float,
+    size: dict[str, float],
+    growth: _Growth,
+) -> Encounter:
+    """The encounter around a closest approach."""
+    index = BODIES.index(body.name)
+    gm = float(window.gm[index])
+    zero, q, state = passage.t, passage.distance, passage.state
+    level = body.impact_level(q)
+    entry = None
+    log, head, data = passage.log, window.head, window.data
+    if level is not None:
+        found, steps = crossings(log, head, data, window.gm, index, body.impact_distance, 8)
+        row = np.flatnonzero((found[:, 0] < zero) & (found[:, 2] < 0.0))[-1]
+        entry = float(found[row, 0])
+        state = np.empty(6)
+        relative(log, int(steps[row]), head, data, window.gm, index, entry, state)
+        q, ahead = _two_body_periapsis(gm, state)
+        zero = entry + ahead
+        level = body.impact_level(q)
+    speed2 = float(state[3:] @ state[3:]) - 2.0 * gm / float(np.linalg.norm(state[:3]))
+    v_p = float(np.sqrt(speed2 + 2.0 * gm / q))
+    tau = max(q, 0.01 * body.radius) / v_p
+    if start is None:
+        start = usual_start(body, q)
+    elif start <= q:
+        raise InvalidInput("start_distance", start * u.m, f"more than the closest approach, {q:.6g} m")
+    t_in, t_out = _ends(passage.log, window, index, start, zero if entry is None else entry)
+    start = float(np.linalg.norm(_log_state(passage.log, window, index, t_in)[:3]))
+    stop = t_out + wait if entry is None else entry
+    end = stop + TAIL if entry is None else entry
+    row = max(int(np.searchsorted(log[:, 0], t_in, side="right")) - 1, 0)
+    flight = Flight(model(window, passage.forces, orbit.nongrav), log[row, 0], log[row, 1:7])
+    track = panel_track(_relative_to(flight, window, index, zero), t_in - zero, end - zero, tau)
+
+    sources, kept, dropped = chosen_sources(track, window, index, body, zero, t_in, stop, 0.1 * accuracy / q)
+    axis = np.array(body.pole_at(window.epoch))
+
+    def tide(t: Array) -> Array:
+        return tide_of(track, window, index, body, axis, zero, t, sources)
+
+    for width in (
+        0.5,
+        0.25,
+        0.125,
+        0.0625,
+    ):  # a passage by the Moon on the way is narrower than the encounter
+        panels, miss = tide_panels(tide, t_in - zero, end - zero, tau, width=width)
+        if miss < 1e-10:  # below lies the rounding of barycentric coordinates
+            break
+    return cls(
+        planet=body,
+        time=later(window.epoch, zero),
+        distance=(q * u.m).to(u.km),
+        v_inf=(np.sqrt(max(speed2, 0.0)) * u.m / u.s).to(u.km / u.s),
+        v_periapsis=(v_p * u.m / u.s).to(u.km / u.s),
+        start_distance=(start * u.m).to(u.km),
+        impact=entry is not None,
+        impact_level=level,
+        impact_time=None if entry is None else entry - zero,
+        frame="ICRF",
+        forces=(*(f"orbit: {n}" for n in passage.forces), *(f"tide: {n}" for n in kept)),
+        left_out=(
+            *((f"orbit: {n}", v / q) for n, v in size.items() if n not in passage.forces and v > 1e-6),
+            *dropped,
+        ),
+        tide_error=miss,
+        t_start=t_in - zero,
+        t_stop=stop - zero,
+        tide=panels,
+        track=track,
+        distance_error=(growth.distance * u.m).to(u.km),
+        time_error=growth.time * u.s,
+        displacement=(growth.displacement * u.m).to(u.km),
+        growth=growth.displacement / growth.beside.shift,
+        neighbour=growth.beside.label,
+        predictability=predictability(
+            max(q, body.impact_distance if level is not None else 0.0),
+            growth.displacement,
+            growth.distance,
+            growth.time * v_p,
+        ),
+        ephemeris=window.name,
+    )
+
+
+def _two_body_periapsis(gm: float, state: Array) -> tuple[float, float]:
+    """Periapsis distance (m) and time to it (s) of the two-body orbit through an inbound state."""
+    r = float(np.linalg.norm(state[:3]))
+    v2 = float(state[3:] @ state[3:])
+    h2 = float(np.sum(np.cross(state[:3], state[3:]) ** 2))
+    energy = v2 - 2.0 * gm / r  # v_inf^2
+    # q from h^2 = q (2 gm + q v_inf^2), without cancellation
+    q = h2 / (gm + np.sqrt(gm * gm + h2 * energy))
+    q = max(q, 1.0)
+    return float(q), float(time_at_distance(gm, q, q * energy / gm, r))
+
+
+def _log_state(log: Array, window: Window, index: int, t: float) -> Array:
+    """State relative to a body at `t` within a log, shape (6,)."""
+    k = min(max(int(np.searchsorted(log[:, 0], t, side="right")) - 1, 0), len(log) - 2)
+    out = np.empty(6)
+    relative(log, k, window.head, window.data, window.gm, index, t, out)
+    return out
+
+
+def _ends(log: Array, window: Window, index: int, level: float, t: float) -> tuple[float, float]:
+    """Last time before `t` and first after it at distance `level`, or at an apoapsis or an end of the log."""
+    tables = (window.head, window.data, window.gm, index)
+    inside, _ = crossings(log, *tables, level, 8)
+    turning, _ = crossings(log, *tables, -1.0, 8)
+    before = [log[0, 0]] + [f[0] for f in (*inside, *turning) if f[0] < t and f[2] < 0.0]
+    after = [log[-1, 0]] + [f[0] for f in inside if f[0] > t and f[2] > 0.0]
+    after += [f[0] for f in turning if f[0] > t and f[2] < 0.0]
+    return float(max(before)), float(min(after))

@@ -1,0 +1,1 @@
+"""A body through an encounter: result, verdict, margin, survival."""

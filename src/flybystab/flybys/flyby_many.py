@@ -1,0 +1,126 @@
+"""Many bodies through many encounters, row by row in compiled code."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import Any, TypeVar
+
+import astropy.units as u
+import numpy as np
+from numpy.typing import NDArray
+
+from flybystab.body.body import Body
+from flybystab.core.dynamics import verdict_row as judgement
+from flybystab.encounter.attitude import attitude_matrices, periapsis_axes
+from flybystab.encounter.encounter import Encounter
+from flybystab.errors import InvalidInput
+from flybystab.flybys.batch import (
+    MAX_STEPS,
+    TOLERANCE,
+    axis_ratio,
+    buffers,
+    columns,
+    failure_of,
+    judge_rows,
+    step_tolerance,
+)
+from flybystab.flybys.result import FlybyTable
+from flybystab.flybys.verdict import VERDICTS, Verdict
+from flybystab.units import whole
+
+T = TypeVar("T")
+
+
+def flyby_many(
+    bodies: Sequence[Body],
+    encounters: Sequence[Encounter],
+    attitudes: Sequence[Any] | None = None,
+    *,
+    tolerance: float = TOLERANCE,
+    max_axis_ratio: float = 6.0,
+    workers: int | None = None,
+) -> FlybyTable:
+    """Carry bodies through encounters, row by row, on all cores.
+
+    Parameters
+    ----------
+    bodies, encounters : sequences of equal length n
+    attitudes : sequence of rotations, optional
+        As in :func:`flyby`; identity by default.
+    tolerance, max_axis_ratio
+        As in :func:`flyby`.
+    workers : int, optional
+        Threads (kernels release the interpreter lock), one a core by default; no result depends on it.
+
+    Returns
+    -------
+    FlybyTable
+
+    Raises
+    ------
+    InvalidInput
+        If the lengths differ, for something that is no body or no encounter, a tolerance out of [1e-13, 1e-3], or
+        workers that are no whole number above zero. An attitude that is no rotation costs its own row only.
+    """
+    bodies, encounters = _all(Body, bodies, "bodies"), _all(Encounter, encounters, "encounters")
+    attitudes = None if attitudes is None else _all(object, attitudes, "attitudes")
+    n = len(bodies)
+    if len(encounters) != n or (attitudes is not None and len(attitudes) != n):
+        raise InvalidInput("encounters", len(encounters), f"as many encounters and attitudes as bodies, {n}")
+    tolerance, max_axis_ratio = step_tolerance(tolerance), axis_ratio(max_axis_ratio)
+    threads = (os.cpu_count() or 1) if workers is None else whole(workers, "workers", 1)
+    rotations, failures = attitude_matrices(attitudes, n)
+    if n:
+        frames = {id(e): periapsis_axes(e).T for e in encounters}
+        rotations = np.stack([frames[id(e)] for e in encounters]) @ rotations
+    rows = np.flatnonzero(failures == "")
+    phi = np.array([b.material.phi for b in bodies], dtype=float)
+    out = np.full((n, judgement.N_ANSWER), np.nan)
+    out[:, judgement.VERDICT] = judgement.FAILED
+    inputs = columns(bodies, rotations, encounters) if n else ()
+
+    def part(indices: NDArray[np.int64]) -> None:
+        judge_rows(indices, *inputs, tolerance, max_axis_ratio, MAX_STEPS, True, *buffers(0), out)
+
+    if threads == 1 or len(rows) < 2:
+        if len(rows):
+            part(rows)
+    else:  # rows that flow take longer: more parts than threads
+        parts = min(len(rows), 16 * threads)
+        with ThreadPoolExecutor(threads) as pool:
+            list(pool.map(part, [rows[k::parts].copy() for k in range(parts)]))
+    names = np.full(n, "FAILED", dtype="U20")
+    for number, name in VERDICTS.items():
+        names[out[:, judgement.VERDICT] == number] = str(name)
+    for lost in map(int, np.flatnonzero(names == "FAILED")):
+        if not failures[lost]:
+            failures[lost] = failure_of(out[lost], encounters[lost], tolerance)
+        out[lost] = np.nan
+    paths = np.array(["path" if e.impact else "body" for e in encounters], dtype="U4")
+    axes, spin = out[:, judgement.AXES : judgement.AXES + 3], out[:, judgement.SPIN : judgement.SPIN + 3]
+    return FlybyTable(
+        verdict=names,
+        bound_fraction=out[:, judgement.BOUND],
+        semi_axes=axes * u.m,
+        spin=np.array([np.linalg.norm(w) for w in spin]) * u.rad / u.s,
+        max_required_friction_angle=np.rad2deg(out[:, judgement.FRICTION]) * u.deg,
+        margin=np.rad2deg(phi - out[:, judgement.FRICTION]) * u.deg,
+        spin_ratio=out[:, judgement.SPIN_RATIO],
+        pole_change=np.rad2deg(out[:, judgement.POLE_CHANGE]) * u.deg,
+        contact=np.where(names == Verdict.IMPACT, paths, ""),
+        failure=failures.astype(str),
+    )
+
+
+def _all(kind: type[T], values: Any, name: str) -> list[T]:
+    """The values as a list; an error names the first that is not of the kind."""
+    try:
+        out = list(values)
+    except TypeError:
+        raise InvalidInput(name, values, "a sequence, one for each row") from None
+    for i, value in enumerate(out):
+        if not isinstance(value, kind):
+            raise InvalidInput(f"{name}[{i}]", value, f"a flybystab {kind.__name__}")
+    return out

@@ -1,0 +1,167 @@
+"""The stability margin of a flyby: what the encounter gives the body, held against the body's barrier.
+
+A quick estimate from the rigid course alone: where the stress that rigidity needs passes the yield surface, the body
+slides (:mod:`flybystab.core.energy.newmark`), and the tide does work on it. A body with a barrier above that work
+comes to rest
+as a recognisable body; ``python benchmarks/margin.py`` counts how often this is wrong, and on which side.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import astropy.units as u
+import numpy as np
+from astropy.units import Quantity
+from numpy.typing import NDArray
+
+from flybystab.body.body import Body
+from flybystab.body.stability import body_units
+from flybystab.body.stability_regions import stability_many
+from flybystab.core.ellipsoid.tide import tensor
+from flybystab.core.energy.newmark import driving_stress, slide
+from flybystab.core.energy.perturbation import pile, rate_of_strain, slope_of_flow
+from flybystab.core.energy.potential import MASS, velocity_gradient
+from flybystab.core.energy.stability_row import first_to_flow
+from flybystab.encounter.encounter import Encounter
+from flybystab.flybys.rigid_course import Course, rigid_course
+from flybystab.units import brief, to_si
+
+Array = NDArray[np.float64]
+
+#: What the margin foretells.
+HOLDS, RECOVERS, RUNS_AWAY = "holds", "recovers", "runs away"
+
+
+@dataclass(frozen=True, eq=False)
+class FlybyMargin:
+    """What an encounter gives a body, and what the body stands.
+
+    Attributes
+    ----------
+    expected : str
+        "holds": it never yields; "recovers": it yields, and comes to rest inside the model and whole; "runs away": it
+        passes the barrier, to an axis ratio beyond 6:1 or to the loss of mass.
+    margin : float
+        ``1 - energy/barrier``: 1 where nothing is given, 0 at the barrier, negative beyond; minus infinity for a body
+        that cannot stand its spin after the encounter.
+    energy : Quantity
+        Work of the tide and the changed spin on the deformation, J; zero for a body that does not yield.
+    kinetic_energy : Quantity
+        Largest kinetic energy of deformation, J.
+    strain : float
+        Strain of the slide (``|D'|`` over time); it ends at 3.
+    duration : Quantity
+        How long the body slides, s.
+    direction : ndarray (3, 3)
+        Rate of strain in body axes, ``|D'| = 1``, at the largest overload; nan for a body that does not yield.
+    barrier : Quantity
+        The lesser of the two below, J.
+    barrier_before, barrier_after : Quantity
+        Barrier of the energy criterion (:func:`flybystab.body.stability.stability`), J, at the spin before the
+        encounter and at the one that a rigid body has after it. Zero for a body that does not stand.
+    momentum, momentum_change : Quantity (3,)
+        Angular momentum before, and what the encounter adds to it, kg m2/s, frame of the encounter.
+    stands_after : bool
+        Whether the body in its old shape would stand its new spin.
+    required_friction_angle : Quantity
+        Largest mobilised friction angle on the rigid course, deg.
+    course : Course
+    """
+
+    expected: str
+    margin: float
+    energy: Quantity
+    kinetic_energy: Quantity
+    strain: float
+    duration: Quantity
+    direction: Array
+    barrier: Quantity
+    barrier_before: Quantity
+    barrier_after: Quantity
+    momentum: Quantity
+    momentum_change: Quantity
+    stands_after: bool
+    required_friction_angle: Quantity
+    course: Course
+
+    def __repr__(self) -> str:
+        return (
+            f"<FlybyMargin {self.expected}: margin {self.margin:.3g}, energy {brief(self.energy)} of "
+            f"{brief(self.barrier)}>"
+        )
+
+
+def flyby_margin(
+    body: Body, encounter: Encounter, attitude: Any = None, *, dilatancy: float | None = None
+) -> FlybyMargin:
+    """The stability margin of an encounter, without the dynamics of the flow.
+
+    Parameters
+    ----------
+    body, encounter, attitude
+        As in :func:`flybystab.flybys.flyby.flyby`.
+    dilatancy : float, optional
+        ``beta/min k``; the material's own by default, as in the dynamics.
+
+    Returns
+    -------
+    FlybyMargin
+    """
+    course = rigid_course(body, encounter, attitude)
+    m, units = body.material, body_units(body)
+    beta = m.dilatancy if dilatancy is None else dilatancy
+    beta = to_si(beta, u.dimensionless_unscaled, "dilatancy", low=0.0, high=1.0)
+    s = (body.axes / units.length) ** 2
+    spin, tide = course.spin.value * units.time, course.tide.value * units.time**2
+    cohesion = m.c_pa / units.stress
+    n = len(course)
+    deviator, pressure, excess = np.empty((n, 5)), np.empty(n), np.empty(n)
+    driving_stress(s, spin, tide, m.surface_code, m.phi, cohesion, deviator, pressure, excess)
+    worst = int(np.argmax(excess))
+
+    energy = kinetic = strain = duration = 0.0
+    way = np.full((3, 3), np.nan)
+    yields = bool(excess[worst] > 0.0)
+    if yields:
+        scene = pile(s[0], s[1], s[2], spin[0], m.surface_code, m.phi, cohesion, beta, 0.0)
+        x = np.empty(5)
+        first_to_flow(scene._replace(stress=deviator[worst].copy(), pressure=float(pressure[worst])), x)
+        g, trace = slope_of_flow(scene, x)
+        d, gradient = np.empty(6), np.empty((3, 3))
+        rate_of_strain(x, trace, d)
+        velocity_gradient(s[0], s[1], s[2], d, gradient)
+        mass = MASS / 5.0 * float(np.trace(gradient @ np.diag(s) @ gradient.T))
+        along = deviator @ x
+        power = MASS * (along - g * (scene.sin * pressure + scene.cohesion))
+        drive = MASS * (along - along[0] - trace * (pressure - pressure[0]))
+        energy, kinetic, strain, duration = slide(course.time.value / units.time, power, drive, mass)
+        way = tensor(d)
+
+    after = body.with_(spin=course.spin[-1])
+    table = stability_many([body, after], dilatancy=beta, depth="barrier", threads=1)
+    before_after = table.energy_barrier.to_value(u.J)
+    barrier = float(before_after.min())
+    given = energy * units.energy
+    margin = 1.0 if given == 0.0 else 1.0 - given / barrier if barrier > 0.0 else -np.inf
+    inertia = body.inertia.to_value(u.kg * u.m**2)
+    momentum = [course.attitude[i] @ (inertia * course.spin[i].value) for i in (0, -1)]
+    unit = u.kg * u.m**2 / u.s
+    return FlybyMargin(
+        expected=HOLDS if not yields else RECOVERS if margin > 0.0 else RUNS_AWAY,
+        margin=float(margin),
+        energy=given * u.J,
+        kinetic_energy=kinetic * units.energy * u.J,
+        strain=float(strain),
+        duration=duration * units.time * u.s,
+        direction=way,
+        barrier=barrier * u.J,
+        barrier_before=before_after[0] * u.J,
+        barrier_after=before_after[1] * u.J,
+        momentum=momentum[0] * unit,
+        momentum_change=(momentum[1] - momentum[0]) * unit,
+        stands_after=bool(table.level[1] >= 1),
+        required_friction_angle=course.max_required_friction_angle,
+        course=course,
+    )

@@ -1,0 +1,144 @@
+"""The rigid course of a body through an encounter: its attitude, spin and tide at every instant.
+
+What the surface feels and what the tide could do to a body that friction holds both follow from it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import astropy.units as u
+import numpy as np
+from astropy.units import Quantity
+from numpy.typing import NDArray
+
+from flybystab.body.body import Body, check_body
+from flybystab.core.dynamics.run import passage
+from flybystab.core.dynamics.state import rotated_to_body, rotation_matrix
+from flybystab.core.ellipsoid.tide import TidePanels, tide_at
+from flybystab.core.numerics.jit import kernel
+from flybystab.encounter.attitude import attitude_matrix, periapsis_axes
+from flybystab.encounter.encounter import Encounter
+from flybystab.errors import InvalidInput, NotConverged
+from flybystab.flybys.batch import ground_near, span_of
+from flybystab.units import brief
+
+Array = NDArray[np.float64]
+
+#: Rows kept at most.
+ROWS = 20_000
+
+
+@dataclass(frozen=True, eq=False)
+class Course:
+    """A body that stays rigid whatever the stress; every array has the same first dimension.
+
+    Attributes
+    ----------
+    body : Body
+    encounter : Encounter
+    time : Quantity (n,)
+        From closest approach.
+    distance : Quantity (n,)
+        Between the centres.
+    attitude : ndarray (n, 3, 3)
+        Body axes -> frame of the encounter.
+    spin : Quantity (n, 3)
+        Angular velocity along the body axes.
+    tide : Quantity (n, 6)
+        Tidal tensor along the body axes, ``xx, yy, zz, xy, xz, yz``.
+    max_required_friction_angle : Quantity
+        Largest friction angle that the body mobilises, deg; inf if none would do.
+    """
+
+    body: Body
+    encounter: Encounter
+    time: Quantity
+    distance: Quantity
+    attitude: Array
+    spin: Quantity
+    tide: Quantity
+    max_required_friction_angle: Quantity
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    def __repr__(self) -> str:
+        return f"<Course {len(self)} rows: mobilises {brief(self.max_required_friction_angle)} at most>"
+
+
+def rigid_course(
+    body: Body, encounter: Encounter, attitude: Any = None, *, tolerance: float = 1e-10
+) -> Course:
+    """The course of a body that does not yield.
+
+    Parameters
+    ----------
+    body, encounter, attitude
+        As in :func:`flybystab.flybys.flyby.flyby`.
+    tolerance : float
+        Relative error allowed in each integration step. The rows are a quarter of a step apart: a smaller one
+        gives more of them (1e-10: about 12 per dynamical time near the planet).
+    """
+    check_body(body)
+    if not isinstance(encounter, Encounter):
+        raise InvalidInput("encounter", encounter, "a flybystab.Encounter")
+    rotation = periapsis_axes(encounter).T @ attitude_matrix(attitude)
+    start, stop, limit = span_of(encounter)
+    material = body.material
+    run = passage(
+        body.axes,
+        body.rho,
+        body.omega,
+        rotation,
+        start,
+        limit,
+        encounter.tide,
+        t_rest=stop,
+        phi=material.phi,
+        cohesion=material.c_pa,
+        surface=material.surface_code,
+        unyielding=True,
+        tolerance=tolerance,
+        max_axis_ratio=np.inf,
+        keep=ROWS,
+        ground=ground_near(encounter, float(body.axes[0])),
+    )
+    if run.reason == "stuck" or run.history is None:
+        raise NotConverged(f"the rigid course stopped {run.time - start:.1f} s after the start")
+    time = run.history["time"]
+    turned = np.empty((len(time), 3, 3))
+    spin, tide = np.empty((len(time), 3)), np.empty((len(time), 6))
+    w = np.ascontiguousarray(_spin_of(run.history["velocity_gradient"]))
+    _along_body_axes(time, run.history["quaternion"], w, encounter.tide, turned, spin, tide)
+    return Course(
+        body=body,
+        encounter=encounter,
+        time=time * u.s,
+        distance=(encounter.radius(time) * u.m).to(u.km),
+        attitude=turned,
+        spin=spin * u.rad / u.s,
+        tide=tide / u.s**2,
+        max_required_friction_angle=np.rad2deg(run.max_friction) * u.deg,
+    )
+
+
+def _spin_of(gradient: Array) -> Array:
+    """Angular velocity of ``W x = w x x``."""
+    return np.stack([gradient[:, 2, 1], gradient[:, 0, 2], gradient[:, 1, 0]], axis=-1)
+
+
+@kernel
+def _along_body_axes(
+    time: Array, quaternion: Array, w: Array, panels: TidePanels, turned: Array, spin: Array, tide: Array
+) -> None:
+    """Rotation matrices of the quaternions; spin and tide along the body axes."""
+    k = np.empty(6)
+    m = np.empty((3, 3))
+    for i in range(time.size):
+        rotation_matrix(quaternion[i], turned[i])
+        tide_at(panels.tau, panels.start, panels.width, panels.coefficients, time[i], k)
+        rotated_to_body(quaternion[i], k, m, tide[i])
+        for j in range(3):
+            spin[i, j] = turned[i, 0, j] * w[i, 0] + turned[i, 1, j] * w[i, 1] + turned[i, 2, j] * w[i, 2]

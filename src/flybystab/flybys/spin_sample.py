@@ -1,0 +1,166 @@
+"""How an encounter changes the spin when the attitude of the body at encounter is not known."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import astropy.units as u
+import numpy as np
+from astropy.units import Quantity
+from numpy.typing import NDArray
+
+from flybystab.body.body import Body, Material
+from flybystab.encounter.attitude import periapsis_axes
+from flybystab.encounter.encounter import Encounter
+from flybystab.errors import InvalidInput
+from flybystab.flybys.batch import TOLERANCE
+from flybystab.flybys.flyby_many import flyby_many
+from flybystab.units import counted, whole
+
+Array = NDArray[np.float64]
+
+
+class SpinStates(Protocol):
+    """What a catalogue knows of a spin: bodies and attitudes by phase (:class:`flybystab.Asteroid`)."""
+
+    @property
+    def pole(self) -> Array | None:
+        """Direction of the angular momentum, ICRF; None if unknown."""
+
+    def body_with(self, material: Material | None = None, *, phase: float = 0.0) -> Body:
+        """The body at a phase of its rotation."""
+
+    def attitude(self, angle: Quantity, *, phase: float = 0.0, pole: Any = None) -> Array:
+        """Body axes -> ICRF."""
+
+
+@dataclass(frozen=True, eq=False)
+class SpinSample:
+    """Encounters of one body at many attitudes; arrays over the sample.
+
+    Attributes
+    ----------
+    spin_ratio : ndarray (n,)
+        Effective spin rate ``2 E/H`` after over before.
+    pole_change : Quantity (n,)
+        Angle between the angular momenta before and after.
+    max_required_friction_angle : Quantity (n,)
+        Largest friction angle mobilised.
+    verdict : ndarray of str (n,)
+    pole_known : bool
+        Whether the pole was the catalogue's; else poles are isotropic.
+    seed : int
+    """
+
+    spin_ratio: Array
+    pole_change: Quantity
+    max_required_friction_angle: Quantity
+    verdict: NDArray[np.str_]
+    pole_known: bool
+    seed: int
+
+    def __len__(self) -> int:
+        return len(self.spin_ratio)
+
+    def __repr__(self) -> str:
+        low, high = np.nanmin(self.spin_ratio), np.nanmax(self.spin_ratio)
+        pole = "known pole" if self.pole_known else "isotropic poles"
+        rate = f"spin rate x {low:.3g} to {high:.3g}"
+        return f"<SpinSample {len(self)} attitudes, {pole}: {counted(self.verdict)}; {rate}>"
+
+
+def spin_sample(
+    asteroid: SpinStates | Body,
+    encounter: Encounter,
+    n: int = 64,
+    seed: int = 0,
+    *,
+    material: Material | None = None,
+    tolerance: float = TOLERANCE,
+    workers: int | None = None,
+) -> SpinSample:
+    """The same encounter at `n` attitudes.
+
+    The pole is the catalogue's where known and the encounter is real (frame ICRF), isotropic otherwise.
+    The turn about the pole and, for a tumbler, the phase of its rotation are uniform: the share of time a
+    free body spends there. They cannot be predicted decades ahead, so that the sample is the prediction.
+
+    Parameters
+    ----------
+    asteroid : Asteroid or Body
+    encounter : Encounter
+    n, seed : int
+        Size of the sample and seed of its random numbers.
+    material : Material, optional
+        Instead of the asteroid's own.
+    tolerance : float
+        As in :func:`flybystab.flybys.flyby.flyby`.
+    workers : int, optional
+        Threads; one a core by default. The result does not depend on it.
+
+    Raises
+    ------
+    InvalidInput
+        If `n` is not a positive whole number, or `seed` a negative one.
+    """
+    known = not isinstance(asteroid, Body) and asteroid.pole is not None and encounter.frame == "ICRF"
+    bodies, rotations = spin_states(asteroid, n, seed, material, use_pole=known)
+    frame = periapsis_axes(encounter)
+    attitudes = [frame @ rotation for rotation in rotations]
+    table = flyby_many(bodies, [encounter] * n, attitudes, tolerance=tolerance, workers=workers)
+    return SpinSample(
+        spin_ratio=table.spin_ratio,
+        pole_change=table.pole_change,
+        max_required_friction_angle=table.max_required_friction_angle,
+        verdict=table.verdict,
+        pole_known=known,
+        seed=seed,
+    )
+
+
+def spin_states(
+    asteroid: SpinStates | Body, n: int, seed: int, material: Material | None = None, *, use_pole: bool = True
+) -> tuple[list[Body], list[Array]]:
+    """Bodies and rotations, body axes -> ICRF, at `n` phases: uniform about the pole, isotropic without one.
+
+    Parameters
+    ----------
+    asteroid, n, seed, material
+        As in :func:`spin_sample`.
+    use_pole : bool
+        Whether the catalogue's pole counts.
+    """
+    n, seed = whole(n, "n", 1), whole(seed, "seed", 0)
+    if not isinstance(asteroid, Body) and not hasattr(asteroid, "body_with"):
+        raise InvalidInput("asteroid", asteroid, "a flybystab.Asteroid or a flybystab.Body")
+    bodies, rotations = [], []
+    for turn, phase, height, longitude in np.random.default_rng(seed).random((n, 4)):
+        if isinstance(asteroid, Body):
+            bodies.append(asteroid if material is None else asteroid.with_(material=material))
+            rotations.append(_isotropic(turn, height, longitude))
+        else:
+            bodies.append(asteroid.body_with(material, phase=float(phase)))
+            pole = asteroid.pole if use_pole else None
+            if pole is None:
+                pole = _direction(height, longitude)
+            rotations.append(asteroid.attitude(2.0 * np.pi * turn * u.rad, phase=float(phase), pole=pole))
+    return bodies, rotations
+
+
+def _direction(height: float, longitude: float) -> Array:
+    """Unit vector, isotropic for two uniform numbers."""
+    z = 2.0 * height - 1.0
+    r = np.sqrt(1.0 - z * z)
+    return np.array([r * np.cos(2.0 * np.pi * longitude), r * np.sin(2.0 * np.pi * longitude), z])
+
+
+def _isotropic(turn: float, height: float, longitude: float) -> Array:
+    """Rotation matrix, uniform over all rotations: an isotropic third column and a uniform turn about it."""
+    z = _direction(height, longitude)
+    helper = np.eye(3)[int(np.argmin(np.abs(z)))]
+    x = np.cross(helper, z)
+    x /= np.linalg.norm(x)
+    y = np.cross(z, x)
+    c, s = np.cos(2.0 * np.pi * turn), np.sin(2.0 * np.pi * turn)
+    return np.stack([c * x + s * y, c * y - s * x, z], axis=1)

@@ -1,0 +1,1 @@
+"""Documents, scenario files, reports and citations."""

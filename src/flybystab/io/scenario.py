@@ -1,0 +1,228 @@
+"""Scripted encounters from TOML files: every quantity is a text with its unit, every key is checked."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Any
+
+import astropy.units as u
+import numpy as np
+from astropy.time import Time
+from astropy.units import Quantity
+from scipy.spatial.transform import Rotation
+
+from flybystab.body.body import Body, Material
+from flybystab.catalogues.asteroid import Asteroid
+from flybystab.encounter.attitude import periapsis_axes
+from flybystab.encounter.encounter import Encounter
+from flybystab.errors import InvalidInput, UnknownName
+from flybystab.orbit.planets import planet
+from flybystab.plots.formats import FIGURES, FILMS
+from flybystab.units import to_si
+
+#: Allowed keys of each table.
+KEYS: dict[str, tuple[str, ...]] = {
+    "": ("title", "body", "material", "encounter", "attitude", "output"),
+    "body": ("asteroid", "semi_axes", "density", "spin_period", "spin", "phase"),
+    "material": ("friction_angle", "cohesion", "dilatancy", "yield_surface", "brittle"),
+    "encounter": (
+        "planet",
+        "date",
+        "asteroid",
+        "periapsis",
+        "v_inf",
+        "start_distance",
+        "settle",
+        "j2",
+        "ephemeris",
+    ),
+    "attitude": ("euler_zxz", "turn"),
+    "output": ("figure",),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """What a scenario file describes, ready for :func:`flybystab.flyby`."""
+
+    title: str
+    body: Body
+    encounter: Encounter
+    attitude: np.ndarray
+    figure: str | None = None
+
+
+def scenario(path: str | Path) -> Scenario:
+    """Read a scenario file.
+
+    Raises
+    ------
+    InvalidInput
+        The file cannot be read or a value is wrong.
+    UnknownName
+        A table or key is not known; near ones are offered.
+    UnitMismatch
+        A value has the wrong unit, or none.
+    """
+    path = Path(path)
+    try:
+        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except (OSError, UnicodeDecodeError) as reason:
+        raise InvalidInput("scenario file", path, f"a readable file ({reason})") from None
+    except tomllib.TOMLDecodeError as reason:
+        raise InvalidInput("scenario file", path, f"valid TOML ({reason})") from None
+    _check(content, "")
+    for table in (t for t in KEYS if t):
+        section = content.setdefault(table, {})
+        if not isinstance(section, dict):
+            raise InvalidInput(table, section, f"a table: [{table}]")
+        _check(section, table)
+    material = _material(content["material"])
+    asteroid, body = _body(content["body"], material)
+    encounter = _encounter(content["encounter"], asteroid)
+    attitude = _attitude(content["attitude"], content["body"], asteroid, encounter)
+    title = _typed(content, "", "title", str, path.stem)
+    figure = _typed(content["output"], "output", "figure", str, None)
+    if figure is not None and Path(figure).suffix.lower() not in FIGURES + FILMS:
+        raise InvalidInput("output.figure", figure, f"a file that ends in {' or '.join(FIGURES + FILMS)}")
+    return Scenario(title, body, encounter, attitude, figure)
+
+
+def quantity(value: Any, name: str) -> Quantity:
+    """A quantity from text such as ``"6 h"``, ``"2.2 R_earth"`` or ``"1400, 850, 750 m"``."""
+    if not isinstance(value, str):
+        raise InvalidInput(name, value, 'text with a unit, for example "6 h"')
+    text = value.strip()
+    scale: Any = 1.0
+    head, mark, where = text.rpartition("R_")
+    if mark:  # radii of a planet
+        text, scale = head, planet(where).radius * u.m
+    try:
+        if "," in text:
+            *first, last = text.split(",")
+            tail = last.split(None, 1)
+            unit = u.Unit(tail[1]) if len(tail) > 1 else u.dimensionless_unscaled
+            return np.array([float(x) for x in [*first, tail[0]]]) * unit * scale
+        return Quantity(text) * scale
+    except (TypeError, ValueError):
+        raise InvalidInput(
+            name, value, 'numbers and a unit, for example "6 h" or "1400, 850, 750 m"'
+        ) from None
+
+
+def _check(section: dict[str, Any], table: str) -> None:
+    for key in section:
+        if key not in KEYS[table]:
+            where = f"key in [{table}]" if table else "table"
+            near = get_close_matches(key, KEYS[table], cutoff=0.5)
+            raise UnknownName(where, key, near, f"(known: {', '.join(KEYS[table])})")
+
+
+def _need(section: dict[str, Any], table: str, key: str) -> Any:
+    if key not in section:
+        raise InvalidInput(f"{table}.{key}", "(missing)", f"a value for {key} in [{table}]")
+    return section[key]
+
+
+def _typed(section: dict[str, Any], table: str, key: str, kind: type, default: Any) -> Any:
+    """A value that is not a quantity; TOML has its own types, and ``"no"`` is not false."""
+    if key not in section:
+        return default
+    value = section[key]
+    if kind is float and isinstance(value, int) and not isinstance(value, bool):
+        value = float(value)
+    if not isinstance(value, kind):
+        words = {bool: "true or false, without quotes", float: "a number, without quotes", str: "text"}
+        raise InvalidInput(f"{table}.{key}" if table else key, value, words[kind])
+    return value
+
+
+def _material(section: dict[str, Any]) -> Material:
+    kinds = {"dilatancy": float, "yield_surface": str, "brittle": bool}
+    plain = {k: _typed(section, "material", k, kinds[k], None) for k in section if k in kinds}
+    units = {
+        k: quantity(v, f"material.{k}") for k, v in section.items() if k in ("friction_angle", "cohesion")
+    }
+    return Material(**plain, **units)
+
+
+def _body(section: dict[str, Any], material: Material) -> tuple[Asteroid | None, Body]:
+    if "asteroid" in section:
+        extra = sorted(set(section) - {"asteroid", "phase"})
+        if extra:
+            raise InvalidInput(f"body.{extra[0]}", section[extra[0]], "no such key beside body.asteroid")
+        asteroid = Asteroid.from_catalogue(section["asteroid"])
+        return asteroid, asteroid.body_with(material, phase=_phase(section))
+    if "phase" in section:
+        raise InvalidInput("body.phase", section["phase"], "no phase without body.asteroid")
+    spin = {k: quantity(section[k], f"body.{k}") for k in ("spin_period", "spin") if k in section}
+    return None, Body(
+        semi_axes=quantity(_need(section, "body", "semi_axes"), "body.semi_axes"),
+        density=quantity(_need(section, "body", "density"), "body.density"),
+        material=material,
+        **spin,
+    )
+
+
+def _phase(section: dict[str, Any]) -> float:
+    phase = _typed(section, "body", "phase", float, 0.0)
+    if not np.isfinite(phase):
+        raise InvalidInput("body.phase", phase, "a finite number")
+    return float(phase)
+
+
+#: Keys of [encounter] that belong to one of its two kinds only.
+_SCRIPTED = ("periapsis", "v_inf", "j2")
+_REAL = ("asteroid", "date", "ephemeris")
+
+
+def _encounter(section: dict[str, Any], asteroid: Asteroid | None) -> Encounter:
+    where = _typed(section, "encounter", "planet", str, "earth")
+    options = {
+        k: quantity(section[k], f"encounter.{k}") for k in ("start_distance", "settle") if k in section
+    }
+    if "date" in section:
+        for key in _SCRIPTED:
+            if key in section:
+                raise InvalidInput(f"encounter.{key}", section[key], "no such key beside encounter.date")
+        orbiting = Asteroid.from_catalogue(section["asteroid"]) if "asteroid" in section else asteroid
+        if orbiting is None:
+            raise InvalidInput("encounter.date", section["date"], "an asteroid whose orbit leads there")
+        try:
+            time = Time(str(section["date"]), scale="tdb")
+        except ValueError:
+            raise InvalidInput("encounter.date", section["date"], "a date such as 2029-04-13") from None
+        ephemeris = _typed(section, "encounter", "ephemeris", str, None)
+        return Encounter.from_orbit(orbiting.orbit, where, time, ephemeris=ephemeris, **options)
+    for key in _REAL:
+        if key in section:
+            raise InvalidInput(f"encounter.{key}", section[key], "encounter.date beside it")
+    return Encounter.hyperbolic(
+        where,
+        periapsis=quantity(_need(section, "encounter", "periapsis"), "encounter.periapsis"),
+        v_inf=quantity(_need(section, "encounter", "v_inf"), "encounter.v_inf"),
+        j2=_typed(section, "encounter", "j2", bool, False),
+        **options,
+    )
+
+
+def _attitude(
+    section: dict[str, Any], body: dict[str, Any], asteroid: Asteroid | None, encounter: Encounter
+) -> np.ndarray:
+    if "euler_zxz" in section:
+        if "turn" in section:
+            raise InvalidInput("attitude.turn", section["turn"], "no such key beside attitude.euler_zxz")
+        name = "attitude.euler_zxz"
+        angles = to_si(quantity(section["euler_zxz"], name), u.rad, name, shape=(3,))
+        return Rotation.from_euler("ZXZ", angles).as_matrix()
+    if asteroid is not None and asteroid.pole is not None and encounter.frame == "ICRF":
+        turn = to_si(quantity(section.get("turn", "0 deg"), "attitude.turn"), u.rad, "attitude.turn")
+        return periapsis_axes(encounter) @ asteroid.attitude(turn * u.rad, phase=_phase(body))
+    if "turn" in section:
+        raise InvalidInput(
+            "attitude.turn", section["turn"], "an asteroid with a known pole on its real orbit"
+        )
+    return np.eye(3)

@@ -1,0 +1,178 @@
+"""Short readable summaries for the terminal."""
+
+from __future__ import annotations
+
+import astropy.units as u
+import numpy as np
+
+from flybystab.body.equilibrium import Equilibrium
+from flybystab.encounter.encounter import Encounter
+from flybystab.flybys.result import FlybyResult
+from flybystab.flybys.spin_sample import SpinSample
+from flybystab.orbit.ephemeris import BELT, BODIES
+
+MEANING = {
+    "INTACT": "never yields",
+    "RESHAPED": "flows, and all of it stays together",
+    "MASS LOSS": "loses mass",
+    "DISRUPTED": "loses half of its mass or more",
+    "IMPACT": "reaches the planet",
+    "BEYOND MODEL": "is drawn out past 6:1, where a homogeneous ellipsoid cannot say what follows",
+    "NOT IN EQUILIBRIUM": "cannot exist as given, even far from any planet",
+}
+
+
+def angle(value: u.Quantity) -> str:
+    """An angle, or that none is enough."""
+    degrees = value.to_value(u.deg)
+    return f"{degrees:.2f} deg" if np.isfinite(degrees) else "none is enough"
+
+
+def encounter_lines(e: Encounter) -> list[str]:
+    """The encounter in two or three lines."""
+    when = f"{e.time.tdb.iso[:19]} TDB" if e.time is not None else "scripted"
+    radii = e.distance.to_value(u.m) / e.planet.radius
+    out = [
+        f"encounter  {e.planet.name.capitalize()}, {when}",
+        f"           {e.distance.to_value(u.km):,.1f} km from the centre ({radii:.3f} radii), "
+        f"v_inf {e.v_inf.to_value(u.km / u.s):.4f} km/s",
+    ]
+    if e.impact:
+        out.append(f"           reaches the {e.impact_level}")
+    if e.displacement is not None:
+        out.append(f"known      {known(e)}")
+    return out
+
+
+def known(e: Encounter) -> str:
+    """How well an encounter on a real orbit is known."""
+    assert e.displacement is not None
+    return f"{e.predictability}: {e.neighbour} moves the asteroid by {e.displacement.to_value(u.km):,.3g} km there"
+
+
+def contact(r: FlybyResult) -> str:
+    """What reaches the planet, and when, in words; of an IMPACT."""
+    e = r.encounter
+    top = "the top of the atmosphere" if e.planet.atmosphere else "the ground"
+    before = -(e.t_start + r.end_time.to_value(u.s))
+    if r.contact == "path":
+        return f"on a path into the {e.impact_level}; touches {top} {before:,.1f} s before closest approach"
+    return (
+        f"its centre would pass {e.height / 1e3:,.3g} km above {top}, but its side touches it, "
+        f"{abs(before):,.1f} s {'before' if before >= 0 else 'after'} closest approach"
+    )
+
+
+def flyby_lines(r: FlybyResult) -> list[str]:
+    """Verdict, margins and error."""
+    m = r.body.material
+    letter = f" (class {r.verdict_class})" if r.verdict_class else ""
+    out = [f"verdict    {r.verdict}{letter}: the body {MEANING[str(r.verdict)]}"]
+    if r.verdict == "NOT IN EQUILIBRIUM":
+        out.append(
+            f"           it would need {angle(r.max_required_friction_angle)} of friction, or at "
+            f"{m.friction_angle.to_value(u.deg):g} deg a cohesion of {r.required_cohesion.to_value(u.Pa):.3g} Pa"
+        )
+        return out
+    if r.contact is not None:
+        out.append(f"contact    {contact(r)}")
+    has = f"{m.friction_angle.to_value(u.deg):g} deg"
+    if r.margin > 0 * u.deg:
+        out.append(
+            f"friction   mobilised {angle(r.max_required_friction_angle)} of {has}, margin {angle(r.margin)}"
+        )
+    else:
+        out.append(f"friction   {angle(r.max_required_friction_angle)} to stay rigid, the material has {has}")
+    if r.onset_time is not None:
+        a = r.semi_axes.to_value(u.m)
+        lode = "" if r.lode_angle is None else f", Lode angle {r.lode_angle.to_value(u.deg):.1f} deg"
+        out.append(f"yield      {r.onset_time.to_value(u.h):.2f} h after the start{lode}")
+        out.append(f"afterwards semi-axes {a[0]:.5g}, {a[1]:.5g}, {a[2]:.5g} m, bound {r.bound_fraction:.1%}")
+    out.append(f"spin       rate x {r.spin_ratio:.3f}, pole moves {r.pole_change.to_value(u.deg):.2f} deg")
+    if r.robust is not None:
+        others = ", ".join(f"{k} {v}" for k, v in r.verdict_by_surface.items())
+        word = "does not depend" if r.robust else "depends"
+        out.append(f"surfaces   the verdict {word} on the yield surface ({others})")
+    if r.error is not None:
+        out.append(
+            f"error      semi-axes {r.error.semi_axes:.1e}, spin {r.error.spin:.1e} (relative, measured); "
+            f"tide {r.error.tide:.1e}"
+        )
+    return out
+
+
+def sample_lines(s: SpinSample) -> list[str]:
+    """What a sample of attitudes gives."""
+    low, mid, high = np.quantile(s.spin_ratio, [0.0, 0.5, 1.0])
+    turn = np.quantile(s.pole_change.to_value(u.deg), [0.0, 0.5, 1.0])
+    phi = np.quantile(s.max_required_friction_angle.to_value(u.deg), [0.0, 1.0])
+    names, counts = np.unique(s.verdict, return_counts=True)
+    pole = "known pole, unknown phases" if s.pole_known else "unknown pole"
+    return [
+        f"attitudes  {len(s)} ({pole}): "
+        + ", ".join(f"{n} x {k}" for k, n in zip(names, counts, strict=True)),
+        f"           spin rate x {low:.2f} to {high:.2f} (median {mid:.2f}), "
+        f"pole moves {turn[0]:.1f} to {turn[2]:.1f} deg (median {turn[1]:.1f})",
+        f"           friction mobilised {phi[0]:.2f} to {phi[1]:.2f} deg",
+    ]
+
+
+def modelled(r: FlybyResult) -> dict[str, str]:
+    """What was modelled, in words, by ``orbit``, ``tide`` and ``body``; the small pullers are counted."""
+    groups: dict[str, list[str]] = {}
+    for entry in r.modelled:
+        head, _, rest = entry.partition(": ")
+        groups.setdefault(head if rest else "body", []).append(rest or entry)
+    out = {}
+    for head, entries in groups.items():
+        names = [e.removesuffix(" point mass") for e in entries]
+        small = [n for n in names if n in BELT]
+        if len(small) > 2:
+            at = names.index(small[0])
+            names = [n for n in names if n not in small]
+            names.insert(at, f"{len(small)} massive asteroids")
+        out[head] = ", ".join(names if head == "body" else map(capital, names))
+    return out
+
+
+def capital(name: str) -> str:
+    """A force or its source with the proper name in capitals: ``earth J2`` is Earth J2."""
+    first, space, rest = name.partition(" ")
+    return (first.capitalize() if first in (*BODIES, *BELT) else first) + space + rest
+
+
+def left_out(r: FlybyResult, most: int = 4) -> str:
+    """The largest of what was left out, with its share; how many more there are."""
+    largest = sorted(r.left_out, key=lambda x: -x[1])
+    words = []
+    for name, share in largest[:most]:
+        head, colon, rest = name.rpartition(": ")
+        words.append(f"{head}{colon}{capital(rest).removesuffix(' point mass')} ({share:.0e})")
+    if len(largest) > most:
+        words.append(f"{len(largest) - most} smaller ones")
+    return "; ".join(words)
+
+
+def model_lines(r: FlybyResult, assumed: tuple[str, ...] = ()) -> list[str]:
+    """What was modelled, left out and assumed."""
+    rows = [f"{head}: {what}" for head, what in modelled(r).items()]
+    out = [("modelled   " if i == 0 else "           ") + row for i, row in enumerate(rows)]
+    if r.left_out:
+        out.append("left out   " + left_out(r))
+    if assumed:
+        out.append("assumed    " + "; ".join(assumed))
+    return out
+
+
+def equilibrium_lines(name: str, e: Equilibrium) -> list[str]:
+    """Equilibrium of a body."""
+    m = e.body.material
+    out = [
+        f"{name}: {'holds' if e.admissible else 'does not hold'} with "
+        f"{m.friction_angle.to_value(u.deg):g} deg and {m.cohesion.to_value(u.Pa):g} Pa ({m.yield_surface})",
+        f"required friction angle   {angle(e.required_friction_angle)}",
+        f"required cohesion         {e.required_cohesion.to_value(u.Pa):.4g} Pa",
+        f"mean pressure             {e.mean_pressure.to_value(u.Pa):.4g} Pa"
+        + (" (tension)" if e.in_tension else ""),
+    ]
+    return out

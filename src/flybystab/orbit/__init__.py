@@ -1,0 +1,1 @@
+"""Heliocentric orbits: ephemerides, planets, forces, and the search for encounters."""

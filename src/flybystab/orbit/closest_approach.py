@@ -1,0 +1,223 @@
+"""Closest approach: where ``r.v`` crosses zero, and the path around it as a smooth function of time.
+
+A log of integration steps (time, position, velocity, acceleration) is read between its rows by the quintic
+that matches all three at both ends. That locates each minimum of distance; the root itself is then found on
+the integrator's own trajectory, from the step before it: neither the step length nor the quintic matters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.polynomial import chebyshev
+from numpy.typing import NDArray
+
+from flybystab.core.numerics.jit import kernel
+from flybystab.errors import NotConverged
+from flybystab.orbit.ephemeris import Window, body_states
+
+Array = NDArray[np.float64]
+
+
+@kernel
+def between(log: Array, k: int, t: float, out: Array) -> None:
+    """Write into ``out[6]`` position (m) and velocity (m/s) at ``t`` inside step ``k`` (row k to k + 1)."""
+    h = log[k + 1, 0] - log[k, 0]
+    s = (t - log[k, 0]) / h
+    for j in range(3):
+        x0, x1 = log[k, 1 + j], log[k + 1, 1 + j]
+        v0, v1 = h * log[k, 4 + j], h * log[k + 1, 4 + j]
+        a0, a1 = 0.5 * h * h * log[k, 7 + j], 0.5 * h * h * log[k + 1, 7 + j]
+        # x0 + v0 s + a0 s^2 + s^3 (c3 + c4 s + c5 s^2), matched at s = 1
+        d = (x1 - x0) - v0 - a0
+        dv = v1 - v0 - 2.0 * a0
+        da = a1 - a0
+        c3 = 10.0 * d - 4.0 * dv + da
+        c4 = -15.0 * d + 7.0 * dv - 2.0 * da
+        c5 = 6.0 * d - 3.0 * dv + da
+        out[j] = x0 + s * (v0 + s * (a0 + s * (c3 + s * (c4 + s * c5))))
+        out[3 + j] = (v0 + s * (2.0 * a0 + s * (3.0 * c3 + s * (4.0 * c4 + s * 5.0 * c5)))) / h
+
+
+@kernel
+def relative(
+    log: Array, k: int, head: Array, data: Array, gm: Array, body: int, t: float, out: Array
+) -> None:
+    """Write into ``out[6]`` the state (m, m/s) relative to a body at ``t`` inside step ``k``."""
+    between(log, k, t, out)
+    place = body_states(head, data, gm, body, np.array([t]))
+    for j in range(6):
+        out[j] -= place[0, j]
+
+
+@kernel
+def crossings(
+    log: Array, head: Array, data: Array, gm: Array, body: int, level: float, cuts: int
+) -> tuple[Array, Array]:
+    """Zeros of ``r.v`` (level < 0), or of ``r - level`` (level in m), along a log that runs forward in time.
+
+    Each step is cut into `cuts` pieces; a piece with a change of sign holds one zero.
+
+    Returns
+    -------
+    ndarray, shape (n, 3)
+        Time (s), distance (m), and direction: +1 where the function rises (a minimum of distance; outbound).
+    ndarray, shape (n,)
+        Step of each.
+    """
+    found = []
+    steps = []
+    s = np.empty(6)
+    for k in range(log.shape[0] - 1):
+        h = (log[k + 1, 0] - log[k, 0]) / cuts
+        for i in range(cuts):
+            ta = log[k, 0] + i * h
+            tb = ta + h
+            relative(log, k, head, data, gm, body, ta, s)
+            fa = _measure(s, level)
+            relative(log, k, head, data, gm, body, tb, s)
+            fb = _measure(s, level)
+            if (fa < 0.0) == (fb < 0.0):
+                continue
+            for _ in range(60):  # Illinois false position
+                tm = (ta * fb - tb * fa) / (fb - fa)
+                if not (min(ta, tb) < tm < max(ta, tb)):
+                    tm = 0.5 * (ta + tb)
+                relative(log, k, head, data, gm, body, tm, s)
+                fm = _measure(s, level)
+                moved = abs(tm - tb)
+                if (fm < 0.0) == (fb < 0.0):
+                    fa *= 0.5
+                else:
+                    ta, fa = tb, fb
+                tb, fb = tm, fm
+                if moved < 1e-6 or fm == 0.0:
+                    break
+            relative(log, k, head, data, gm, body, tb, s)
+            d = np.sqrt(s[0] ** 2 + s[1] ** 2 + s[2] ** 2)
+            relative(log, k, head, data, gm, body, log[k, 0] + i * h, s)
+            found.append((tb, d, 1.0 if _measure(s, level) < 0.0 else -1.0))
+            steps.append(k)
+    out = np.empty((len(found), 3))
+    where = np.empty(len(found))
+    for n in range(len(found)):
+        out[n, 0], out[n, 1], out[n, 2] = found[n]
+        where[n] = steps[n]
+    return out, where
+
+
+@kernel
+def _measure(s: Array, level: float) -> float:
+    """``r.v`` (m2/s) for a negative level, else ``r - level`` (m)."""
+    if level < 0.0:
+        return s[0] * s[3] + s[1] * s[4] + s[2] * s[5]
+    return np.sqrt(s[0] ** 2 + s[1] ** 2 + s[2] ** 2) - level
+
+
+def periapsis_time(state_at: Callable[[float], Array], t: float) -> tuple[float, Array]:
+    """Zero of ``r.v`` near `t` on an exact trajectory, and the relative state there.
+
+    Secant method: the slope of ``r.v`` is measured, since far from the planet the Sun makes as much of it.
+
+    Parameters
+    ----------
+    state_at : callable
+        Time (s) to relative state (m, m/s), shape (6,).
+    t : float
+        First guess, s.
+    """
+    s = state_at(t)
+    last, step = float(s[:3] @ s[3:]), 60.0
+    for _ in range(40):
+        t += step
+        s = state_at(t)
+        rv = float(s[:3] @ s[3:])
+        slope = (rv - last) / step
+        if not slope > 0.0:
+            break
+        last, step = rv, -rv / slope
+        # A decimetre of the way, beside the 1e8 m of an encounter: rounding over centuries leaves centimetres.
+        if abs(step) * float(np.linalg.norm(s[3:])) < 0.1:
+            return t + step, state_at(t + step)
+    raise NotConverged(f"closest approach near t = {t:.6g} s: the last correction was {step:.3g} s")
+
+
+@dataclass(frozen=True)
+class PanelTrack:
+    """Relative motion as Chebyshev panels in ``u = asinh((t)/tau)``, like the tide.
+
+    Attributes
+    ----------
+    tau, start, width : float
+        Time scale (s), ``u`` at the start, width of a panel in ``u``.
+    coefficients : ndarray, shape (panels, degree + 1, 3)
+        Position, m.
+    """
+
+    tau: float
+    start: float
+    width: float
+    coefficients: Array
+
+    def states(self, t: Array) -> Array:
+        """Position (m) and velocity (m/s), shape (n, 6), at ``t`` s from closest approach, shape (n,).
+
+        Beyond its ends the track does not exist: nan.
+        """
+        time = np.asarray(t, dtype=float)
+        v = (np.arcsinh(time / self.tau) - self.start) / self.width
+        count = len(self.coefficients)
+        panel = np.clip(np.floor(v), 0, count - 1).astype(int)
+        x = 2.0 * (v - panel) - 1.0
+        rate = 2.0 / self.width / np.hypot(self.tau, time)
+        out = np.empty((time.size, 6))
+        for p in np.unique(panel):
+            here = panel == p
+            c = self.coefficients[p]
+            out[here, :3] = chebyshev.chebval(x[here], c).T
+            out[here, 3:] = (chebyshev.chebval(x[here], chebyshev.chebder(c)) * rate[here]).T
+        out[(v < -1e-9) | (v > count + 1e-9)] = np.nan
+        return out
+
+
+def panel_track(
+    state_at: Callable[[float], Array],
+    t_start: float,
+    t_stop: float,
+    tau: float,
+    *,
+    width: float = 0.5,
+    degree: int = 17,
+) -> PanelTrack:
+    """Sample a trajectory, in order of time, at the Chebyshev nodes of its panels.
+
+    Parameters
+    ----------
+    state_at : callable
+        Time (s from closest approach) to relative state, shape (6,); called with increasing times.
+    t_start, t_stop, tau, width, degree
+        As in :func:`flybystab.core.ellipsoid.tide.tide_panels`.
+    """
+    u0, u1 = np.arcsinh(t_start / tau), np.arcsinh(t_stop / tau)
+    n = max(1, int(np.ceil((u1 - u0) / width)))
+    w = (u1 - u0) / n
+    k = np.arange(degree + 1)
+    nodes = -np.cos(np.pi * (k + 0.5) / (degree + 1))
+    inverse = np.linalg.inv(chebyshev.chebvander(nodes, degree))
+    coefficients = np.empty((n, degree + 1, 3))
+    for p in range(n):
+        times = tau * np.sinh(u0 + w * (p + 0.5 * (1.0 + nodes)))
+        coefficients[p] = inverse @ np.array([state_at(t)[:3] for t in times])
+    return PanelTrack(float(tau), float(u0), float(w), coefficients)
+
+
+def nearest_minimum(log: Array, window: Window, body: int, near: float) -> tuple[float, float, int] | None:
+    """Time (s), distance (m) and step of the minimum of distance to a body nearest in time to `near`."""
+    found, steps = crossings(log, window.head, window.data, window.gm, body, -1.0, 8)
+    rows = np.flatnonzero(found[:, 2] > 0.0)
+    if rows.size == 0:
+        return None
+    best = rows[np.argmin(np.abs(found[rows, 0] - near))]
+    return float(found[best, 0]), float(found[best, 1]), int(steps[best])

@@ -1,0 +1,234 @@
+"""How well an orbit is known: the covariance of its elements, and samples of it.
+
+A covariance belongs to a set of elements at an epoch of its own, which need not be that of the orbit (JPL's
+differ by years). Only deviations from its own mean are used: they are added to the orbit's state at that
+epoch, without linearisation, so that the orbit stays the middle of its clones.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import astropy.units as u
+import numpy as np
+from astropy.time import Time
+from numpy.typing import NDArray
+
+from flybystab.errors import InvalidInput
+from flybystab.orbit.elements import GM_SUN, state_from_elements
+from flybystab.units import to_si
+
+Array = NDArray[np.float64]
+
+#: The sets of elements: cometary (JPL), Keplerian (NEOCC and catalogues), or a state with ICRF axes. ``tp`` is
+#: the time of perihelion less the epoch.
+SETS: Mapping[str, tuple[str, ...]] = {
+    "cometary": ("e", "q", "tp", "node", "peri", "i"),
+    "keplerian": ("a", "e", "i", "node", "peri", "M"),
+    "cartesian": ("x", "y", "z", "vx", "vy", "vz"),
+}
+PUSHES = ("A1", "A2", "A3")
+_SI: Mapping[str, u.UnitBase] = (
+    dict.fromkeys(("a", "q", "x", "y", "z"), u.m)
+    | dict.fromkeys(("vx", "vy", "vz"), u.m / u.s)
+    | dict.fromkeys(("i", "node", "peri", "M"), u.rad)
+    | dict.fromkeys(PUSHES, u.m / u.s**2)
+    | {"e": u.dimensionless_unscaled, "tp": u.s}
+)
+#: Largest negative eigenvalue of the correlation matrix that rounding of published digits may leave.
+_ROUNDING = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Covariance:
+    """Mean and covariance of the elements of an orbit, SI units, heliocentric, ecliptic J2000.
+
+    Attributes
+    ----------
+    epoch : Time
+        To which the elements belong, TDB.
+    names : tuple of str
+        The parameters: one of the sets of :data:`SETS`, in any order, and those of A1, A2, A3 that were
+        estimated. A cartesian state has ICRF axes.
+    values : ndarray, shape (n,)
+        Mean; m, s, rad, m/s, m/s2.
+    matrix : ndarray, shape (n, n)
+        Covariance of them.
+    source : str
+        Where it comes from.
+    correlated : bool
+        False where only the 1-sigmas are known: the matrix is diagonal for want of better, and an encounter
+        mapped with it can be wrong by a large factor, mostly too uncertain.
+    caveat : str
+        What to say of errors by it where it is no published covariance; "without correlations" by default.
+    """
+
+    epoch: Time
+    names: tuple[str, ...]
+    values: Array
+    matrix: Array
+    source: str = ""
+    correlated: bool = True
+    caveat: str = ""
+
+    def __post_init__(self) -> None:
+        if not (self.correlated or self.caveat):
+            object.__setattr__(self, "caveat", "without correlations")
+        n = len(self.names)
+        orbital = {name for name in self.names if name not in PUSHES}
+        if len(set(self.names)) != n or not any(orbital == set(s) for s in SETS.values()):
+            raise InvalidInput(
+                "names", self.names, f"one of {[*SETS.values()]}, and any of {PUSHES}, each once"
+            )
+        if self.values.shape != (n,) or self.matrix.shape != (n, n):
+            raise InvalidInput("covariance", self.matrix.shape, f"{n} values and a matrix ({n}, {n})")
+        if not (np.isfinite(self.values).all() and np.isfinite(self.matrix).all()):
+            raise InvalidInput("covariance", self.matrix, "finite numbers")
+        if np.any(np.diag(self.matrix) < 0.0):
+            raise InvalidInput("covariance", np.diag(self.matrix), "variances of zero or more")
+        scale = np.outer(self.sigma, self.sigma)
+        if np.any(np.abs(self.matrix - self.matrix.T) > 1e-8 * scale):
+            raise InvalidInput("covariance", self.matrix, "a symmetric matrix")
+        lowest = float(self._spectrum[0].min())
+        if lowest < -_ROUNDING:
+            raise InvalidInput(
+                "covariance", f"an eigenvalue of {lowest:.3g} of the correlations", "none below 0"
+            )
+        if not self._possible(self.values[None, :])[0]:
+            raise InvalidInput(
+                "elements", self.values, "those of a conic: q > 0, e >= 0, a > 0 exactly if e < 1"
+            )
+
+    @classmethod
+    def in_units(
+        cls,
+        epoch: Time,
+        names: Sequence[str],
+        values: Sequence[float],
+        matrix: Array,
+        units: Sequence[u.UnitBase],
+        source: str = "",
+        correlated: bool = True,
+    ) -> Covariance:
+        """From numbers in the units of a publication, one unit a parameter (``tp``: time less the epoch).
+
+        Raises
+        ------
+        InvalidInput, UnitMismatch
+            No covariance, or a unit that does not fit its parameter.
+        """
+        for name in names:
+            if name not in _SI:
+                raise InvalidInput("names", name, f"parameters out of {[*_SI]}")
+        if len(units) != len(names):
+            raise InvalidInput("units", len(units), f"one a parameter, {len(names)}")
+        factor = np.array([to_si(1.0 * x, _SI[n], n) for n, x in zip(names, units, strict=True)])
+        return cls(
+            epoch.tdb,
+            tuple(names),
+            np.asarray(values, dtype=float) * factor,
+            np.asarray(matrix, dtype=float) * np.outer(factor, factor),
+            source,
+            correlated,
+        )
+
+    @property
+    def sigma(self) -> Array:
+        """1-sigma of each parameter, SI, shape (n,)."""
+        return np.sqrt(np.diag(self.matrix))
+
+    @property
+    def elements(self) -> str:
+        """Name of the set of elements."""
+        return next(k for k, s in SETS.items() if set(s) <= set(self.names))
+
+    @cached_property
+    def _spectrum(self) -> tuple[Array, Array]:
+        """Eigenvalues and eigenvectors of the correlation matrix: the elements differ by 20 decades."""
+        sigma = np.where(self.sigma > 0.0, self.sigma, 1.0)
+        correlation = self.matrix / np.outer(sigma, sigma)
+        values, vectors = np.linalg.eigh(0.5 * (correlation + correlation.T))
+        return values, vectors
+
+    @cached_property
+    def factor(self) -> Array:
+        """Matrix F with F F^T = covariance, SI, shape (n, n): a column is a deviation of one sigma."""
+        values, vectors = self._spectrum
+        return np.asarray(self.sigma[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
+
+    def samples(self, n: int, seed: int) -> tuple[Array, int]:
+        """Parameters drawn from the normal distribution, shape (n, len(names)), SI; number drawn again.
+
+        Row k depends on the seed and k alone. A draw that is no conic (perihelion inside the Sun's centre,
+        negative eccentricity, a Keplerian ellipse beyond e = 1) is drawn again; cometary elements and states
+        pass from ellipse to hyperbola freely.
+
+        Raises
+        ------
+        InvalidInput
+            If a row was refused 100 times: the distribution does not fit these elements.
+        """
+        z = np.random.default_rng(seed).standard_normal((n, len(self.names)))
+        out = self.values + z @ self.factor.T
+        again = 0
+        for k in np.flatnonzero(~self._possible(out)):
+            other = np.random.default_rng([seed, int(k)])
+            for _ in range(100):
+                again += 1
+                out[k] = self.values + self.factor @ other.standard_normal(len(self.names))
+                if self._possible(out[k : k + 1])[0]:
+                    break
+            else:
+                raise InvalidInput(
+                    "covariance", self.source, f"a spread for which {self.elements} elements are normal"
+                )
+        return out, again
+
+    def _column(self, parameters: Array, name: str) -> Array:
+        return np.asarray(parameters[:, self.names.index(name)])
+
+    def _possible(self, parameters: Array) -> NDArray[np.bool_]:
+        """Which rows describe a conic."""
+        kind = self.elements
+        if kind == "cartesian":
+            return np.ones(len(parameters), dtype=bool)
+        e = self._column(parameters, "e")
+        if kind == "cometary":
+            return np.asarray((e >= 0.0) & (self._column(parameters, "q") > 0.0))
+        a = self._column(parameters, "a")
+        return np.asarray(((a > 0.0) & (e >= 0.0) & (e < 1.0)) | ((a < 0.0) & (e > 1.0)))
+
+    def states(self, parameters: Array) -> Array:
+        """States, shape (m, 6), m and m/s, ICRF axes (heliocentric, or as given), of parameters (m, n)."""
+        if self.elements == "cartesian":
+            order = [self.names.index(n) for n in SETS["cartesian"]]
+            return np.array(parameters[:, order])
+        e, i, node, peri = (self._column(parameters, n) for n in ("e", "i", "node", "peri"))
+        if self.elements == "cometary":
+            q, since = self._column(parameters, "q"), -self._column(parameters, "tp")
+        else:
+            a = self._column(parameters, "a")
+            q = a * (1.0 - e)
+            since = self._column(parameters, "M") * np.sqrt(np.abs(a) ** 3 / GM_SUN)
+        columns = zip(q, e, i, node, peri, since, strict=True)
+        return np.array([state_from_elements(*row) for row in columns])
+
+    def pushes(self, parameters: Array) -> Array:
+        """A1, A2, A3 less their means, m/s2, shape (m, 3); zero for those that were not estimated."""
+        out = np.zeros((len(parameters), 3))
+        for j, name in enumerate(PUSHES):
+            if name in self.names:
+                at = self.names.index(name)
+                out[:, j] = parameters[:, at] - self.values[at]
+        return out
+
+    def deviations(self, parameters: Array) -> tuple[Array, Array]:
+        """States and A1, A2, A3 less those of the mean, shapes (m, 6) and (m, 3)."""
+        return self.states(parameters) - self.states(self.values[None, :]), self.pushes(parameters)
+
+    def __repr__(self) -> str:
+        kind = f", {self.caveat}" if self.caveat else ""
+        when = f"{self.epoch.tdb.iso[:10]} TDB"
+        return f"<Covariance of {', '.join(self.names)} at {when}, {self.source or 'no source'}{kind}>"

@@ -1,0 +1,335 @@
+"""What moves an asteroid: a table of forces, the share each one has, and one compiled acceleration.
+
+The asteroid is massless; Sun, planets and Moon move on the ephemeris. Barycentric ICRF, m, s. Formulas:
+
+- point masses, Newton; inside 0.9 radii a smooth core, so that a plunge (an impact) stays finite;
+- 1PN: :mod:`flybystab.orbit.relativity`;
+- J2: ``-3/2 J2 GM a^2/r^5 [(1 - 5 s^2) r + 2 (r.p) p]``, ``s = r.p/r``, p the pole, the Earth's of date;
+- non-gravitational: ``g(r) (A1 er + A2 et + A3 en)`` with ``g = (1 au/r)^2`` for an asteroid and the
+  water-ice law of Marsden, Sekanina & Yeomans 1973 for a comet.
+
+A force is one entry of :data:`FORCES`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flybystab.constants import AU, DAY
+from flybystab.core.numerics.jit import kernel
+from flybystab.errors import UnknownName
+from flybystab.orbit.ephemeris import BELT, BELT_GM, BODIES, Window, series_position, series_state
+from flybystab.orbit.planets import PLANETS
+from flybystab.orbit.relativity import IS_SOURCE, one_pn
+
+Array = NDArray[np.float64]
+
+#: Every force the package knows, in the order in which their accelerations are reported.
+FORCES = (
+    *(f"{name} point mass" for name in (*BODIES, *BELT)),
+    "1PN",
+    *(f"{name} J2" for name in BODIES),
+    "non-gravitational",
+)
+N_BODIES, N_ALL = len(BODIES), len(BODIES) + len(BELT)
+_PN, _J2, _NON = N_ALL, N_ALL + 1, N_ALL + 1 + N_BODIES
+
+# Layout of a model, one flat array that a C callback can be handed as a pointer:
+#   [0] length  [1] Earth/Moon ratio  [2..5] switches: 1PN, any J2, non-gravitational, unused
+#   [6..8] A1 A2 A3 (m/s2)  [9..13] law: ALN, r0 (m), m, n, k  [14] address, [15] rows and [16] count of a log
+#   [20] head (26 x 5)  [150] gm (26)  [176] radius of the core (10)  [186] J2: c, pole (10 x 4)
+#   [226] GM in use (26; zero: left out)  [252...] coefficients
+# Rows 0 to 9 are BODIES, rows 10 to 25 are BELT.
+LOG_ADDRESS, LOG_ROWS, LOG_COUNT = 14, 15, 16
+_HEAD, _GM, _INNER, _FLAT, _USED, _DATA = 20, 150, 176, 186, 226, 252
+INNER = 0.9
+
+
+@dataclass(frozen=True)
+class NonGravitational:
+    """Non-gravitational acceleration ``g(r) (A1 er + A2 et + A3 en)``.
+
+    Attributes
+    ----------
+    a : tuple of float
+        A1, A2, A3, m/s2.
+    law : {"asteroid", "comet"}
+        ``g = (1 au/r)^2``, or ``g = 0.1113 (r/r0)^-2.15 [1 + (r/r0)^5.093]^-4.6142``, r0 = 2.808 au.
+    """
+
+    a: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    law: str = "asteroid"
+
+    @property
+    def constants(self) -> tuple[float, float, float, float, float]:
+        """ALN, r0 (m), m, n, k of the law ``ALN (r/r0)^-m [1 + (r/r0)^n]^-k``."""
+        laws = {
+            "asteroid": (1.0, AU, 2.0, 5.093, 0.0),
+            "comet": (0.1112620426, 2.808 * AU, 2.15, 5.093, 4.6142),
+        }
+        if self.law not in laws:
+            raise UnknownName("non-gravitational law", self.law, [], known=f"(known: {', '.join(laws)})")
+        return laws[self.law]
+
+
+def model(window: Window, forces: Iterable[str], nongrav: NonGravitational | None = None) -> Array:
+    """The forces of that name, as the flat array that the kernels read.
+
+    Raises
+    ------
+    UnknownName
+        For a name that is not in ``FORCES``.
+    """
+    chosen = set(forces)
+    for name in chosen - set(FORCES):
+        raise UnknownName("force", name, [], known=f"(known: {', '.join(FORCES)})")
+    out = np.zeros(_DATA + window.data.size)
+    out[0] = out.size
+    out[1] = window.gm[4] / window.gm[3]
+    out[_HEAD:_GM] = window.head.ravel()
+    out[_GM : _GM + N_BODIES] = window.gm
+    out[_GM + N_BODIES : _INNER] = list(BELT_GM.values())
+    out[_DATA:] = window.data
+    for i, name in enumerate(BODIES):
+        body = PLANETS[name]
+        out[_INNER + i] = INNER * body.radius
+        if f"{name} point mass" in chosen:
+            out[_USED + i] = window.gm[i]
+        if f"{name} J2" in chosen:
+            out[3] = 1.0
+            strength = 1.5 * body.j2 * window.gm[i] * body.radius**2
+            out[_FLAT + 4 * i : _FLAT + 4 * i + 4] = strength, *body.pole_at(window.epoch)
+    out[2] = float("1PN" in chosen)
+    for i, name in enumerate(BELT, N_BODIES):
+        if f"{name} point mass" in chosen:
+            out[_USED + i] = BELT_GM[name]
+    if "non-gravitational" in chosen and nongrav is not None and any(nongrav.a):
+        out[4] = 1.0
+        out[6:9] = nongrav.a
+        out[9:14] = nongrav.constants
+    return out
+
+
+@kernel
+def bodies(model: Array, t: float, out: Array, rates: Array) -> None:
+    """Write the positions (m) of bodies at ``t`` into ``out[26, 3]``, velocities (m/s) of ``SOURCES`` into ``rates``.
+
+    Massive asteroids that are not in use are left out, and velocities that no force asks for.
+    """
+    head = model[_HEAD:_GM].reshape((26, 5))
+    data = model[_DATA:]
+    state = np.empty(6)
+    for i in range(10):
+        if (model[2] != 0.0 and IS_SOURCE[i]) or (model[4] != 0.0 and i == 0):
+            series_state(head, data, i, t, state)
+            for j in range(3):
+                out[i, j] = state[j]
+                rates[i, j] = state[3 + j]
+        else:
+            series_position(head, data, i, t, out[i])
+    # The Earth's velocity stays that of its barycentre with the Moon, 12 m/s off: the terms with it are small.
+    for j in range(3):
+        far = out[4, j]
+        out[4, j] = out[3, j] + far
+        out[3, j] -= model[1] * far
+    for i in range(10, 26):
+        if model[_USED + i] != 0.0:
+            series_position(head, data, i, t, out[i])
+            for j in range(3):
+                out[i, j] += out[0, j]
+
+
+@kernel
+def oblateness(strength: float, pole: Array, r: Array, out: Array) -> None:
+    """Add the J2 acceleration (m/s2) at ``r`` (m) to ``out[3]``; ``strength = 3/2 J2 GM a^2``."""
+    r2 = r[0] * r[0] + r[1] * r[1] + r[2] * r[2]
+    s = r[0] * pole[0] + r[1] * pole[1] + r[2] * pole[2]
+    c = strength / (r2 * r2 * np.sqrt(r2))
+    a = c * (5.0 * s * s / r2 - 1.0)
+    b = -2.0 * c * s
+    for j in range(3):
+        out[j] += a * r[j] + b * pole[j]
+
+
+@kernel
+def push(law: Array, r: Array, v: Array, out: Array) -> None:
+    """Add ``g(r) (A1 er + A2 et + A3 en)`` (m/s2) to ``out[3]``; ``law`` is A1 A2 A3, ALN, r0, m, n, k."""
+    d = np.sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2])
+    x = d / law[4]
+    if law[7] == 0.0 and law[5] == 2.0:
+        g = law[3] / (x * x)
+    else:
+        g = law[3] * x ** (-law[5]) * (1.0 + x ** law[6]) ** (-law[7])
+    h0 = r[1] * v[2] - r[2] * v[1]
+    h1 = r[2] * v[0] - r[0] * v[2]
+    h2 = r[0] * v[1] - r[1] * v[0]
+    h = np.sqrt(h0 * h0 + h1 * h1 + h2 * h2)
+    if h == 0.0:
+        return
+    n0, n1, n2 = h0 / h, h1 / h, h2 / h
+    e0, e1, e2 = r[0] / d, r[1] / d, r[2] / d
+    out[0] += g * (law[0] * e0 + law[1] * (n1 * e2 - n2 * e1) + law[2] * n0)
+    out[1] += g * (law[0] * e1 + law[1] * (n2 * e0 - n0 * e2) + law[2] * n1)
+    out[2] += g * (law[0] * e2 + law[1] * (n0 * e1 - n1 * e0) + law[2] * n2)
+
+
+@kernel
+def core(s: float) -> float:
+    """``s^(-3/2)`` continued into ``s < 1`` by its first nine Taylor terms at 1: finite and smooth.
+
+    A jump in any low derivative would stop a high-order integrator with adaptive steps.
+    """
+    x = 1.0 - s
+    out = 1.0
+    term = 1.0
+    for n in range(1, 9):
+        term *= x * (0.5 + n) / n
+        out += term
+    return out
+
+
+@kernel
+def fade(s: float) -> float:
+    """Smooth switch, four derivatives continuous: 0 for ``s <= 1/2``, 1 for ``s >= 1``."""
+    if s >= 1.0:
+        return 1.0
+    x = max(2.0 * s - 1.0, 0.0)
+    return x**5 * (126.0 + x * (-420.0 + x * (540.0 + x * (-315.0 + 70.0 * x))))
+
+
+@kernel
+def acceleration_among(model: Array, places: Array, rates: Array, x: Array, v: Array, out: Array) -> None:
+    """Write into ``out[3]`` the acceleration (m/s2) at ``x`` (m), ``v`` (m/s); bodies at ``places`` (m)."""
+    ax = ay = az = potential = 0.0
+    g = np.zeros(3)
+    for i in range(26):
+        gm = model[_USED + i]
+        if gm == 0.0:
+            continue
+        dx = places[i, 0] - x[0]
+        dy = places[i, 1] - x[1]
+        dz = places[i, 2] - x[2]
+        r2 = dx * dx + dy * dy + dz * dz
+        inner = model[_INNER + i] if i < 10 else 0.0
+        c = gm / (r2 * np.sqrt(r2)) if r2 > inner * inner else gm * core(r2 / (inner * inner)) / inner**3
+        ax += c * dx
+        ay += c * dy
+        az += c * dz
+        if i < 10 and r2 > inner * inner:
+            g[0] += c * dx
+            g[1] += c * dy
+            g[2] += c * dz
+            potential += c * r2
+    out[0] = ax
+    out[1] = ay
+    out[2] = az
+    if model[3] != 0.0:
+        d = np.empty(3)
+        for i in range(10):
+            p = _FLAT + 4 * i
+            if model[p] != 0.0:
+                r2 = 0.0
+                for j in range(3):
+                    d[j] = x[j] - places[i, j]
+                    r2 += d[j] * d[j]
+                oblateness(model[p] * fade(r2 / model[_INNER + i] ** 2), model[p + 1 : p + 4], d, out)
+    if model[2] != 0.0:
+        gms, used, inners = model[_GM : _GM + 10], model[_USED : _USED + 10], model[_INNER : _INNER + 10]
+        one_pn(gms, used, inners, places, rates, g, potential, x, v, out)
+    if model[4] != 0.0:
+        r = np.empty(3)
+        w = np.empty(3)
+        for j in range(3):
+            r[j] = x[j] - places[0, j]
+            w[j] = v[j] - rates[0, j]
+        push(model[6:14], r, w, out)
+
+
+@kernel
+def acceleration(model: Array, t: float, x: Array, v: Array, out: Array) -> None:
+    """Write into ``out[3]`` the acceleration (m/s2) at ``t`` (s), ``x`` (m), ``v`` (m/s)."""
+    places = np.empty((26, 3))
+    rates = np.zeros((10, 3))
+    bodies(model, t, places, rates)
+    acceleration_among(model, places, rates, x, v, out)
+
+
+def shares(window: Window, t: Array, states: Array, nongrav: NonGravitational | None) -> dict[str, float]:
+    """Estimated displacement, m, that each force makes by the end of a track.
+
+    ``3 int |a_i(t)| (t_end - t) dt`` along the track: the free displacement of a push at time t times
+    3, the growth of a tangential push along an orbit. An estimate of size; close passages add to it.
+
+    Parameters
+    ----------
+    window : Window
+    t : ndarray, shape (n,)
+        Times, s, increasing or decreasing; the displacement is that at the last.
+    states : ndarray, shape (n, 6)
+        Barycentric track, m and m/s.
+    nongrav : NonGravitational or None
+    """
+    full = model(window, FORCES, nongrav)
+    sizes = np.empty((t.size, len(FORCES)))
+    _sizes(full, np.ascontiguousarray(t), np.ascontiguousarray(states), sizes)
+    weight = 3.0 * np.abs(t[-1] - t)
+    integral = np.abs(np.trapezoid(sizes * weight[:, None], t, axis=0))
+    return {name: float(value) for name, value in zip(FORCES, integral, strict=True)}
+
+
+@kernel
+def _sizes(model: Array, t: Array, states: Array, out: Array) -> None:
+    """Write the size (m/s2) of each force of ``FORCES`` at each point of a track into ``out[n, forces]``."""
+    places = np.empty((26, 3))
+    rates = np.zeros((10, 3))
+    a = np.empty(3)
+    g = np.empty(3)
+    d = np.empty(3)
+    for n in range(t.size):
+        bodies(model, t[n], places, rates)
+        for i in range(26):
+            r2 = 0.0
+            for j in range(3):
+                d[j] = states[n, j] - places[i, j]
+                r2 += d[j] * d[j]
+            out[n, i] = model[_GM + i] / r2
+            if i >= 10:
+                continue
+            a[:] = 0.0
+            oblateness(model[_FLAT + 4 * i], model[_FLAT + 4 * i + 1 : _FLAT + 4 * i + 4], d, a)
+            out[n, _J2 + i] = np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2)
+        r = states[n, :3] - places[0]
+        w = states[n, 3:] - rates[0]
+        a[:] = 0.0
+        potential = 0.0
+        for i in range(10):
+            potential += model[_GM + i] / np.sqrt(np.sum((states[n, :3] - places[i]) ** 2))
+        for j in range(3):
+            g[j] = -model[_GM] * r[j] / np.sum(r * r) ** 1.5
+        gms = model[_GM : _GM + 10]
+        one_pn(
+            gms,
+            gms,
+            model[_INNER : _INNER + 10],
+            places,
+            rates,
+            g,
+            potential,
+            states[n, :3],
+            states[n, 3:],
+            a,
+        )
+        out[n, _PN] = np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2)
+        a[:] = 0.0
+        if model[4] != 0.0:
+            push(model[6:14], r, w, a)
+        out[n, _NON] = np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2)
+
+
+def au_per_day2(value: float) -> float:
+    """Acceleration in m/s2 from one in au/d2."""
+    return value * AU / DAY**2

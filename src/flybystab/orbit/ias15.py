@@ -1,0 +1,172 @@
+"""An asteroid among prescribed bodies, moved by rebound (IAS15) through a compiled force.
+
+rebound calls the force and the log through C function pointers that numba compiles: a Python callback costs
+about 90 times as much. The layout of ``reb_simulation`` differs between rebound 4 and 5, so that the offsets
+of the fields are read from rebound's own ctypes classes.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from typing import Any
+
+import numpy as np
+import rebound
+from numba import carray, cfunc, types
+from numba.core import cgutils
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+from flybystab.core.numerics.jit import CACHE
+from flybystab.errors import NotConverged
+from flybystab.orbit.forces import LOG_ADDRESS, LOG_COUNT, LOG_ROWS, acceleration
+
+Array = NDArray[np.float64]
+
+#: Columns of a log: time, position, velocity, acceleration.
+LOG_WIDTH = 10
+
+
+@intrinsic
+def _pointer(typingctx: Any, address: Any) -> Any:
+    """An address (integer) as a pointer."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.inttoptr(args[0], cgutils.voidptr_t)
+
+    return types.voidptr(types.int64), generate
+
+
+@intrinsic
+def _address(typingctx: Any, pointer: Any) -> Any:
+    """A pointer as an address (integer)."""
+
+    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        return builder.ptrtoint(args[0], cgutils.intp_t)
+
+    return types.int64(types.voidptr), generate
+
+
+@lru_cache(maxsize=1)
+def _callbacks() -> tuple[Any, Any]:
+    """The force and the log for the rebound that is installed."""
+    sim, particle = rebound.Simulation, rebound.Particle
+    return _compile(
+        sim.t.offset,
+        sim._particles.offset,
+        sim.extras.offset,
+        particle.x.offset // 8,
+        particle.vx.offset // 8,
+        particle.ax.offset // 8,
+    )
+
+
+def _compile(at_t: int, at_p: int, at_model: int, x: int, v: int, a: int) -> tuple[Any, Any]:
+    # The offsets are closure variables: they are part of the key of numba's cache on disk.
+    words = max(x, v, a) + 3
+
+    @cfunc(types.void(types.voidptr), cache=CACHE)
+    def force(sim: Any) -> None:
+        base: int = _address(sim)  # type: ignore[call-arg]
+        t = carray(_pointer(base + at_t), 1, np.float64)[0]
+        particle = carray(_pointer(carray(_pointer(base + at_p), 1, np.int64)[0]), words, np.float64)
+        where = carray(_pointer(base + at_model), 1, np.int64)[0]
+        size = int(carray(_pointer(where), 1, np.float64)[0])
+        model = carray(_pointer(where), size, np.float64)
+        out = np.empty(3)
+        acceleration(model, t, particle[x : x + 3], particle[v : v + 3], out)
+        for j in range(3):
+            particle[a + j] += out[j]
+
+    @cfunc(types.void(types.voidptr), cache=CACHE)
+    def log(sim: Any) -> None:
+        base: int = _address(sim)  # type: ignore[call-arg]
+        t = carray(_pointer(base + at_t), 1, np.float64)[0]
+        particle = carray(_pointer(carray(_pointer(base + at_p), 1, np.int64)[0]), words, np.float64)
+        where = carray(_pointer(base + at_model), 1, np.int64)[0]
+        size = int(carray(_pointer(where), 1, np.float64)[0])
+        model = carray(_pointer(where), size, np.float64)
+        n = int(model[LOG_COUNT])
+        model[LOG_COUNT] = n + 1
+        if n >= int(model[LOG_ROWS]):
+            return
+        row = carray(_pointer(int(model[LOG_ADDRESS]) + 8 * LOG_WIDTH * n), LOG_WIDTH, np.float64)
+        row[0] = t
+        for j in range(3):
+            row[1 + j] = particle[x + j]
+            row[4 + j] = particle[v + j]
+        acceleration(model, t, particle[x : x + 3], particle[v : v + 3], row[7:10])
+
+    return force, log
+
+
+class Flight:
+    """One asteroid under way in rebound.
+
+    Parameters
+    ----------
+    model : ndarray
+        From :func:`flybystab.orbit.forces.model`; times in seconds from its epoch.
+    t : float
+        Start, s.
+    state : ndarray, shape (6,)
+        Barycentric position (m) and velocity (m/s) at `t`.
+    epsilon : float
+        Tolerance of IAS15.
+    """
+
+    def __init__(self, model: Array, t: float, state: Array, epsilon: float = 1e-9) -> None:
+        self._model = np.array(model)
+        force, log = _callbacks()
+        sim = rebound.Simulation()
+        sim.add(x=state[0], y=state[1], z=state[2], vx=state[3], vy=state[4], vz=state[5])
+        sim.t = t
+        sim.integrator = "ias15"
+        sim.gravity = "none"
+        sim.force_is_velocity_dependent = 1
+        sim.dt = 3600.0
+        settings = sim.ri_ias15 if hasattr(sim, "ri_ias15") else sim.integrator
+        settings.epsilon = epsilon
+        settings.min_dt = 0.1  # far below any step that a path outside a planet needs: no run can stall
+        sim.extras = self._model.ctypes.data
+        sim.additional_forces = force.ctypes
+        self._sim, self._log = sim, log
+
+    @property
+    def t(self) -> float:
+        """Time reached, s."""
+        return float(self._sim.t)
+
+    @property
+    def state(self) -> Array:
+        """Barycentric position (m) and velocity (m/s), shape (6,)."""
+        p = self._sim.particles[0]
+        return np.array([p.x, p.y, p.z, p.vx, p.vy, p.vz])
+
+    def to(self, t: float) -> Array:
+        """Move to time `t`, s; the state there, shape (6,)."""
+        self._sim.integrate(t)
+        state = self.state
+        if not np.isfinite(state).all():
+            raise NotConverged(f"the orbit was lost before t = {t:.6g} s from the epoch of the integration")
+        return state
+
+    def log_to(self, t: float, rows: int = 4096) -> Array:
+        """Move to time `t`; every step on the way: time, position, velocity, acceleration, shape (n, 10), SI.
+
+        Times increase along the motion and do not repeat.
+        """
+        start, state = self.t, self.state
+        while True:
+            out = np.zeros((rows, LOG_WIDTH))
+            self._model[[LOG_ADDRESS, LOG_ROWS, LOG_COUNT]] = out.ctypes.data, rows, 0
+            self._sim.heartbeat = self._log.ctypes
+            self.to(t)
+            count = int(self._model[LOG_COUNT])
+            self._model[LOG_ROWS] = 0
+            if count <= rows:
+                out = out[:count]
+                return out[np.concatenate([[True], np.diff(out[:, 0]) != 0.0])]
+            fresh = Flight(self._model, start, state)  # the log was too short: once more with a longer one
+            self._sim, rows = fresh._sim, 2 * count
+            self._sim.extras = self._model.ctypes.data

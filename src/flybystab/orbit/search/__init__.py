@@ -1,0 +1,1 @@
+"""Encounters of many asteroids found by compiled integrations."""

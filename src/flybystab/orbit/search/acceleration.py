@@ -1,0 +1,280 @@
+"""The acceleration of an asteroid among bodies read from an almanac: what a search evaluates millions of times.
+
+The same forces as in :mod:`flybystab.orbit.forces`, from the same table, arranged so that the sums over bodies
+become vector instructions.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flybystab.constants import C_LIGHT
+from flybystab.core.numerics.jit import borrowed, kernel, pasted_kernel
+from flybystab.orbit import forces as table
+from flybystab.orbit.almanac import (
+    GRID,
+    HEAVY,
+    N_BELT,
+    N_FAST,
+    N_HEAVY,
+    N_SLOW,
+    SLOT,
+    Almanac,
+    Places,
+    almanac,
+    find_heavy,
+    find_places,
+)
+from flybystab.orbit.ephemeris import BODIES, Window
+from flybystab.orbit.forces import core, fade, model, push
+from flybystab.orbit.relativity import of_source
+
+Array = NDArray[np.float64]
+
+
+class Field(NamedTuple):
+    """The chosen forces.
+
+    Attributes
+    ----------
+    book : Almanac
+    gm_fast, gm_slow, gm_belt : ndarray
+        GM (m3/s2) in use per slot; zero: left out.
+    inner_fast, inner_slow : ndarray
+        Square of the radius of the smooth core per slot, m2; ``nothing`` is zeros, for the asteroids.
+    flat : ndarray, shape (n, 6)
+        Bodies with J2: slot (plus 8 on the slow grid), strength ``3/2 J2 GM a^2`` (m5/s2), pole, square of the
+        radius of the core (m2).
+    gm_pn : float
+        GM of the Sun if there is relativity, else zero.
+    heavy : ndarray, shape (2, 4)
+        GM in use of ``HEAVY``, and the square of the radius (m2) inside of which each is left out of relativity.
+    head, data, gm : ndarray
+        The ephemeris itself, for places to the last digit.
+    """
+
+    book: Almanac
+    gm_fast: Array
+    gm_slow: Array
+    gm_belt: Array
+    inner_fast: Array
+    inner_slow: Array
+    nothing: Array
+    flat: Array
+    gm_pn: float
+    heavy: Array
+    head: Array
+    data: Array
+    gm: Array
+
+
+def field(window: Window, forces: Iterable[str]) -> Field:
+    """The forces of that name (``FORCES``, without non-gravitational) in a window.
+
+    Raises
+    ------
+    UnknownName
+    """
+    flat_model = model(window, forces)
+    used = flat_model[table._USED : table._DATA]
+    inner = flat_model[table._INNER : table._FLAT] ** 2
+    grids = [np.zeros(N_FAST), np.zeros(N_SLOW)]
+    inners = [np.zeros(N_FAST), np.zeros(N_SLOW)]
+    for b in range(len(BODIES)):
+        grids[GRID[b]][SLOT[b]] = used[b]
+        inners[GRID[b]][SLOT[b]] = inner[b]
+    belt = used[len(BODIES) :]
+    rows = []
+    for b in range(len(BODIES)):
+        at = table._FLAT + 4 * b
+        if flat_model[at] != 0.0:
+            rows.append([float(SLOT[b] + 8 * GRID[b]), *flat_model[at : at + 4], inner[b]])
+    return Field(
+        almanac(window, bool(belt.any())),
+        grids[0],
+        grids[1],
+        belt.copy(),
+        inners[0],
+        inners[1],
+        np.zeros(N_BELT),
+        np.array(rows).reshape(-1, 6),
+        float(window.gm[0]) if flat_model[2] != 0.0 else 0.0,
+        np.array([used[: len(BODIES)], inner])[:, [BODIES.index(name) for name in HEAVY]],
+        window.head,
+        window.data,
+        window.gm,
+    )
+
+
+@kernel
+def empty_places() -> Places:
+    """Room for the places of all bodies."""
+    return Places(np.zeros(4 * N_FAST), np.zeros(3 * N_SLOW), np.zeros(3 * N_BELT), np.zeros(12 * N_HEAVY))
+
+
+@kernel
+def borrowed_field(f: Field) -> Field:
+    """The same field without reference counts, for use inside a kernel that has it as an argument."""
+    b = f.book
+    return Field(
+        Almanac(borrowed(b.when), borrowed(b.fast), borrowed(b.slow), borrowed(b.belt), borrowed(b.heavy)),
+        borrowed(f.gm_fast),
+        borrowed(f.gm_slow),
+        borrowed(f.gm_belt),
+        borrowed(f.inner_fast),
+        borrowed(f.inner_slow),
+        borrowed(f.nothing),
+        borrowed(f.flat),
+        f.gm_pn,
+        borrowed(f.heavy),
+        borrowed(f.head),
+        borrowed(f.data),
+        borrowed(f.gm),
+    )
+
+
+@pasted_kernel
+def _pull(
+    p: Array, slots: int, gm: Array, inner: Array, x: float, y: float, z: float
+) -> tuple[float, float, float, float, int]:
+    """Newton's pull of one grid (m/s2), its potential (m2/s2), and in how many bodies the asteroid is (left out)."""
+    ax = 0.0
+    ay = 0.0
+    az = 0.0
+    potential = 0.0
+    inside = 0
+    for i in range(slots):
+        dx = p[i] - x
+        dy = p[slots + i] - y
+        dz = p[slots + slots + i] - z
+        r2 = dx * dx + dy * dy + dz * dz
+        near = r2 < inner[i]
+        inside += near
+        c = (0.0 if near else gm[i]) / (r2 * np.sqrt(r2))
+        ax += c * dx
+        ay += c * dy
+        az += c * dz
+        potential += c * r2
+    return ax, ay, az, potential, inside
+
+
+@kernel
+def _pull_inside(p: Array, slots: int, gm: Array, inner: Array, x: Array, out: Array) -> None:
+    """Add to ``out[3:6]`` the pull of the bodies of one grid that the asteroid is inside of: a smooth core."""
+    for i in range(slots):
+        dx, dy, dz = p[i] - x[0], p[slots + i] - x[1], p[2 * slots + i] - x[2]
+        r2 = dx * dx + dy * dy + dz * dz
+        if r2 < inner[i]:
+            c = gm[i] * core(r2 / inner[i]) / inner[i] ** 1.5
+            out[3] += c * dx
+            out[4] += c * dy
+            out[5] += c * dz
+
+
+@kernel
+def _push(law: Array, y: Array, places: Places, out: Array) -> None:
+    """Add the non-gravitational acceleration (m/s2) to ``out[3:6]``."""
+    r = np.empty(3)
+    w = np.empty(3)
+    for j in range(3):
+        r[j] = y[j] - places.slow[j * N_SLOW]
+        w[j] = y[3 + j] - places.fast[3 * N_FAST + j]
+    push(law, r, w, out[3:])
+
+
+@pasted_kernel
+def rate(field: Field, law: Array, t: float, y: Array, places: Places, out: Array) -> None:
+    """Write velocity and acceleration at ``t`` (s), ``y[6]`` into ``out[6]``, and where the bodies are.
+
+    ``law[8]`` is A1, A2, A3 (m/s2) and the constants of their law; zeros for none.
+    """
+    belt = field.book.when[2, 2] > 0.0
+    find_places(field.book, t, belt, places)
+    fast, slow = places.fast, places.slow
+    px, py, pz, vx, vy, vz = y[0], y[1], y[2], y[3], y[4], y[5]
+    ax, ay, az, potential, n = _pull(fast, 4, field.gm_fast, field.inner_fast, px, py, pz)
+    bx, by, bz, other, m = _pull(slow, 8, field.gm_slow, field.inner_slow, px, py, pz)
+    ax += bx
+    ay += by
+    az += bz
+    potential += other
+    gx, gy, gz = ax, ay, az
+    if belt:
+        bx, by, bz, _, _ = _pull(places.belt, 16, field.gm_belt, field.nothing, px, py, pz)
+        ax += bx
+        ay += by
+        az += bz
+    for i in range(field.flat.shape[0]):
+        row = field.flat[i]
+        s = int(row[0])
+        p, slots = (fast, 4) if s < 4 else (slow, 8)
+        s &= 3 if s < 4 else 7
+        dx = px - p[s]
+        dy = py - p[slots + s]
+        dz = pz - p[slots + slots + s]
+        r2 = dx * dx + dy * dy + dz * dz
+        z = dx * row[2] + dy * row[3] + dz * row[4]
+        c = row[1] / (r2 * r2 * np.sqrt(r2)) * (1.0 if r2 > row[5] else fade(r2 / row[5]))
+        a = c * (5.0 * z * z / r2 - 1.0)
+        b = -2.0 * c * z
+        ax += a * dx + b * row[2]
+        ay += a * dy + b * row[3]
+        az += a * dz + b * row[4]
+    if field.gm_pn != 0.0:
+        find_heavy(field.book, t, places)
+        q = places.heavy
+        ex, ey, ez = of_source(
+            field.gm_pn,
+            px - slow[0],
+            py - slow[8],
+            pz - slow[16],
+            fast[12],
+            fast[13],
+            fast[14],
+            q[40],
+            q[41],
+            q[42],
+            q[43],
+            vx,
+            vy,
+            vz,
+        )
+        for i in range(4):
+            dx, dy, dz = px - q[i], py - q[4 + i], pz - q[8 + i]
+            bx, by, bz = of_source(
+                0.0 if dx * dx + dy * dy + dz * dz < field.heavy[1, i] else field.heavy[0, i],
+                dx,
+                dy,
+                dz,
+                q[12 + i],
+                q[16 + i],
+                q[20 + i],
+                q[24 + i],
+                q[28 + i],
+                q[32 + i],
+                q[36 + i],
+                vx,
+                vy,
+                vz,
+            )
+            ex += bx
+            ey += by
+            ez += bz
+        a = vx * vx + vy * vy + vz * vz - 4.0 * potential
+        b = -4.0 * (gx * vx + gy * vy + gz * vz)
+        ax += (a * gx + b * vx + ex) / (C_LIGHT * C_LIGHT)
+        ay += (a * gy + b * vy + ey) / (C_LIGHT * C_LIGHT)
+        az += (a * gz + b * vz + ez) / (C_LIGHT * C_LIGHT)
+    out[0], out[1], out[2], out[3], out[4], out[5] = vx, vy, vz, ax, ay, az
+    if n + m > 0:
+        _pull_inside(fast, 4, field.gm_fast, field.inner_fast, y, out)
+        _pull_inside(slow, 8, field.gm_slow, field.inner_slow, y, out)
+    if law[0] != 0.0 or law[1] != 0.0 or law[2] != 0.0:
+        _push(law, y, places, out)
+
+
+__all__ = ["Field", "borrowed_field", "empty_places", "field", "rate"]

@@ -1,0 +1,332 @@
+"""All encounters of many asteroids.
+
+Each asteroid is followed on its own (:mod:`flybystab.orbit.search.track`), so that none disturbs another, and
+threads share the work.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from functools import lru_cache
+from typing import Any
+
+import astropy.units as u
+import numpy as np
+from astropy.table import QTable
+from astropy.time import Time
+from astropy.units import Quantity
+from numpy.typing import NDArray
+
+from flybystab.constants import DAY, YEAR
+from flybystab.core.numerics.threads import in_order
+from flybystab.errors import InvalidInput, NotConverged
+from flybystab.orbit.almanac import GRID, N_FAST, SLOT
+from flybystab.orbit.ephemeris import BODIES, Ephemeris, Window
+from flybystab.orbit.forces import FORCES
+from flybystab.orbit.orbit import Orbit, _ephemeris, default_forces, later, seconds
+from flybystab.orbit.planets import PLANETS, Planet, planet
+from flybystab.orbit.predictability import neighbour, neighbour_epoch
+from flybystab.orbit.search.acceleration import Field, field
+from flybystab.orbit.search.force_selection import N_SHARES, NAMES, reduced
+from flybystab.orbit.search.minima import WIDTH
+from flybystab.orbit.search.track import INSIDE, STALLED, search
+from flybystab.orbit.target_plane import target_plane
+from flybystab.units import to_si
+
+Array = NDArray[np.float64]
+
+_SPEED = u.m / u.s
+
+#: Tolerance over the error (m) that it leaves the median asteroid with after ten years; the error grows with the
+#: square of time (``flybystab bench sky``).
+_AT_10_YEARS, _TOLERANCES = 1e-12 / 100.0, (1e-15, 1e-8)
+
+
+@lru_cache(maxsize=4)
+def _window(eph: Ephemeris, day: float, fraction: float, start: float, stop: float) -> Window:
+    """The ephemeris around a search; kept, with its almanac, for the next asteroid of the same epoch."""
+    return eph.window(Time(day, fraction, format="jd", scale="tdb"), start, stop)
+
+
+def find_encounters(
+    objects: Any,
+    start: Time,
+    stop: Time,
+    planets: Sequence[str] = ("earth",),
+    within: Quantity = 0.05 * u.au,
+    *,
+    ephemeris: str | Ephemeris | None = None,
+    error: Quantity = 0.1 * u.km,
+    tolerance: float | None = None,
+    forces: tuple[str, ...] | None = None,
+    growth: bool = False,
+    threads: int | None = None,
+    progress: Callable[[int, int, int], None] | None = None,
+) -> QTable:
+    """Every closest approach of every asteroid to every planet below a threshold.
+
+    Parameters
+    ----------
+    objects : Orbit, object with ``orbit`` and ``name``, or an iterable of either
+        The asteroids; they do not disturb each other.
+    start, stop : Time
+        Span of the search.
+    planets : sequence of str
+        Bodies to look for: planets and ``"moon"``.
+    within : Quantity
+        Largest distance between the centres; one value or one per planet.
+    ephemeris : str or Ephemeris, optional
+        ``"de421"``, ``"de440"``; the best installed by default.
+    error : Quantity
+        Displacement that counts: of the point masses and 1PN an asteroid is given those that can move
+        it by more than a tenth of this before the end of the span; J2 of Sun, Earth and `planets` and its own
+        A1, A2, A3 always.
+    tolerance : float, optional
+        Error per step of the integration, in units of 1.5e11 m and 30 km/s; by default what keeps the median
+        asteroid within `error` to the end of its span: ``1e-12 (error/0.1 km) (10 yr/span)^2``, from 1e-15 to 1e-8.
+    forces : tuple of str, optional
+        Exactly these forces, names as in ``flybystab.orbit.forces.FORCES``, instead of choosing by `error`.
+    growth : bool
+        Follow a neighbour of each orbit as well, for the columns ``displacement`` (km, of the neighbour from
+        the asteroid at closest approach), ``growth`` (over that at the epoch) and ``predictability``
+        (:mod:`flybystab.orbit.predictability`). Up to twice the time.
+    threads : int, optional
+        Number of threads; the processors by default.
+    progress : callable, optional
+        Called with the asteroids searched, all of them, and the encounters found so far.
+
+    Returns
+    -------
+    QTable
+        One row per encounter, sorted by asteroid and time: ``asteroid``, ``planet``, ``time`` (TDB),
+        ``distance`` (km), ``v_rel`` and ``v_inf`` (km/s; 0 for a bound passage), ``b_t`` and ``b_r`` (km;
+        target plane, north +z of ICRF, :mod:`flybystab.orbit.target_plane`; nan for a bound passage), ``impact``,
+        ``index`` (of the asteroid), ``position`` and ``velocity`` (ICRF, relative to the planet). On
+        an impact, distance and time are those of the two-body orbit without a surface, position and velocity
+        are from the step before, and the search ends for that asteroid. Metadata: ephemeris, forces and
+        the largest estimated share of each (``share_km``, point masses and 1PN), shares of the forces left out
+        (``left_out_km``), frame, time scale, tolerance, and, of several asteroids, those that could not be
+        followed (``failed``: ``asteroid`` and ``why``).
+
+    Raises
+    ------
+    OutOfSpan
+        Where an epoch or the span lies outside the ephemeris.
+    UnitMismatch, InvalidInput, UnknownName, NotConverged
+    """
+    rows = _objects(objects)
+    for name, value in (("start", start), ("stop", stop)):
+        if not isinstance(value, Time) or value.shape != ():
+            raise InvalidInput(name, value, "one astropy Time")
+    if not start < stop:
+        raise InvalidInput("stop", stop.iso, f"a time after start, {start.iso}")
+    names = [planets] if isinstance(planets, str) else list(planets)
+    if not names:
+        raise InvalidInput("planets", planets, "at least one")
+    found = [planet(n) for n in names]
+    for body in found:
+        if body.name == "sun":
+            raise InvalidInput("planets", body.name, f"one of {', '.join(BODIES[1:])}")
+    reach = np.broadcast_to(
+        to_si(within, u.m, "within", shape=None, low=0.0, open_low=True), (len(found),)
+    ).astype(float)
+    accuracy = to_si(error, u.m, "error", low=0.0)
+    eph = _ephemeris(ephemeris)
+    middle = later(start, 0.5 * seconds(stop, start))
+    t_start, t_stop = seconds(start, middle), seconds(stop, middle)
+    epochs = _epochs(rows, middle)
+    known = [seconds(neighbour_epoch(orbit), middle) for _, orbit in rows] if growth else []
+    every = [t_start, t_stop, *epochs, *known]
+    window = _window(eph, middle.tdb.jd1, middle.tdb.jd2, min(every), max(every))
+    chosen = forces
+    if chosen is None:
+        kinds = {any(orbit.nongrav.a): orbit for _, orbit in rows}
+        used = {name for orbit in kinds.values() for name in default_forces(orbit, *(b.name for b in found))}
+        chosen = tuple(name for name in FORCES if name in used)
+    longest = np.maximum(np.abs(epochs - t_start), np.abs(epochs - t_stop))
+    if tolerance is None:
+        tolerances = np.clip(_AT_10_YEARS * accuracy * (10.0 * YEAR / longest) ** 2, *_TOLERANCES)
+        if growth:  # the displacement of a neighbour may be metres
+            tolerances = np.minimum(tolerances, 1e-14)
+    else:
+        tolerances = np.full(len(rows), float(tolerance))
+    everything = field(window, [n for n in chosen if n != "non-gravitational"])
+    limits = np.zeros(len(BODIES))
+    limits[[BODIES.index(b.name) for b in found]] = reach
+    floors = np.array([PLANETS[name].impact_distance for name in BODIES])
+    always = np.zeros(12, dtype=bool)
+    for name in ("sun", *(b.name for b in found)):
+        b = BODIES.index(name)
+        always[SLOT[b] + N_FAST * GRID[b]] = True
+    laws = np.zeros((len(rows), 8))
+    if "non-gravitational" in chosen:
+        for i, (_, orbit) in enumerate(rows):
+            if any(orbit.nongrav.a):
+                laws[i] = *orbit.nongrav.a, *orbit.nongrav.constants
+    states = _states(rows, window, epochs)
+    shares = np.zeros((len(rows), N_SHARES))
+    # A tenth: several shares add up, and passages on the way enlarge them.
+    least = 0.1 * accuracy if forces is None else 0.0
+
+    failed: dict[int, dict[str, str]] = {}
+
+    def run(part: slice) -> list[Array]:
+        tables = everything, laws[part], epochs[part], states[part]
+        steps = tolerances[part]
+        size = len(tables[2])
+        i, space, parts = 0, 64 * size + 256, []
+        while i < size:
+            out = np.empty((space, WIDTH))
+            i, n, status, reached = search(
+                *tables, t_start, t_stop, limits, floors, steps, least, always, shares[part], i, out
+            )
+            if status in (INSIDE, STALLED):
+                name, orbit = rows[part][i]
+                why = (
+                    starts_inside(name, orbit.epoch, PLANETS[BODIES[int(reached)]])
+                    if status == INSIDE
+                    else NotConverged(f"{name}: the step size collapsed at {later(middle, reached).iso} TDB")
+                )
+                if len(rows) == 1:
+                    raise why
+                failed[part.start + i] = {"asteroid": name, "why": str(why)}
+                i += 1
+            elif n == 0:
+                space *= 4
+            out[:n, 11] += part.start
+            parts.append(out[:n].copy())
+        return parts
+
+    workers = threads or os.cpu_count() or 1
+    # Parts small enough that threads end together, large enough that Python does not count.
+    size = max(1, min(64, -(-len(rows) // (4 * workers)))) if workers > 1 else max(len(rows), 1)
+    tasks = [slice(i, min(i + size, len(rows))) for i in range(0, len(rows), size)]
+    flat: list[Array] = []
+    for task, parts in zip(tasks, in_order(run, tasks, workers), strict=True):
+        flat += parts
+        if progress is not None:
+            progress(task.stop, len(rows), sum(map(len, flat)))
+    raw = np.concatenate(flat) if flat else np.empty((0, WIDTH))
+    raw = raw[np.lexsort((raw[:, 1], raw[:, 11]))]
+    asked = np.isin(raw[:, 0], [BODIES.index(b.name) for b in found])
+    elsewhere = [
+        {"asteroid": rows[int(r[11])][0], "planet": BODIES[int(r[0])], "time_jd_tdb": later(middle, r[1]).jd}
+        for r in raw[~asked]
+    ]
+    raw = raw[asked]
+    kept, share, left_out = _forces_used(chosen, shares, least)
+    meta = {
+        "ephemeris": window.name,
+        "forces": list(kept),
+        "share_km": share,
+        "left_out_km": left_out,
+        "impacts_elsewhere": elsewhere,
+        "failed": [failed[i] for i in sorted(failed)],
+        "frame": "ICRF",
+        "time_scale": "TDB",
+        "tolerance": float(tolerances.min(initial=1.0)),
+    }
+    out = _table(rows, raw, middle, window, meta)
+    if growth:
+        from flybystab.orbit.search.neighbours import add_growth
+
+        # One neighbour for all encounters of an asteroid: the direction that matters is that of the farthest.
+        beside = {}
+        for i in np.unique(out["index"]).tolist():
+            times = raw[raw[:, 11] == i, 1]
+            farthest = float(times[np.argmax(np.abs(times - known[i]))])
+            beside[i] = neighbour(rows[i][1], later(middle, farthest), eph)
+
+        def field_of(i: int) -> Field:
+            return reduced(everything, shares[i], least, always)
+
+        add_growth(out, beside, laws, window, field_of, tolerances, workers)
+    return out
+
+
+def starts_inside(name: str, epoch: Time, body: Planet) -> InvalidInput:
+    """The error of an orbit whose state at the epoch is below the surface or atmosphere of a body."""
+    what = f"{name or 'the orbit'} at {epoch.tdb.iso} TDB inside {body.name}"
+    return InvalidInput(
+        "orbit", what, f"a start more than {body.impact_distance / 1e3:.0f} km from its centre"
+    )
+
+
+def _epochs(rows: list[tuple[str, Orbit]], origin: Time) -> Array:
+    """Epochs, s (TDB) from `origin`; whole days first, so that no digit is lost."""
+    zero = origin.tdb
+    # Asteroids of a catalogue share few epochs, and a Time takes long to say its date.
+    epochs = {id(orbit.epoch): orbit.epoch for _, orbit in rows}
+    known = {key: (t.jd1, t.jd2) for key, t in epochs.items()}
+    pairs = np.array([known[id(orbit.epoch)] for _, orbit in rows]).reshape(-1, 2)
+    return ((pairs[:, 0] - zero.jd1) + (pairs[:, 1] - zero.jd2)) * DAY
+
+
+def _states(rows: list[tuple[str, Orbit]], window: Window, epochs: Array) -> Array:
+    """Barycentric states at the epochs, shape (n, 6), m and m/s."""
+    out = np.empty((len(rows), 6))
+    centres = np.array([orbit.centre for _, orbit in rows], dtype=object)
+    for i, (_, orbit) in enumerate(rows):
+        out[i, :3] = orbit.position.to_value(u.m)
+        out[i, 3:] = orbit.velocity.to_value(_SPEED)
+    for centre in set(centres) - {"ssb"}:
+        where = centres == centre
+        out[where] += window.states(BODIES.index(centre), epochs[where])
+    return out
+
+
+def _forces_used(
+    chosen: tuple[str, ...], shares: Array, least: float
+) -> tuple[tuple[str, ...], dict[str, float], dict[str, float]]:
+    """Forces that at least one asteroid was given, their largest shares where known, and those of the others, km."""
+    largest = {name: float(v) for name, v in zip(NAMES, shares.max(axis=0, initial=0.0), strict=True) if name}
+    out = {name for name, value in largest.items() if value < least and name in chosen and len(shares)}
+    kept = tuple(n for n in chosen if n not in out)
+    share, left_out = ({n: largest[n] / 1e3 for n in some if n in largest} for some in (kept, sorted(out)))
+    return kept, share, left_out
+
+
+def _table(
+    rows: list[tuple[str, Orbit]], raw: Array, origin: Time, window: Window, meta: dict[str, Any]
+) -> QTable:
+    index = raw[:, 11].astype(int)
+    gm = window.gm[raw[:, 0].astype(int)]
+    speed2 = raw[:, 9] + 2.0 * gm / raw[:, 8]
+    b, _ = target_plane(raw[:, 2:8], gm)
+    out = QTable()
+    out["asteroid"] = np.array([rows[i][0] for i in index], dtype=str)
+    out["planet"] = np.array([BODIES[int(b)] for b in raw[:, 0]], dtype=str)
+    zero = origin.tdb
+    out["time"] = Time(np.full(len(raw), zero.jd1), zero.jd2 + raw[:, 1] / DAY, format="jd", scale="tdb")
+    out["distance"] = (raw[:, 8] * u.m).to(u.km)
+    out["v_rel"] = (np.sqrt(np.maximum(speed2, 0.0)) * u.m / u.s).to(u.km / u.s)
+    out["v_inf"] = (np.sqrt(np.maximum(raw[:, 9], 0.0)) * u.m / u.s).to(u.km / u.s)
+    out["b_t"], out["b_r"] = (b[:, 0] * u.m).to(u.km), (b[:, 1] * u.m).to(u.km)
+    out["impact"] = raw[:, 10] > 0.0
+    out["index"] = index
+    out["position"] = (raw[:, 2:5] * u.m).to(u.km)
+    out["velocity"] = (raw[:, 5:8] * u.m / u.s).to(u.km / u.s)
+    out.meta = meta
+    return out
+
+
+def _objects(objects: Any) -> list[tuple[str, Orbit]]:
+    """Names and orbits of one object or of many."""
+    if isinstance(objects, str):
+        raise InvalidInput("objects", objects, f"an orbit, as in fs.Asteroid.from_catalogue({objects!r})")
+    single = isinstance(objects, Orbit) or hasattr(objects, "orbit")
+    many = [objects] if single else objects
+    try:
+        many = list(many)
+    except TypeError:
+        raise InvalidInput("objects", objects, "an Orbit, an asteroid, or a list of them") from None
+    out = []
+    for i, item in enumerate(many):
+        orbit = item if isinstance(item, Orbit) else getattr(item, "orbit", None)
+        if not isinstance(orbit, Orbit):
+            raise InvalidInput(
+                f"objects[{i}]", item, "an Orbit, or an object with one as its attribute 'orbit'"
+            )
+        out.append((str(getattr(item, "name", "") or orbit.name or i), orbit))
+    return out

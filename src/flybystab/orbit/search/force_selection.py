@@ -1,0 +1,123 @@
+"""Which forces an orbit needs over a span: the displacement that each can make, against the error asked for.
+
+The same measure as :func:`flybystab.orbit.forces.shares`, ``3 int |a_i(t)| |t_end - t| dt``, along the two-body
+orbit around the Sun and with the bodies of the almanac: some microseconds an asteroid.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flybystab.constants import C_LIGHT
+from flybystab.core.numerics.jit import kernel
+from flybystab.orbit.almanac import FAST, N_BELT, N_FAST, N_SLOW, SLOW, Almanac, Places, find_places
+from flybystab.orbit.ephemeris import BELT
+from flybystab.orbit.kepler import two_body
+from flybystab.orbit.search.acceleration import Field
+
+Array = NDArray[np.float64]
+
+N_SHARES = N_FAST + N_SLOW + N_BELT + 1
+#: The forces with a share, in its order: slots of the three grids (None where one is empty), then 1PN.
+NAMES = (
+    *(f"{name} point mass" for name in (*FAST, *SLOW)),
+    *[None] * (N_SLOW - len(SLOW)),
+    *(f"{name} point mass" for name in BELT),
+    "1PN",
+)
+_POINTS = 32
+
+
+@kernel
+def shares_along(field: Field, t0: float, y: Array, t_end: float, places: Places, share: Array) -> None:
+    """Raise ``share[29]`` (m) to the displacement that each force can make from ``t0`` to ``t_end``.
+
+    Parameters
+    ----------
+    field : Field
+    t0, y : float, ndarray
+        Start (s) and barycentric state (m, m/s).
+    t_end : float
+        End, s, before or after.
+    places : Places
+        Room.
+    share : ndarray, shape (29,)
+        In the order of ``NAMES``.
+    """
+    gm = field.gm[0]
+    belt = field.book.when[2, 2] > 0.0
+    find_places(field.book, t0, belt, places)
+    s = np.empty(6)
+    for j in range(3):
+        s[j] = y[j] - places.slow[j * N_SLOW]
+        s[3 + j] = y[3 + j] - places.fast[3 * N_FAST + j]
+    total = np.zeros(N_SHARES)
+    x = np.empty(3)
+    dt = (t_end - t0) / _POINTS
+    for n in range(_POINTS):
+        t = t0 + (n + 0.5) * dt
+        find_places(field.book, t, belt, places)
+        there = two_body(gm, s, t - t0)
+        v2 = 0.0
+        r2 = 0.0
+        for j in range(3):
+            x[j] = there[j] + places.slow[j * N_SLOW]
+            r2 += there[j] ** 2
+            v2 += there[3 + j] ** 2
+        weight = 3.0 * abs(dt * (t_end - t))
+        for i in range(N_FAST):
+            total[i] += weight * field.gm_fast[i] / _square(places.fast, N_FAST, i, x)
+        for i in range(N_SLOW):
+            total[N_FAST + i] += weight * field.gm_slow[i] / _square(places.slow, N_SLOW, i, x)
+        if belt:
+            for i in range(N_BELT):
+                total[N_FAST + N_SLOW + i] += weight * field.gm_belt[i] / _square(places.belt, N_BELT, i, x)
+        r = np.sqrt(r2)
+        total[N_SHARES - 1] += (
+            weight * field.gm_pn / (C_LIGHT * C_LIGHT * r2) * (4.0 * field.gm_pn / r + 3.0 * v2)
+        )
+    for i in range(N_SHARES):
+        share[i] = max(share[i], total[i])
+
+
+@kernel
+def _square(p: Array, slots: int, i: int, x: Array) -> float:
+    return (p[i] - x[0]) ** 2 + (p[slots + i] - x[1]) ** 2 + (p[2 * slots + i] - x[2]) ** 2
+
+
+@kernel
+def reduced(field: Field, share: Array, least: float, always: Array) -> Field:
+    """The field without the forces of a share (m) below ``least``; slots flagged in ``always[12]`` stay."""
+    fast, slow, belt = field.gm_fast.copy(), field.gm_slow.copy(), field.gm_belt.copy()
+    for i in range(N_FAST):
+        if share[i] < least and not always[i]:
+            fast[i] = 0.0
+    for i in range(N_SLOW):
+        if share[N_FAST + i] < least and not always[N_FAST + i]:
+            slow[i] = 0.0
+    any_belt = False
+    for i in range(N_BELT):
+        if share[N_FAST + N_SLOW + i] < least:
+            belt[i] = 0.0
+        else:
+            any_belt = True
+    when = field.book.when.copy()
+    if not any_belt:
+        when[2, 2] = 0.0
+    book = field.book
+    return Field(
+        Almanac(when, book.fast, book.slow, book.belt, book.heavy),
+        fast,
+        slow,
+        belt,
+        field.inner_fast,
+        field.inner_slow,
+        field.nothing,
+        field.flat,
+        field.gm_pn if share[N_SHARES - 1] >= least else 0.0,
+        field.heavy,
+        field.head,
+        field.data,
+        field.gm,
+    )

@@ -1,0 +1,208 @@
+"""One compiled integration per asteroid, with the search for encounters inside it.
+
+DOP853 among prescribed bodies. Each asteroid has its own steps and only the forces that it needs. After each step
+every planet asked for is checked for a minimum of distance (:mod:`flybystab.orbit.search.minima`). An impact, on
+whichever body, is reported and ends that track.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from flybystab.constants import DAY
+from flybystab.core.numerics.jit import kernel
+from flybystab.orbit.almanac import gather
+from flybystab.orbit.ephemeris import body_state
+from flybystab.orbit.search.acceleration import Field, borrowed_field, empty_places, rate
+from flybystab.orbit.search.dop853 import Room, advance, borrowed_room, empty_room
+from flybystab.orbit.search.force_selection import reduced, shares_along
+from flybystab.orbit.search.minima import BENDING, FINE, chord_distance, crash, look
+
+Array = NDArray[np.float64]
+
+#: How a search ends: ``out`` too small, step size collapsed, start below the surface or atmosphere of a body.
+FULL, STALLED, INSIDE = 1, 2, 3
+
+
+@kernel
+def track_encounters(
+    field: Field,
+    law: Array,
+    t0: float,
+    y0: Array,
+    t_quiet: float,
+    t_end: float,
+    limits: Array,
+    floors: Array,
+    tolerance: float,
+    room: Room,
+    spare_room: Room,
+    out: Array,
+    n: int,
+) -> tuple[int, int, float]:
+    """Encounters of one asteroid from ``t0`` to ``t_end``, s, not counting those before ``t_quiet``.
+
+    Parameters
+    ----------
+    field : Field
+        Forces, without the non-gravitational one.
+    law : ndarray, shape (8,)
+        A1, A2, A3 (m/s2) and their law; zeros for none.
+    t0, y0 : float, ndarray
+        Start (s) and barycentric state (m, m/s). Time may run backward.
+    limits, floors : ndarray, shape (10,)
+        Of each body: largest distance of an encounter (zero: only impacts count), distance of impact, m.
+    tolerance : float
+        Error per step, in units of 1.5e11 m and 30 km/s.
+    room, spare_room : Room
+        For the integration and for the refinement of minima.
+    out : ndarray, shape (rows, 12)
+        Result from row `n` on; see ``WIDTH``.
+
+    Returns
+    -------
+    int
+        Number of rows.
+    int
+        0 done; 1 `out` was too small; 2 the step size collapsed; 3 the start is inside a body.
+    float
+        Time reached, s; for 3 the number of the body.
+    """
+    field = borrowed_field(field)
+    k, places = borrowed_room(room)
+    spare, spare_places = borrowed_room(spare_room)
+    y = y0.copy()
+    new = np.empty(6)
+    old, now = np.empty((10, 3)), np.empty((10, 3))
+    work = np.empty(6)
+    pair = np.empty((2, 10))
+    sign = 1.0 if t_end >= t0 else -1.0
+    h = DAY
+    t = t0
+    rate(field, law, t, y, places, k[0])
+    gather(places, now)
+    for body in range(10):
+        if (y[0] - now[body, 0]) ** 2 + (y[1] - now[body, 1]) ** 2 + (y[2] - now[body, 2]) ** 2 < floors[
+            body
+        ] ** 2:
+            return n, INSIDE, float(body)
+    while (t_end - t) * sign > 0.0:
+        stop = t_quiet if (t_quiet - t) * sign > 0.0 else t_end
+        t_new, h = advance(field, law, t, y, h, stop, tolerance, k, new, places)
+        if t_new != t_new:
+            return n, STALLED, t
+        old[:] = now
+        gather(places, now)
+        if (t - t_quiet) * sign >= 0.0:
+            early, late = (0, 1) if sign > 0.0 else (1, 0)
+            pair[early, 0] = t
+            pair[late, 0] = t_new
+            bend0 = 0.0
+            bend1 = 0.0
+            for j in range(6):
+                pair[early, 1 + j] = y[j]
+                pair[late, 1 + j] = new[j]
+            for j in range(3):
+                pair[early, 7 + j] = k[0, 3 + j]
+                pair[late, 7 + j] = k[12, 3 + j]
+                bend0 += k[0, 3 + j] ** 2
+                bend1 += k[12, 3 + j] ** 2
+            bend = 3.0 * np.sqrt(max(bend0, bend1))
+            bulge = 0.125 * (t_new - t) ** 2
+            for body in range(10):
+                reach = max(limits[body], floors[body])
+                if chord_distance(y, old[body], new, now[body]) > reach + bulge * (bend + BENDING[body]):
+                    continue
+                if n + FINE > out.shape[0]:
+                    return n, FULL, t
+                d1 = 0.0
+                for j in range(3):
+                    d1 += (new[j] - now[body, j]) ** 2
+                if d1 < floors[body] ** 2:
+                    body_state(field.head, field.data, field.gm, body, t, work)
+                    for j in range(6):
+                        out[n, 2 + j] = y[j] - work[j]
+                    crash(out[n], body, field.gm[body], t, sign)
+                    return n + 1, 0, t_new
+                n, hit = look(
+                    field,
+                    law,
+                    pair,
+                    k[0] if sign > 0.0 else k[12],
+                    body,
+                    limits[body],
+                    floors[body],
+                    out,
+                    n,
+                    spare,
+                    spare_places,
+                )
+                if hit == hit:
+                    return n, 0, hit
+        t = t_new
+        y[:] = new
+        k[0] = k[12]
+    return n, 0, t
+
+
+@kernel
+def search(
+    everything: Field,
+    laws: Array,
+    epochs: Array,
+    states: Array,
+    t_start: float,
+    t_stop: float,
+    limits: Array,
+    floors: Array,
+    tolerances: Array,
+    least: float,
+    always: Array,
+    shares: Array,
+    first: int,
+    out: Array,
+) -> tuple[int, int, int, float]:
+    """Encounters of asteroids ``first``, ``first + 1``, ... until all are done or ``out`` is full.
+
+    ``least`` (m) is the share of a force below which it is left out, ``shares[n, 29]`` takes the estimates.
+    Other arguments as in :func:`track_encounters`, one row per asteroid.
+
+    Returns
+    -------
+    int
+        The asteroid to go on with.
+    int
+        Number of rows.
+    int
+        0 done, 1 `out` was too small for the next asteroid, 2 its step size collapsed, 3 it starts inside a body.
+    float
+        Where it did, s; for 3 the number of the body.
+    """
+    n = 0
+    room, spare_room, places = empty_room(), empty_room(), empty_places()
+    for i in range(first, epochs.size):
+        t0 = epochs[i]
+        y = states[i]
+        if t0 > t_start:
+            shares_along(everything, t0, y, t_start, places, shares[i])
+        if t0 < t_stop:
+            shares_along(everything, t0, y, t_stop, places, shares[i])
+        field = reduced(everything, shares[i], least, always)
+        m = n
+        for leg in range(2):
+            if leg == 0 and t0 > t_start:
+                quiet, end = min(t0, t_stop), t_start
+            elif leg == 1 and t0 < t_stop:
+                quiet, end = max(t0, t_start), t_stop
+            else:
+                continue
+            m, status, t = track_encounters(
+                field, laws[i], t0, y, quiet, end, limits, floors, tolerances[i], room, spare_room, out, m
+            )
+            if status != 0:
+                return i, n, status, t
+        for row in range(n, m):
+            out[row, 11] = i
+        n = m
+    return epochs.size, n, 0, 0.0

@@ -1,0 +1,107 @@
+"""Figures. Every function takes matplotlib axes and returns them; units are on every axis.
+
+Colours are those of Okabe & Ito (2008), which colour-blind readers tell apart; line styles differ too, so that the
+figures work in greyscale.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import astropy.units as u
+import numpy as np
+
+from flybystab.encounter.encounter import Encounter
+from flybystab.errors import InvalidInput
+from flybystab.flybys.result import FlybyResult, History
+
+BLACK, ORANGE, SKY, GREEN, BLUE, RED = "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00"
+STYLES = ("-", "--", ":")
+
+
+def _hours(history: History) -> Any:
+    return history.time_from_periapsis.to_value(u.h)
+
+
+def _shade(axes: Any, history: History) -> None:
+    """Grey where the body flows, hatched where it is dispersed."""
+    t = _hours(history)
+    for regime, style in (("flowing", {"color": "0.85"}), ("dispersed", {"color": "0.7", "hatch": "//"})):
+        inside = history.regime == regime
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
+        for a, b in zip(edges[::2], edges[1::2], strict=True):
+            axes.axvspan(t[a], t[min(b, len(t) - 1)], lw=0, zorder=0, **style)
+
+
+def distance_plot(axes: Any, history: History, encounter: Encounter) -> Any:
+    """Distance from the planet's centre against time, with the planet's radius."""
+    axes.semilogy(_hours(history), history.distance.to_value(u.km), color=BLACK)
+    radius = encounter.planet.radius / 1e3
+    axes.axhline(radius, color=BLUE, ls="--", label=f"radius of {encounter.planet.name.capitalize()}")
+    axes.set_ylabel("distance (km)")
+    axes.legend(frameon=False, fontsize=8)
+    _shade(axes, history)
+    return axes
+
+
+def friction_plot(axes: Any, history: History, limit: u.Quantity) -> Any:
+    """Mobilised friction angle against time, with what the material has."""
+    phi = history.required_friction_angle.to_value(u.deg)
+    axes.plot(_hours(history), np.where(np.isfinite(phi), phi, np.nan), color=RED, label="mobilised")
+    axes.axhline(limit.to_value(u.deg), color=BLACK, ls="--", label="material")
+    axes.set_ylim(0.0, 1.15 * limit.to_value(u.deg))
+    axes.set_ylabel("friction angle (deg)")
+    axes.legend(frameon=False, fontsize=8, loc="center right")
+    _shade(axes, history)
+    return axes
+
+
+def spin_plot(axes: Any, history: History) -> Any:
+    """Spin rate against time."""
+    rate = np.linalg.norm(history.spin.to_value(u.rad / u.s), axis=1)
+    axes.plot(_hours(history), rate * 86400.0 / (2.0 * np.pi), color=GREEN)
+    axes.set_ylabel("spin rate (turns/day)")
+    axes.set_ylim(bottom=0.0)
+    _shade(axes, history)
+    return axes
+
+
+def axes_plot(axes: Any, history: History) -> Any:
+    """Semi-axes against time."""
+    a = history.semi_axes.to_value(u.m)
+    for i, (colour, style) in enumerate(zip((BLUE, ORANGE, BLACK), STYLES, strict=True)):
+        axes.plot(_hours(history), a[:, i], color=colour, ls=style, label=f"$a_{i + 1}$")
+    axes.set_ylim(0.0, 1.15 * a.max())
+    axes.set_ylabel("semi-axes (m)")
+    axes.legend(frameon=False, fontsize=8, ncols=3, loc="lower left")
+    _shade(axes, history)
+    return axes
+
+
+def flyby_panels(panels: Sequence[Any], result: FlybyResult) -> Sequence[Any]:
+    """Distance, mobilised friction, spin and semi-axes into four axes that share their time."""
+    history = result.history
+    if history is None:
+        raise InvalidInput("result", "without history", "the result of flyby(..., history=True)")
+    distance_plot(panels[0], history, result.encounter)
+    friction_plot(panels[1], history, result.body.material.friction_angle)
+    spin_plot(panels[2], history)
+    axes_plot(panels[3], history)
+    panels[3].set_xlabel("time from closest approach (h)")
+    return panels
+
+
+def flyby_figure(result: FlybyResult, title: str, path: str | Path) -> Path:
+    """Write the four panels of a flyby as a picture; returns its path."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(7.2, 8.4), layout="constrained")
+    FigureCanvasAgg(figure)
+    panels: Any = figure.subplots(4, 1, sharex=True)
+    flyby_panels(panels, result)
+    panels[0].set_title(title)
+    figure.savefig(path, dpi=150)
+    return Path(path)

@@ -1,0 +1,151 @@
+"""Figures of a screening's table and of the bounds that survival puts on a material."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import astropy.units as u
+import numpy as np
+from astropy.table import QTable
+
+from flybystab.flybys.verdict import Verdict
+from flybystab.plots.labels import label_points
+from flybystab.plots.outcome_map import MARKERS, SCALE
+from flybystab.screening.columns import VERDICTS
+from flybystab.screening.inference import strongest_passage
+from flybystab.screening.results import read_results
+from flybystab.screening.summary import summary
+
+PANELS = {
+    "friction_equilibrium": "shape and spin",
+    "friction_any_attitude": "and passages, whatever the attitude",
+    "friction_every_attitude": "enough at every attitude",
+}
+#: Friction angle, deg, below which a passage adds nothing on a figure.
+NOTHING = 1e-5
+#: Isolines of the least friction angle, deg.
+_LEVELS = (0, 5, 10, 15, 20, 25, 30, 35, 40, 45, 60)
+
+
+def _figure(width: float, height: float) -> Any:
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(width, height), layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure
+
+
+def inference_figure(table: QTable, path: str | Path) -> Path:
+    """Plot the region of density, cohesion and friction that :func:`flybystab.infer` leaves.
+
+    Each panel is a map of the least friction angle over density and cohesion; hatched, no friction is enough.
+    The white line and band are the density of the catalogue and its 1-sigma.
+
+    Returns
+    -------
+    Path
+        The file written.
+    """
+    import matplotlib
+
+    density = np.unique(table["density"].to_value(u.kg / u.m**3))
+    cohesion = np.unique(table["cohesion"].to_value(u.Pa))
+    names = list(PANELS) if table.meta.get("passages") else list(PANELS)[:1]
+    figure = _figure(1.2 + 3.6 * len(names), 3.8)
+    panels: Any = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
+    # Zero cohesion has a place below the least of the others.
+    height = np.arange(len(cohesion))
+    known = table.meta.get("catalogue_density_kg_m3") or []
+    filled = None
+    colours = matplotlib.colormaps["viridis_r"].with_extremes(over="0.85")
+    for panel, name in zip(panels, names, strict=True):
+        need = table[name].to_value(u.deg).reshape(len(density), len(cohesion)).T
+        capped = np.where(np.isfinite(need), np.minimum(need, 90.0), 90.0)
+        if min(capped.shape) > 1:
+            filled = panel.contourf(density, height, capped, _LEVELS, cmap=colours, extend="max")
+
+            lines = panel.contour(density, height, capped, [15, 25, 35, 45], colors="k", linewidths=0.7)
+            panel.clabel(lines, fmt="%g deg", fontsize=7)
+            panel.contourf(density, height, capped, [60, 91], colors="none", hatches=["///"])
+        if len(known) == 2:
+            panel.axvspan(known[0] - known[1], known[0] + known[1], color="w", alpha=0.35, lw=0)
+            panel.axvline(known[0], color="w", lw=1)
+        panel.set_title(PANELS[name], fontsize=9)
+        panel.set(xlabel="density (kg/m$^3$)", xlim=(density[0], density[-1]))
+        panel.locator_params(axis="x", nbins=4)
+    panels[0].set_yticks(height, [f"{c:g}" for c in cohesion])
+    panels[0].set_ylabel("cohesion (Pa)")
+    if filled is not None:
+        figure.colorbar(filled, ax=list(panels), label="least friction (deg); hatched: none")
+    axes = " x ".join(f"{2 * a:.0f}" for a in table.meta.get("semi_axes_m", []))
+    title = f"{table.meta.get('asteroid', '')}: {axes} m, {table.meta.get('spin_period_h', np.nan):.4g} h"
+    strongest = strongest_passage(table)
+    if strongest is not None:
+        title += f"; strongest tide: {strongest['passage']}"
+    figure.suptitle(title, fontsize=9)
+    figure.savefig(path, dpi=150)
+    return Path(path)
+
+
+def results_figure(results: QTable | str | Path, path: str | Path, names: int = 4) -> Path:
+    """Plot a result table: what each passage adds to the mobilised friction, and how near that is to failure.
+
+    Named are the passages that add most (left) and those nearest to failure (right).
+
+    Returns
+    -------
+    Path
+        The file written.
+    """
+    table = results if isinstance(results, QTable) else read_results(results)
+    summary(table)
+    verdict = np.asarray(table["verdict"], dtype=str)
+    distance = table["distance"].to_value(u.au)
+    rise = np.maximum(table["friction_rise"].to_value(u.deg), NOTHING)
+    margin = table["margin"].to_value(u.deg)
+    figure = _figure(10, 4.2)
+    left, right = figure.subplots(1, 2)
+    stands = np.isfinite(rise) & np.isfinite(margin) & (verdict != Verdict.NOT_IN_EQUILIBRIUM)
+    bound = np.asarray(table["decided_by"], dtype=str) == "bound"
+    for v in VERDICTS:
+        known = {"mfc": SCALE[v][1], "marker": MARKERS[list(SCALE).index(v)], "ms": 5}
+        for chosen, how, style in (
+            (
+                stands & (verdict == v) & bound,
+                "upper limit",
+                {"mfc": "none", "mec": "0.5", "marker": "v", "ms": 4},
+            ),
+            (stands & (verdict == v) & ~bound, "by the dynamics", {"mec": "black", **known}),
+        ):
+            if chosen.any():
+                style = {"ls": "", "mew": 0.5, **style}
+                left.plot(distance[chosen], rise[chosen], **style, label=f"{v}, {how} ({chosen.sum()})")
+                right.plot(rise[chosen], margin[chosen], **style)
+    left.set(xscale="log", yscale="log", xlabel="distance at closest approach (au)")
+    adds = "friction angle that the passage adds (deg)"
+    left.set_ylabel(adds)
+    right.set(xscale="log", xlabel=adds)
+    right.set_ylabel("margin (deg of friction angle)")
+    right.axhline(0.0, color="0.6", lw=0.8)
+    if left.get_legend_handles_labels()[0]:
+        left.legend(fontsize=7)
+    out = int((verdict == Verdict.NOT_IN_EQUILIBRIUM).sum())
+    least = f"; {NOTHING:g} deg stands for that or less" if np.any(rise[stands] == NOTHING) else ""
+    figure.suptitle(
+        f"{len(table)} passages, ephemeris {table.meta.get('ephemeris', '-')}; not shown: {out} of bodies that "
+        "are not in equilibrium by themselves" + least,
+        fontsize=9,
+    )
+    exact = stands & ~bound
+    for axes, x, y, rows in (
+        (left, distance, rise, np.flatnonzero(exact)[np.argsort(-rise[exact], kind="stable")]),
+        (right, rise, margin, np.flatnonzero(stands)[np.argsort(margin[stands], kind="stable")]),
+    ):
+        named = [
+            (x[k], y[k], f"{table['asteroid'][k]} {str(table['time_tdb'][k])[:4]}") for k in rows[:names]
+        ]
+        label_points(axes, named, np.column_stack([x[stands], y[stands]]), fontsize=7)
+    figure.savefig(path, dpi=150)
+    return Path(path)

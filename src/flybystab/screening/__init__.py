@@ -1,0 +1,1 @@
+"""Many asteroids through many encounters: settings, samples, journal, tables, inference."""

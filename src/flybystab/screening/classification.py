@@ -1,0 +1,153 @@
+"""A whole catalogue by structural stability: one row an asteroid, what it needs and how hard a push it stands."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import astropy.units as u
+import numpy as np
+from astropy.table import QTable
+from astropy.units import Quantity
+
+from flybystab._version import __version__
+from flybystab.body.body import Body, Material
+from flybystab.body.stability import LEVELS
+from flybystab.body.stability_regions import StabilityTable, stability_many
+from flybystab.catalogues.asteroid import Asteroid
+from flybystab.constants import G
+from flybystab.errors import FlybystabError
+from flybystab.screening.draws import nominal
+from flybystab.screening.priors import Population
+from flybystab.screening.results import Column, table_of
+from flybystab.screening.selection import listed
+
+#: Friction angles at which the level is given.
+ANGLES = (30.0, 35.0, 40.0)
+
+#: Columns of the table.
+COLUMNS: dict[str, Column] = {
+    "asteroid": Column(str, None, "name, or designation"),
+    "number": Column(int, None, "IAU number, -1 without"),
+    "required_friction_angle": Column(float, u.deg, "mobilised without cohesion; inf if none would do"),
+    **{
+        f"level_{angle:g}": Column(int, None, f"at {angle:g} deg of friction; see `levels` in the meta data")
+        for angle in ANGLES
+    },
+    "critical_strain": Column(float, None, "strain of the push that just reaches the barrier"),
+    "critical_energy": Column(float, u.J, "least energy of a push from which the body does not come to rest"),
+    "energy_share": Column(float, None, "that over the binding energy of a sphere of its mean radius"),
+    "critical_strain_second": Column(float, None, "critical strain at second order"),
+    "required_cohesion": Column(
+        float, u.Pa, "at the friction angle of the material; 0 where friction suffices"
+    ),
+    "in_tension": Column(bool, None, "mean tension: no friction would hold the body"),
+    "mean_pressure": Column(float, u.Pa, "mean pressure; negative in tension"),
+    "w2": Column(float, None, "omega^2/(pi G rho)"),
+    "semi_axis_a": Column(float, u.m, "long semi-axis"),
+    "semi_axis_b": Column(float, u.m, "middle semi-axis"),
+    "semi_axis_c": Column(float, u.m, "short semi-axis"),
+    "density": Column(float, u.kg / u.m**3, "bulk density"),
+    "spin_period": Column(float, u.h, "2 pi over the spin rate"),
+    "assumed": Column(str, None, "what nobody measured in the catalogue's values"),
+    "drawn": Column(str, None, "what the catalogue does not know: median of its distribution"),
+    "error": Column(str, None, "why the row could not be computed"),
+}
+
+
+def classification(
+    asteroids: str | Path | Sequence[Asteroid | str | int | Path] | None = None,
+    *,
+    material: Material | None = None,
+    dilatancy: float = 1.0,
+    population: Population | None = None,
+    threads: int | None = None,
+) -> QTable:
+    """Structural stability of a catalogue.
+
+    Parameters
+    ----------
+    asteroids : path, or sequence of asteroids, names and paths, optional
+        As in :func:`flybystab.screening.screening.screen`; the embedded catalogue by default. Bodies of tables of
+        orbits get their spins and shapes from the embedded tables; what is missing is the median of its distribution.
+    material : Material, optional
+        For the critical strain and the cohesion needed; 35 deg without cohesion by default. Its yield surface serves
+        all columns.
+    dilatancy : float
+        ``beta/min k`` of the test; 1 is associative flow.
+    population : Population, optional
+        Distributions of what is missing.
+    threads : int, optional
+        As many as cores by default.
+
+    Returns
+    -------
+    QTable
+        :data:`COLUMNS`; a body that cannot be computed has its reason in `error`.
+    """
+    material = material or Material()
+    rows: list[dict[str, Any]] = []
+    bodies: list[Body] = []
+    which: list[int] = []
+    for asteroid in listed(asteroids):
+        row: dict[str, Any] = {"asteroid": asteroid.name, "number": asteroid.number}
+        rows.append(row)
+        try:
+            draw = nominal(asteroid, material, population)
+            body = draw.body(0, material)
+        except FlybystabError as reason:
+            row["error"] = str(reason)
+            continue
+        row["assumed"], row["drawn"] = "; ".join(asteroid.assumptions), "; ".join(draw.drawn)
+        row |= dict(zip(("semi_axis_a", "semi_axis_b", "semi_axis_c"), body.axes, strict=True))
+        row |= {"density": body.rho, "spin_period": draw.period[0] / 3600.0}
+        row["w2"] = float(body.omega @ body.omega) * body.dynamical_time**2
+        bodies.append(body)
+        which.append(len(rows) - 1)
+
+    def table(depth: str, friction: Quantity | None = None, cohesionless: bool = False) -> StabilityTable:
+        bare = Material(yield_surface=material.yield_surface, bulk_modulus=material.bulk_modulus)
+        them = [b.with_(material=bare) for b in bodies] if cohesionless else bodies
+        return stability_many(
+            them, friction_angle=friction, dilatancy=dilatancy, depth=depth, threads=threads
+        )
+
+    own = table("barrier")
+    required = table("friction", cohesionless=True).required_friction_angle.to_value(u.deg)
+    levels = {f"level_{angle:g}": table("second", angle * u.deg).level for angle in ANGLES}
+    for k, (i, body) in enumerate(zip(which, bodies, strict=True)):
+        energy = float(own.energy_barrier[k].to_value(u.J))
+        sphere = 0.6 * G * body.mass.value**2 / body.mean_radius.value
+        rows[i] |= {
+            "required_friction_angle": required[k],
+            "critical_strain": own.strain_barrier[k],
+            "critical_energy": energy,
+            "energy_share": energy / sphere,
+            "critical_strain_second": own.strain_second[k],
+            "required_cohesion": own.required_cohesion[k].to_value(u.Pa),
+            "mean_pressure": own.mean_pressure[k].to_value(u.Pa),
+            "in_tension": bool(own.mean_pressure[k].value < 0.0),
+            **{name: int(level[k]) for name, level in levels.items()},
+        }
+    meta = {
+        "flybystab": __version__,
+        "friction_angle_deg": float(material.friction_angle.to_value(u.deg)),
+        "cohesion_Pa": material.c_pa,
+        "yield_surface": material.yield_surface,
+        "dilatancy": float(dilatancy),
+        "levels": {str(i): name for i, name in enumerate(LEVELS)},
+    }
+    return table_of(rows, COLUMNS, meta)
+
+
+def counts(table: QTable) -> dict[str, dict[str, int]]:
+    """How many bodies are at each level, by friction angle."""
+    good = np.asarray(table["error"]) == ""
+    return {
+        f"{angle:g} deg": {
+            name: int(np.sum(np.asarray(table[f"level_{angle:g}"])[good] == i))
+            for i, name in enumerate(LEVELS)
+        }
+        for angle in ANGLES
+    }

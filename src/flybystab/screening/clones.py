@@ -1,0 +1,147 @@
+"""How the uncertainty of an orbit enters the samples of a passage: each sample on a clone of its own.
+
+Where the covariance with its correlations is known and the distance is uncertain enough to matter, sample k
+meets the planet on clone k, followed with all forces: no linearisation. Elsewhere all samples share the
+nominal passage, and the row says why. A few clones tell which of the two it is; the others are drawn and followed
+where their samples are judged.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import astropy.units as u
+import numpy as np
+from astropy.time import Time
+from numpy.typing import NDArray
+
+from flybystab.catalogues.asteroid import identity
+from flybystab.encounter.distribution import clone_passages, encounter_distribution
+from flybystab.encounter.reach import far_enough
+from flybystab.errors import FlybystabError
+from flybystab.orbit.orbit import later
+from flybystab.orbit.planets import planet
+from flybystab.screening.draws import stream
+from flybystab.screening.encounters import Passage
+
+Array = NDArray[np.float64]
+
+#: Five sigma of the distance matter beyond this share of it: the tide then changes by three times as much.
+MATTERS = 1e-3
+#: The linear map of the covariance gives the sigma while its nonlinearity is below this.
+LINEAR = 0.1
+#: Clones that tell the sigma where the map is not linear.
+_PROBES = 16
+#: How far from the nominal passage those of the clones are looked for.
+_SEARCH = 30.0 * u.d
+
+
+class Clones(NamedTuple):
+    """The clones of an asteroid at one passage, drawn and followed when they are asked for.
+
+    Attributes
+    ----------
+    passage : Passage
+        Of the nominal orbit.
+    time : Time
+        Its closest approach.
+    within : float
+        Largest distance of a passage, m. A clone that does not come near is judged there.
+    samples, key : int
+        Number of all clones, and seed: clone k depends on the key and k alone.
+    """
+
+    passage: Passage
+    time: Time
+    within: float
+    samples: int
+    key: int
+
+    def passages(self, first: int, last: int) -> list[Passage]:
+        """The passages of clones `first` to ``last - 1``; those of one clone do not depend on the others."""
+        p = self.passage
+        clones = p.asteroid.orbit.clones(self.samples, self.key, first=first, last=last)
+        offset, distance, v_inf = clone_passages(
+            clones, p.planet, self.time, search=_SEARCH, within=self.within * u.m, threads=1
+        )
+        out = []
+        for k, orbit in enumerate(clones):
+            if np.isfinite(distance[k]):
+                time = later(self.time, float(offset[k]))
+                out.append(
+                    Passage(p.asteroid, p.planet, time, float(distance[k]), float(v_inf[k]), orbit=orbit)
+                )
+            else:
+                far = self.within, p.v_inf
+                out.append(Passage(p.asteroid, p.planet, self.time, *far, orbit=orbit, missed=True))
+        return out
+
+    def sigma(self, distance: Array) -> float:
+        """1-sigma of the distances of the samples, m, without the clones that do not come near."""
+        near = distance[distance < self.within]
+        return float(near.std(ddof=1)) if len(near) > 1 else np.nan
+
+
+class Spread(NamedTuple):
+    """The orbit's part in the samples of a passage.
+
+    Attributes
+    ----------
+    clones : Clones or None
+        One a sample; None where all samples share the nominal passage.
+    sigma : float
+        1-sigma of the distance, m; nan where nothing is known, or where only all clones can tell.
+    note : str
+        Why the orbit is not drawn, for a reader; empty where it is, or where its error is too small to matter.
+    """
+
+    clones: Clones | None
+    sigma: float
+    note: str
+
+
+def spread(passage: Passage, samples: int, seed: int) -> Spread:
+    """Whether the samples of a passage have orbits of their own, and which.
+
+    Parameters
+    ----------
+    passage : Passage
+        Of the nominal orbit.
+    samples, seed : int
+        Clone k depends on the seed, the asteroid and k alone: it is the same in every passage.
+    """
+    asteroid = passage.asteroid
+    if passage.encounter is not None and passage.encounter.time is None:
+        return Spread(None, np.nan, "scripted passage")
+    covariance = asteroid.orbit.covariance
+    if covariance is None:
+        return Spread(None, np.nan, "orbit without errors (no covariance)")
+    if not covariance.correlated:
+        known = "1-sigmas" if covariance.caveat == "without correlations" else "known only"
+        return Spread(None, np.nan, f"orbit without errors ({known} {covariance.caveat})")
+    body = planet(passage.planet)
+    key = int(stream(seed, "orbit", identity(asteroid)).integers(2**62))
+    within = max(1.5 * passage.distance, far_enough(body))
+    try:
+        few = encounter_distribution(
+            asteroid.orbit,
+            body.name,
+            passage.time,
+            n=min(samples, _PROBES),
+            seed=key,
+            search=_SEARCH,
+            within=within * u.m,
+            threads=1,
+        )
+    except FlybystabError as error:
+        return Spread(None, np.nan, f"orbit without errors ({type(error).__name__}: {error})")
+    linear = few.linear
+    if linear is not None and linear.nonlinearity < LINEAR:
+        sigma = float(linear.distance_sigma.to_value(u.m))
+    elif few.found.sum() > 1:
+        sigma = float(few.distance_sigma.to_value(u.m))
+    else:
+        sigma = np.nan
+    if 5.0 * sigma < MATTERS * passage.distance:
+        return Spread(None, sigma, "")
+    return Spread(Clones(passage, few.time, within, samples, key), sigma, "")

@@ -1,0 +1,242 @@
+"""Bodies drawn from what is known: catalogue values within their errors, distributions for the rest.
+
+A draw is fixed by the seed, the asteroid and the number of the sample alone: sample 17 of Apophis is the same
+whatever else is screened, in any order, by any number of workers, and for any number of samples. The same
+draw of a body meets every planet; its attitude is drawn anew for every encounter.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from dataclasses import dataclass, field
+from functools import lru_cache
+from typing import NamedTuple
+
+import astropy.units as u
+import numpy as np
+from numpy.typing import NDArray
+
+from flybystab.body.body import DENSITY_RANGE, Body, Material
+from flybystab.catalogues.asteroid import Asteroid, identity
+from flybystab.catalogues.catalogue import catalogue
+from flybystab.catalogues.lightcurves import periods_like
+from flybystab.catalogues.tumbling import attitude_matrix, free_spin, isotropic_direction
+from flybystab.errors import InvalidInput
+from flybystab.screening.distributions import truncated_normal
+from flybystab.screening.priors import Population
+
+Array = NDArray[np.float64]
+
+
+@lru_cache(maxsize=1)
+def _catalogue_values() -> dict[str, Array]:
+    """Spin periods (h) and elongations a/b of the embedded catalogue, tumblers left out."""
+    bodies = [a for a in catalogue() if a.row["spin_state"] == "principal"]
+    periods = np.array([a.quantity("spin_period_h").value for a in bodies])
+    axes = np.array([a.semi_axes.value for a in bodies])
+    return {"spin_period_h": np.sort(periods), "elongation": np.sort(axes[:, 0] / axes[:, 1])}
+
+
+def stream(seed: int, *names: object) -> np.random.Generator:
+    """Random numbers that depend on the seed and the names only."""
+    digest = hashlib.sha256("|".join(str(n) for n in names).encode()).digest()
+    words = [int.from_bytes(digest[i : i + 4], "little") for i in range(0, 16, 4)]
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, *words])))
+
+
+class Draws(NamedTuple):
+    """Samples of one asteroid; sample 0 of a nominal draw holds the catalogue's values.
+
+    Attributes
+    ----------
+    axes : ndarray (n, 3)
+        Semi-axes, m, longest first.
+    rho, period, phi, cohesion : ndarray (n,)
+        kg/m3, s, rad, Pa.
+    omega : ndarray (n, 3)
+        Angular velocity along the axes, rad/s.
+    phase : ndarray (n,)
+        Phase of a tumbler in its rotation period.
+    drawn : tuple of str
+        What came from a distribution rather than from the catalogue.
+    """
+
+    axes: Array
+    rho: Array
+    period: Array
+    phi: Array
+    cohesion: Array
+    omega: Array
+    phase: Array
+    drawn: tuple[str, ...]
+
+    def part(self, first: int, last: int) -> Draws:
+        """Samples `first` to ``last - 1``."""
+        arrays = {name: getattr(self, name)[first:last] for name in self._fields if name != "drawn"}
+        return self._replace(**arrays)
+
+    def body(self, i: int, material: Material) -> Body:
+        """Sample `i` as a body; friction and cohesion are the sample's, the rest is of `material`."""
+        return Body(
+            semi_axes=self.axes[i] * u.m,
+            density=self.rho[i] * u.kg / u.m**3,
+            spin=self.omega[i] * u.rad / u.s,
+            material=material.with_(
+                friction_angle=np.rad2deg(self.phi[i]) * u.deg, cohesion=self.cohesion[i] * u.Pa
+            ),
+        )
+
+
+#: Columns of uniform numbers behind a draw.
+_SIZE, _SHAPE, _FLAT, _THIRD, _DENSITY, _PERIOD, _FRICTION, _COHESION, _PHASE, _ALBEDO = range(10)
+_WIDTH = 12
+
+
+def _tumbling_rates(asteroid: Asteroid, phase: Array) -> Array:
+    moments, momentum, j = asteroid._tumbling
+    return free_spin(moments, momentum, j, phase)[0]
+
+
+def nominal(asteroid: Asteroid, material: Material, population: Population | None = None) -> Draws:
+    """The catalogue's values as a draw of one; what is missing is the median of its distribution.
+
+    Raises
+    ------
+    InvalidInput
+        The row has neither a size nor an absolute magnitude, or a value that is no number.
+    """
+    middle = np.full((1, _WIDTH), 0.5)
+    draw = _draws(asteroid, middle, population or Population(), keep=True)
+    return draw._replace(phi=np.array([material.phi]), cohesion=np.array([material.c_pa]))
+
+
+def draws(asteroid: Asteroid, samples: int, seed: int, population: Population | None = None) -> Draws:
+    """Samples of an asteroid (arguments as in :func:`nominal`)."""
+    uniform = stream(seed, "body", identity(asteroid)).random((samples, _WIDTH))
+    return _draws(asteroid, uniform, population or Population(), keep=False)
+
+
+def _draws(asteroid: Asteroid, x: Array, population: Population, *, keep: bool) -> Draws:
+    """`keep` leaves known values as they are: without their errors, and without `replace_assumed`."""
+    n = len(x)
+    drawn: list[str] = []
+    replace = population.replace_assumed and not keep
+    tumbles = asteroid.tumbles
+
+    def known(*columns: str) -> bool:
+        return asteroid.knows(*columns) and not (replace and any(c in asteroid.assumed for c in columns))
+
+    def value(column: str) -> float:
+        return asteroid._number(column)
+
+    def relative(column: str) -> float:
+        """Relative 1-sigma; zero where none is given."""
+        sigma = column.removesuffix("_m") + "_sigma_m"
+        return value(sigma) / value(column) if asteroid.knows(sigma) and not keep else 0.0
+
+    # Size
+    if asteroid.knows("diameter_m"):
+        size = value("diameter_m") * truncated_normal(x[:, _SIZE], 1.0, relative("diameter_m"), 0.1, 10.0)
+    elif asteroid.knows("semi_axis_a_m", "semi_axis_b_m", "semi_axis_c_m"):
+        size = np.full(n, 2.0 * float(np.prod(asteroid.semi_axes.value)) ** (1 / 3))
+    elif asteroid.knows("H_mag"):
+        albedo = population.albedo.quantile(x[:, _ALBEDO])
+        size = 1.329e6 / np.sqrt(albedo) * 10.0 ** (-value("H_mag") / 5.0)
+        drawn.append("diameter (from H and albedo)")
+    else:
+        raise InvalidInput(
+            "diameter_m", "(empty)", f"a size or H_mag for {asteroid.label} in {asteroid.file}"
+        )
+
+    # Shape, then scaled to the size
+    if known("semi_axis_a_m", "semi_axis_b_m", "semi_axis_c_m") and (
+        keep or tumbles or asteroid.row.get("shape_kind") != "size+elongation"
+    ):
+        shape = np.tile(asteroid.semi_axes.value, (n, 1))
+        if not keep and not tumbles:
+            common = relative("diameter_m")
+            for i, (axis, column) in enumerate(zip("abc", (_SHAPE, _FLAT, _THIRD), strict=True)):
+                own = np.sqrt(max(0.0, relative(f"semi_axis_{axis}_m") ** 2 - common**2))
+                shape[:, i] *= truncated_normal(x[:, column], 1.0, own, 0.2, 5.0)
+    else:
+        if known("amplitude_mag") and not replace:
+            centre = population.log_elongation_per_mag * value("amplitude_mag")
+            elongation = 10.0 ** truncated_normal(
+                x[:, _SHAPE], centre, population.log_elongation_sigma, 0.0, np.log10(4.0)
+            )
+            drawn.append("elongation (from the lightcurve amplitude)")
+        else:
+            elongation = population.elongation.quantile(x[:, _SHAPE], _catalogue_values()["elongation"])
+            elongation = np.maximum(1.0, elongation)
+            drawn.append("elongation")
+        flat = np.minimum(1.0, population.flattening.quantile(x[:, _FLAT]))
+        drawn.append("flattening")
+        shape = np.column_stack([elongation, np.ones(n), flat])
+    shape = np.sort(shape, axis=1)[:, ::-1]
+    axes = shape * (0.5 * size / np.cbrt(np.prod(shape, axis=1)))[:, None]
+
+    # Density
+    if known("density_kg_m3"):
+        centre = value("density_kg_m3")
+        has_sigma = asteroid.knows("density_sigma_kg_m3") and not keep
+        sd = value("density_sigma_kg_m3") if has_sigma else 0.0
+        least, most = max(0.25 * centre, DENSITY_RANGE[0]), min(4.0 * centre, DENSITY_RANGE[1])
+        rho = truncated_normal(x[:, _DENSITY], centre, sd, least, most)
+        if "density_kg_m3" in asteroid.assumed:
+            drawn.append("density (from the class)" if asteroid.row.get("taxonomic_class") else "density")
+    else:
+        distribution, name = population.density_of(asteroid.row.get("taxonomic_class", ""))
+        rho = distribution.quantile(x[:, _DENSITY])
+        drawn.append(name)
+
+    # Spin
+    phase = x[:, _PHASE] if not keep else np.zeros(n)
+    if tumbles:
+        omega = _tumbling_rates(asteroid, phase)
+        period = 2.0 * np.pi / np.linalg.norm(omega, axis=1)
+    else:
+        if known("spin_period_h"):
+            has_sigma = asteroid.knows("spin_period_sigma_h") and not keep
+            centre, sd = value("spin_period_h"), value("spin_period_sigma_h") if has_sigma else 0.0
+            period = 3600.0 * truncated_normal(x[:, _PERIOD], centre, sd, 0.2 * centre, 5.0 * centre)
+        else:
+            values = _catalogue_values()["spin_period_h"]
+            if population.spin_period_h.kind == "lightcurves":
+                values = periods_like(value("H_mag") if asteroid.knows("H_mag") else None)
+            period = 3600.0 * population.spin_period_h.quantile(x[:, _PERIOD], values)
+            drawn.append("spin period")
+        omega = np.column_stack([np.zeros(n), np.zeros(n), 2.0 * np.pi / period])
+
+    phi = np.radians(population.friction_angle_deg.quantile(x[:, _FRICTION]))
+    cohesion = population.cohesion_Pa.quantile(x[:, _COHESION])
+    return Draws(axes, rho, period, phi, cohesion, omega, phase, tuple(drawn))
+
+
+@dataclass(frozen=True)
+class Attitudes:
+    """Attitudes of an asteroid's samples at one encounter, made one by one when they are asked for."""
+
+    asteroid: Asteroid
+    draws: Draws
+    uniform: Array = field(repr=False)
+
+    @classmethod
+    def at(cls, asteroid: Asteroid, draws: Draws, seed: int, *encounter: object) -> Attitudes:
+        """Attitudes that depend on the seed, the asteroid and the encounter only."""
+        numbers = stream(seed, "attitude", identity(asteroid), *encounter).random((len(draws.rho), 3))
+        return cls(asteroid, draws, numbers)
+
+    def part(self, first: int, last: int) -> Attitudes:
+        """Attitudes of samples `first` to ``last - 1``."""
+        return Attitudes(self.asteroid, self.draws.part(first, last), self.uniform[first:last])
+
+    def pole(self, i: int) -> Array:
+        """Direction of the angular momentum of sample `i`, ICRF."""
+        known = self.asteroid.pole
+        return isotropic_direction(self.uniform[i, :2]) if known is None else known
+
+    def matrix(self, i: int) -> Array:
+        """Rotation of sample `i`, body axes -> ICRF."""
+        s = self.draws.axes[i] ** 2
+        momentum = (s.sum() - s) * self.draws.omega[i]
+        return attitude_matrix(momentum, self.pole(i), 2.0 * np.pi * float(self.uniform[i, 2]))

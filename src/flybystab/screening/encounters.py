@@ -1,0 +1,147 @@
+"""Passages of asteroids by planets, as a screening meets them: found first, bounded, followed only if need be."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import astropy.units as u
+import numpy as np
+from astropy.time import Time
+
+from flybystab.catalogues.catalogue import Asteroid
+from flybystab.constants import AU
+from flybystab.core.ellipsoid.yield_bound import tide_size
+from flybystab.encounter.encounter import Encounter
+from flybystab.encounter.reach import SETTLE, far_enough, usual_start
+from flybystab.errors import NoEncounter
+from flybystab.orbit.orbit import Orbit
+from flybystab.orbit.planets import PLANETS, planet
+from flybystab.screening.settings import Settings
+
+#: Nearer to the Earth than this (m) the Moon cannot be bounded without knowing where it is.
+FAR_FROM_EARTH = 3 * 3.844e8
+_MOON_PERIGEE, _MOON_APOGEE = 3.56e8, 4.067e8
+#: No planet comes nearer to the Sun than this share of its mean distance (Mercury: 0.794).
+_PERIHELION = 0.79
+_SQRT6 = np.sqrt(6.0)
+
+
+@dataclass
+class Passage:
+    """One encounter of one asteroid during its screening; the tide is made when it is first needed.
+
+    Attributes
+    ----------
+    asteroid : Asteroid
+    planet : str
+    time : Time
+        Closest approach.
+    distance, v_inf : float
+        m, m/s.
+    encounter : Encounter or None
+        Once it has been followed; given for a scripted one.
+    orbit : Orbit or None
+        A clone, instead of the asteroid's own orbit.
+    missed : bool
+        The clone does not come nearer than `distance`, and has no passage to follow.
+    """
+
+    asteroid: Asteroid
+    planet: str
+    time: Time
+    distance: float
+    v_inf: float
+    encounter: Encounter | None = None
+    orbit: Orbit | None = None
+    missed: bool = False
+
+    @property
+    def key(self) -> tuple[str, str]:
+        """What names the passage in the random streams."""
+        return self.planet, f"{self.time.tdb.jd:.1f}"
+
+    def bounds(self) -> tuple[float, float]:
+        """Bounds on the tide, as of :func:`tide_size`, from distance and speed alone; infinite where unknown.
+
+        The encounter lasts from the distance D = `usual_start` inbound to D outbound and SETTLE longer. What
+        pulls the asteroid away from the planet is at most ``kappa r`` with ``kappa = 2 GM_sun/d^3``, d the
+        least distance from the Sun, plus, at the Earth, the Moon's pull on both. With E the two-body energy,
+        ``(r^2)''/2 = 2 E + GM/r + r.a``, and E changes by ``int a.v dt``. Along a path from q to D
+        ``int r ds < 0.7 D^2`` and ``int ds < 1.2 D``. So ``(r^2)''/2 >= v_inf^2 (1 - eps)`` with the `eps`
+        below: there is one minimum, ``r^2 >= q^2 + (1 - eps) v_inf^2 t^2``, hence the time to D and
+        ``int GM/r^3 dt <= 2 GM/(q^2 v_inf sqrt(1 - eps))``.
+        """
+        body = planet(self.planet)
+        q, v = self.distance, self.v_inf
+        nothing = np.inf, np.inf
+        if self.planet == "moon" or q < 3.0 * body.radius or not v > 0.0:
+            return nothing
+        if self.planet == "earth" and q < FAR_FROM_EARTH:
+            return nothing
+        reach = usual_start(body, q)
+        nearest = _PERIHELION * body.orbit_radius - reach
+        if nearest < 0.3 * body.orbit_radius:
+            return nothing
+        others = PLANETS["sun"].gm / nearest**3
+        eps = 1.9 * 2.0 * others * reach**2 / v**2
+        if self.planet == "earth":
+            moon = PLANETS["moon"].gm
+            others += moon / (q - _MOON_APOGEE) ** 3
+            eps += 3.4 * reach * (moon / _MOON_PERIGEE**2 + moon / (q - _MOON_APOGEE) ** 2) / v**2
+        if eps > 0.75:
+            return nothing
+        slow = v * np.sqrt(1.0 - eps)
+        # J2 adds at most 6 J2 (R/q)^2.
+        near = body.gm * (1.0 + 6.0 * body.j2 * (body.radius / q) ** 2)
+        peak = near / q**3 + others
+        impulse = 2.0 * near / (q * q * slow) + others * (2.0 * reach / slow + SETTLE)
+        # 2 percent: the other planets, and the distance found against the distance followed.
+        return float(1.02 * _SQRT6 * peak), float(1.02 * _SQRT6 * impulse)
+
+    def meet(self) -> Encounter:
+        """The encounter, followed with all forces."""
+        if self.missed:
+            raise NoEncounter(f"the clone has no passage within {self.distance / AU:.3g} au of {self.planet}")
+        if self.encounter is None:
+            self.encounter = Encounter.from_orbit(
+                self.orbit or self.asteroid.orbit,
+                self.planet,
+                self.time,
+                within=max(1.5 * self.distance, far_enough(planet(self.planet))) * u.m,
+            )
+        return self.encounter
+
+    def close_bounds(self) -> tuple[float, float]:
+        """Bounds on the tide of the encounter that was followed."""
+        e = self.meet()
+        return tide_size(e.tide, e.t_start, e.t_stop)
+
+
+def passages(asteroid: Asteroid, settings: Settings) -> list[Passage]:
+    """Encounters of an asteroid, in time."""
+    from flybystab.orbit.search.encounter_finder import find_encounters
+
+    table = find_encounters(
+        asteroid.orbit,
+        Time(settings.start, format="jd", scale="tdb"),
+        Time(settings.stop, format="jd", scale="tdb"),
+        planets=list(settings.planets),
+        within=settings.within * u.m,
+        threads=1,
+    )
+    found = [
+        Passage(
+            asteroid,
+            str(row["planet"]),
+            row["time"],
+            float(row["distance"].to_value(u.m)),
+            float(row["v_inf"].to_value(u.m / u.s)),
+        )
+        for row in table
+    ]
+    return sorted(found, key=lambda p: (p.time.tdb.jd, p.planet))
+
+
+#: What finds the passages of an asteroid: a function that workers can import.
+Finder = Callable[[Asteroid, Settings], list[Passage]]

@@ -1,0 +1,262 @@
+"""What shape, spin and survived passages say about the material of a body.
+
+For each density and cohesion there is a least friction angle that carries the body as it is (theory,
+section 4) and one that carries it through a passage without yielding. The second depends on the attitude,
+which nobody knew in the past: its least value over the attitudes is a bound that any attitude obeys, its
+largest one makes the body safe at every attitude. A body that yielded and was moulded into its present shape
+escapes the bounds from passages, and nothing here says that it did not: they hold for a body that kept its
+shape.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import astropy.units as u
+import numpy as np
+from astropy.table import QTable
+from astropy.time import Time
+from astropy.units import Quantity
+
+from flybystab.body.body import Body, Material
+from flybystab.catalogues.asteroid import identity
+from flybystab.catalogues.catalogue import Asteroid
+from flybystab.catalogues.tumbling import attitude_matrix, isotropic_direction
+from flybystab.constants import G
+from flybystab.core.dynamics.run import passage
+from flybystab.core.ellipsoid.yield_bound import quick_margins, tide_size
+from flybystab.encounter.encounter import Encounter
+from flybystab.errors import InvalidInput
+from flybystab.orbit.search.encounter_finder import find_encounters
+from flybystab.screening.draws import stream
+from flybystab.units import to_si, whole
+
+_TOLERANCE = 1e-7
+#: A passage that adds less than this is not followed, rad.
+NEGLIGIBLE = float(np.radians(0.05))
+#: A friction angle that no material has, rad: where the bound may look.
+_STEEP = 1.5
+
+
+def infer(
+    asteroid: Asteroid | Body,
+    encounters: Sequence[Encounter] = (),
+    densities: Quantity | None = None,
+    cohesions: Quantity | None = None,
+    *,
+    attitudes: int = 32,
+    seed: int = 0,
+    yield_surface: str = "drucker-prager",
+) -> QTable:
+    """Least friction angles that are compatible with a body's shape and spin and with its passages.
+
+    Parameters
+    ----------
+    asteroid : Asteroid or Body
+    encounters : sequence of Encounter
+        Passages that it is known to have survived. One that the quick bound shows to add less than 0.05 deg
+        is not followed: its bound counts for every attitude, and nothing for any attitude.
+    densities, cohesions : Quantity (n,), (m,)
+        The grid; by default 1000 to 3500 kg/m3, and cohesions from zero to three times the body's own stress.
+    attitudes : int
+        Attitudes tried in every passage: the catalogue's pole where it is known, isotropic ones elsewhere.
+    seed : int
+        Of the attitudes.
+    yield_surface : str
+        As in :class:`flybystab.Material`.
+
+    Returns
+    -------
+    QTable
+        Rows over densities, then cohesions: ``density``, ``cohesion``, ``friction_equilibrium`` (of a tumbler: in
+        all its phases), and over all passages ``friction_any_attitude`` (needed whatever the attitude was) and
+        ``friction_every_attitude`` (enough for every attitude tried); deg, inf where no friction is enough.
+        ``meta["passages"]`` says what each passage adds.
+
+    Raises
+    ------
+    InvalidInput, UnitMismatch, UnknownName
+    """
+    rho = (
+        np.linspace(1000.0, 3500.0, 11) if densities is None else _grid(densities, u.kg / u.m**3, "densities")
+    )
+    if np.any(rho <= 0.0):
+        raise InvalidInput("densities", densities, "positive values")
+    whole(attitudes, "attitudes", 1)
+    if not isinstance(asteroid, Asteroid | Body):
+        raise InvalidInput(
+            "asteroid", asteroid, "an Asteroid (Asteroid.from_catalogue finds a name) or a Body"
+        )
+    code = Material(yield_surface=yield_surface).surface_code
+    bodies, turns = _attitudes(asteroid, attitudes, seed)
+    cohesion = _cohesions(bodies[0]) if cohesions is None else _grid(cohesions, u.Pa, "cohesions")
+    sizes = [tide_size(e.tide, e.t_start, e.t_stop) for e in encounters]
+    shape = (len(rho), len(cohesion))
+    rest = np.empty(shape)
+    needs = np.empty((*shape, len(encounters), 2))  # whatever the attitude, at the worst one
+    followed = np.zeros(len(encounters), dtype=bool)
+    for i, r in enumerate(rho):
+        for j, c in enumerate(cohesion):
+            free, bounds = _by_bound(bodies, float(r), float(c), code, sizes)
+            rest[i, j] = free
+            for k, encounter in enumerate(encounters):
+                if bounds[k] < free + NEGLIGIBLE or not np.isfinite(free):
+                    needs[i, j, k] = free, max(free, bounds[k] if np.isfinite(free) else free)
+                    continue
+                followed[k] = True
+                found = [
+                    _need(body, q, encounter, float(r), float(c), code)
+                    for body, q in zip(bodies, turns, strict=True)
+                ]
+                needs[i, j, k] = max(free, min(found)), max(free, *found)
+    least, most = (
+        np.maximum(rest, needs[..., side].max(axis=2)) if len(encounters) else rest for side in (0, 1)
+    )
+    table = QTable()
+    table["density"] = np.repeat(rho, len(cohesion)) * u.kg / u.m**3
+    table["cohesion"] = np.tile(cohesion, len(rho)) * u.Pa
+    for name, values in (("equilibrium", rest), ("any_attitude", least), ("every_attitude", most)):
+        table[f"friction_{name}"] = np.rad2deg(values.ravel()) * u.deg
+    table.meta = {
+        "title": "least friction angle by density and cohesion",
+        "asteroid": asteroid.label if isinstance(asteroid, Asteroid) else "body",
+        "semi_axes_m": [float(a) for a in bodies[0].axes],
+        "spin_period_h": 2.0 * np.pi / float(np.linalg.norm(bodies[0].omega)) / 3600.0,
+        "catalogue_density_kg_m3": _known_density(asteroid),
+        "passages": [
+            {
+                "passage": _label(e),
+                "tide_s-2": float(sizes[k][0]),
+                "followed": bool(followed[k]),
+                "adds_at_any_attitude_deg": _largest(needs[..., k, 0] - rest),
+                "adds_at_worst_attitude_deg": _largest(needs[..., k, 1] - rest),
+            }
+            for k, e in enumerate(encounters)
+        ],
+        "attitudes": attitudes,
+        "pole": "catalogue" if isinstance(asteroid, Asteroid) and asteroid.pole is not None else "isotropic",
+        "seed": seed,
+        "yield_surface": yield_surface,
+        "reading": "bounds from passages hold for a body that has kept its shape since",
+    }
+    return table
+
+
+def strongest_passage(table: QTable) -> dict[str, Any] | None:
+    """The passage with the strongest tide out of ``meta["passages"]``; None without passages.
+
+    Not the one that adds most: what a passage adds may be a bound, which says nothing of the order.
+    """
+    return max(table.meta.get("passages", []), key=lambda p: p["tide_s-2"], default=None)
+
+
+def _largest(rise: np.ndarray) -> float:
+    """Largest finite rise over the grid, deg."""
+    finite = rise[np.isfinite(rise)]
+    return float(np.rad2deg(finite.max())) if len(finite) else 0.0
+
+
+def _known_density(asteroid: Asteroid | Body) -> list[float]:
+    """Density and its 1-sigma in the catalogue, kg/m3; empty for a body of one's own."""
+    columns = ("density_kg_m3", "density_sigma_kg_m3")
+    if not isinstance(asteroid, Asteroid) or not asteroid.knows(columns[0]):
+        return []
+    return [float(asteroid.quantity(c).value) if asteroid.knows(c) else 0.0 for c in columns]
+
+
+def _cohesions(body: Body) -> np.ndarray:
+    """Zero, and the steps 1, 3, 10 ... Pa from a hundredth to three times the body's own stress."""
+    a = body.axes
+    weight = 2.0 / 15.0 * np.pi * G * 2000.0**2 * np.cbrt(np.prod(a)) ** 2
+    spin = 2000.0 / 5.0 * float(body.omega @ body.omega) * a[0] ** 2
+    top = 3.0 * max(weight, spin)
+    steps = np.array([m * 10.0**k for k in range(-6, 10) for m in (1.0, 3.0)])
+    return np.concatenate([[0.0], steps[(steps <= top) & (steps >= top / 300.0)]])
+
+
+def _by_bound(
+    bodies: Sequence[Body], rho: float, cohesion: float, code: int, sizes: Sequence[tuple[float, float]]
+) -> tuple[float, list[float]]:
+    """Friction (rad) mobilised at rest, largest over the phases, and bounds on it in each of the tides."""
+    n = len(bodies)
+    axes = np.array([b.axes for b in bodies])
+    omega = np.array([b.omega for b in bodies])
+    friction, verdict = np.empty((n, 2)), np.empty(n, dtype=np.int64)
+    bounds = []
+    for size in [(0.0, 0.0), *sizes]:
+        args = axes, np.full(n, rho), omega, np.full(n, _STEEP), np.full(n, cohesion), code
+        quick_margins(*args, *size, friction, verdict)
+        bounds.append(float(friction[:, 1].max()))
+    return float(friction[:, 0].max()), bounds[1:]
+
+
+def survived(
+    asteroid: Asteroid,
+    start: Time,
+    stop: Time,
+    planets: Sequence[str] = ("earth",),
+    within: Quantity = 0.05 * u.au,
+) -> list[Encounter]:
+    """Passages of an asteroid's orbit between two dates, followed with all forces, for :func:`infer`.
+
+    Raises
+    ------
+    OutOfSpan
+        The span reaches beyond the ephemeris.
+    """
+    table = find_encounters(asteroid, start, stop, planets=list(planets), within=within)
+    return [Encounter.from_orbit(asteroid.orbit, str(row["planet"]), row["time"]) for row in table]
+
+
+def _grid(values: Quantity, unit: u.UnitBase, name: str) -> np.ndarray:
+    grid = np.atleast_1d(to_si(values, unit, name, shape=None, low=0.0))
+    if grid.ndim != 1 or not len(grid):
+        raise InvalidInput(name, values, "a list of values")
+    return grid
+
+
+def _attitudes(asteroid: Asteroid | Body, n: int, seed: int) -> tuple[list[Body], list[np.ndarray]]:
+    """Bodies (a tumbler at different phases) and their rotations to the frame of the encounter."""
+    key = identity(asteroid) if isinstance(asteroid, Asteroid) else "body"
+    bodies, turns = [], []
+    for x in stream(seed, "infer", key).random((n, 4)):
+        tumbles = isinstance(asteroid, Asteroid) and asteroid.tumbles
+        if isinstance(asteroid, Body):
+            body, pole = asteroid, None
+        else:
+            body, pole = asteroid.body_with(phase=float(x[3]) if tumbles else 0.0), asteroid.pole
+        s = body.axes**2
+        momentum = (s.sum() - s) * body.omega
+        if not np.any(momentum):
+            momentum = np.array([0.0, 0.0, 1.0])
+        direction = isotropic_direction(x[:2]) if pole is None else pole
+        bodies.append(body)
+        turns.append(attitude_matrix(momentum, direction, 2.0 * np.pi * x[2]))
+    return bodies, turns
+
+
+def _need(
+    body: Body, turn: np.ndarray, encounter: Encounter, rho: float, cohesion: float, code: int
+) -> float:
+    """Largest friction angle (rad) that the rigid body mobilises in a passage."""
+    run = passage(
+        body.axes,
+        rho,
+        body.omega,
+        turn,
+        encounter.t_start,
+        encounter.t_stop,
+        encounter.tide,
+        phi=0.5,
+        cohesion=cohesion,
+        surface=code,
+        unyielding=True,
+        tolerance=_TOLERANCE,
+    )
+    return float(run.max_friction)
+
+
+def _label(encounter: Encounter) -> str:
+    when = "scripted" if encounter.time is None else encounter.time.tdb.iso[:16]
+    return f"{encounter.planet.name.capitalize()} {when}, {encounter.distance.to_value(u.km):,.0f} km"

@@ -1,0 +1,147 @@
+"""Rows of a screening: one an encounter, for the catalogue body and its samples, and one a sample."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from flybystab._version import __version__
+from flybystab.catalogues.catalogue import Asteroid
+from flybystab.constants import AU
+from flybystab.errors import FlybystabError
+from flybystab.flybys.verdict import Verdict
+from flybystab.orbit.ephemeris import ephemeris
+from flybystab.screening.clones import Spread
+from flybystab.screening.columns import VERDICTS, YIELDED, share_of
+from flybystab.screening.draws import Attitudes, Draws, nominal
+from flybystab.screening.encounters import Passage
+from flybystab.screening.sample_verdicts import Judged, contributors, inputs, judge, wilson
+from flybystab.screening.settings import Settings
+
+#: Values by column; a column that is left out is empty.
+Row = dict[str, Any]
+
+#: The margin of the catalogue body is computed, not bounded, where the bound is this far from rest, rad.
+SHARP = float(np.radians(0.01))
+
+
+def failed_row(asteroid: Asteroid, settings: Settings, error: FlybystabError) -> Row:
+    """Row of an asteroid that could not be followed."""
+    return _head(asteroid, settings) | {"error": f"{type(error).__name__}: {error}"}
+
+
+def body_row(passage: Passage, settings: Settings) -> Row:
+    """Row of an encounter with what happens to the catalogue body; without a verdict where that is not known."""
+    asteroid, material = passage.asteroid, settings.material
+    row = _head(asteroid, settings) | {
+        "planet": passage.planet,
+        "time_tdb": passage.time.tdb.isot,
+        "jd_tdb": float(passage.time.tdb.jd),
+        "distance": passage.distance / AU,
+        "v_inf": passage.v_inf / 1000.0,
+    }
+    try:
+        known = nominal(asteroid, material, settings.population)
+        attitude = Attitudes.at(asteroid, known, settings.seed, "nominal", *passage.key)
+        main = judge(
+            passage, known, attitude, material, tolerance=settings.tolerance, sharp=SHARP, measure=True
+        )
+    except FlybystabError as error:
+        return row | {"error": f"{type(error).__name__}: {error}"}
+    return row | {
+        "verdict": main.verdict[0],
+        "margin": float(np.rad2deg(main.margin[0])),
+        "decided_by": "dynamics" if main.dynamic[0] else "bound",
+        "required_friction_at_rest": float(np.rad2deg(main.rest[0])),
+        "friction_rise": float(np.rad2deg(_rise(known.phi[0] - main.margin[0], main.rest[0]))),
+        "numerical_error": main.numerical,
+        "error": main.error[0],
+        "assumed": "; ".join(
+            (*asteroid.assumptions, *(d for d in known.drawn if d.split(" (")[0] not in asteroid.assumptions))
+        ),
+        "forces": "; ".join(passage.encounter.forces)
+        if passage.encounter
+        else "bound on the tide of all bodies",
+        **{f"semi_axis_{x}": float(a) for x, a in zip("abc", known.axes[0], strict=True)},
+        "density": float(known.rho[0]),
+        "spin_period": float(known.period[0]) / 3600.0,
+        "samples": 0,
+        "samples_dynamic": 0,
+    }
+
+
+def sampled_row(row: Row, orbits: Spread, draw: Draws, result: Judged) -> Row:
+    """The row of the catalogue body with what happens to the samples."""
+    counts = Counter(result.verdict)
+    judged = len(draw.rho) - counts[""]
+    stands = judged - counts[Verdict.NOT_IN_EQUILIBRIUM]
+    yielded = sum(counts[v] for v in YIELDED)
+    low, high = wilson(yielded, stands)
+    sigma = orbits.sigma
+    if orbits.clones is not None and np.isnan(sigma):
+        sigma = orbits.clones.sigma(result.distance)
+    row = row | {
+        "samples": judged,
+        "samples_dynamic": int(result.dynamic.sum()),
+        **{share_of(v): counts[v] / judged if judged else np.nan for v in VERDICTS},
+        "p_yield": yielded / stands if stands else np.nan,
+        "p_yield_low": low,
+        "p_yield_high": high,
+        "distance_sigma": sigma / 1000.0,
+        "contributors": contributors(inputs(draw) | {"distance": result.distance}, result.margin),
+        "drawn": "; ".join((*draw.drawn, *(("orbit",) if orbits.clones else ()))),
+        "assumed": "; ".join(filter(None, (row["assumed"], orbits.note))),
+    }
+    failures = [e for e in result.error if e]
+    if failures and not row["error"]:
+        row["error"] = f"{len(failures)} samples: {failures[0]}"
+    return row
+
+
+def _rise(most: float, rest: float) -> float:
+    """What a passage adds to the mobilised friction; inf beyond any friction, nan if rest needs that, too."""
+    return most - rest if np.isfinite(rest) else np.nan
+
+
+def sample_rows(passage: Passage, attitudes: Attitudes, result: Judged) -> Iterator[Row]:
+    """Rows of the samples of one encounter."""
+    draw = attitudes.draws
+    for i in range(len(draw.rho)):
+        pole = attitudes.pole(i)
+        yield {
+            "asteroid": passage.asteroid.name,
+            "planet": passage.planet,
+            "jd_tdb": float(passage.time.tdb.jd),
+            "sample": i,
+            "distance": float(result.distance[i]) / AU,
+            **{f"semi_axis_{x}": float(a) for x, a in zip("abc", draw.axes[i], strict=True)},
+            "density": float(draw.rho[i]),
+            "spin_period": float(draw.period[i]) / 3600.0,
+            "friction_angle": float(np.rad2deg(draw.phi[i])),
+            "cohesion": float(draw.cohesion[i]),
+            **{f"pole_{x}": float(n) for x, n in zip("xyz", pole, strict=True)},
+            "angle": 360.0 * float(attitudes.uniform[i, 2]),
+            "phase": float(draw.phase[i]),
+            "verdict": str(result.verdict[i]),
+            "margin": float(np.rad2deg(result.margin[i])),
+            "decided_by": "dynamics" if result.dynamic[i] else "bound",
+            "error": result.error[i],
+        }
+
+
+def _head(asteroid: Asteroid, settings: Settings) -> Row:
+    return {
+        "asteroid": asteroid.name,
+        "number": -1 if asteroid.number is None else asteroid.number,
+        "friction_angle": float(np.rad2deg(settings.material.phi)),
+        "cohesion": settings.material.c_pa,
+        "yield_surface": settings.material.yield_surface,
+        "seed": settings.seed,
+        "orbit": asteroid.row.get("orbit_solution", ""),
+        "catalogue": asteroid.file,
+        "ephemeris": ephemeris().name,
+        "version": __version__,
+    }

@@ -1,0 +1,234 @@
+"""Verdicts on many bodies in one passage: by the bound where it decides, by the dynamics elsewhere."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import astropy.units as u
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import rankdata
+
+from flybystab.body.body import Material
+from flybystab.core.ellipsoid.yield_bound import INTACT, UNDECIDED, quick_margins
+from flybystab.encounter.attitude import periapsis_axes
+from flybystab.errors import FlybystabError
+from flybystab.flybys.flyby import LOOSER
+from flybystab.flybys.flyby_many import flyby_many
+from flybystab.flybys.verdict import Verdict
+from flybystab.screening.draws import Attitudes, Draws
+from flybystab.screening.encounters import Passage
+
+Array = NDArray[np.float64]
+
+
+def _quick(draw: Draws, code: int, size: tuple[float, float]) -> tuple[Array, NDArray[np.int64]]:
+    n = len(draw.rho)
+    friction, verdict = np.full((n, 2), np.inf), np.zeros(n, dtype=np.int64)
+    quick_margins(
+        np.ascontiguousarray(draw.axes),
+        draw.rho,
+        np.ascontiguousarray(draw.omega),
+        draw.phi,
+        draw.cohesion,
+        code,
+        *size,
+        friction,
+        verdict,
+    )
+    return friction, verdict
+
+
+@dataclass
+class Judged:
+    """Verdicts on the samples of one passage.
+
+    Attributes
+    ----------
+    verdict : list of str
+        Empty where there is none.
+    margin, rest : ndarray
+        Friction angle of the material less the one mobilised in the passage; the one mobilised far from it, rad.
+    dynamic : ndarray of bool
+        Decided by the dynamics, not by the bound.
+    error : list of str
+        Why there is no verdict.
+    distance : ndarray
+        Of the passage, m.
+    numerical : float
+        Numerical error of the first mobilised angle, deg, where it was measured.
+    """
+
+    verdict: list[str]
+    margin: Array
+    rest: Array
+    dynamic: NDArray[np.bool_]
+    error: list[str]
+    distance: Array
+    numerical: float = np.nan
+
+    @classmethod
+    def joined(cls, parts: Sequence[Judged]) -> Judged:
+        """The samples of all parts, in their order."""
+        return cls(
+            [v for p in parts for v in p.verdict],
+            np.concatenate([p.margin for p in parts]),
+            np.concatenate([p.rest for p in parts]),
+            np.concatenate([p.dynamic for p in parts]),
+            [e for p in parts for e in p.error],
+            np.concatenate([p.distance for p in parts]),
+        )
+
+    @classmethod
+    def failed(cls, error: str, distance: float) -> Judged:
+        """One sample that could not be judged."""
+        nothing = np.full(1, np.nan)
+        return cls([""], nothing, nothing.copy(), np.zeros(1, dtype=bool), [error], np.full(1, distance))
+
+    def stored(self) -> dict[str, Any]:
+        """As what JSON holds; no digit is lost."""
+        arrays = {name: getattr(self, name).tolist() for name in ("margin", "rest", "dynamic", "distance")}
+        return {"verdict": [str(v) for v in self.verdict], "error": self.error, **arrays}
+
+    @classmethod
+    def restored(cls, stored: Mapping[str, Any]) -> Judged:
+        """From what `stored` gave."""
+        margin, rest, distance = (np.array(stored[n], dtype=float) for n in ("margin", "rest", "distance"))
+        dynamic = np.array(stored["dynamic"], dtype=bool)
+        return cls(list(stored["verdict"]), margin, rest, dynamic, list(stored["error"]), distance)
+
+
+def judge(
+    passage: Passage,
+    draw: Draws,
+    attitudes: Attitudes,
+    material: Material,
+    *,
+    tolerance: float = 1e-7,
+    quick: bool = True,
+    sharp: float = np.inf,
+    measure: bool = False,
+) -> Judged:
+    """Verdicts on bodies in one passage: by the bound where it decides, else by the dynamics.
+
+    Parameters
+    ----------
+    passage : Passage
+    draw : Draws
+    attitudes : Attitudes
+        Of the same samples.
+    material : Material
+        Yield surface, dilatancy and brittleness; friction and cohesion are those of the draw.
+    quick : bool
+        Whether the bound may decide.
+    sharp : float
+        Follow a body that the bound decides all the same if its bound on the mobilised friction angle exceeds
+        the angle mobilised at rest by more than this, rad: for a margin instead of a lower limit to it.
+    measure : bool
+        Measure the numerical error of the first body by a run with a larger step tolerance.
+    """
+    n = len(draw.rho)
+    code = material.surface_code
+    friction, decided = _quick(draw, code, passage.bounds())
+    if not quick:
+        decided[:] = UNDECIDED
+    decided[(decided == INTACT) & (friction[:, 1] > friction[:, 0] + sharp)] = UNDECIDED
+    failure = ""
+    if np.any(decided == UNDECIDED):
+        try:
+            encounter = passage.meet()
+        except FlybystabError as error:
+            failure = f"{type(error).__name__}: {error}"
+        else:
+            if quick and not encounter.impact:
+                close, sharper = _quick(draw, code, passage.close_bounds())
+                fresh = (decided == UNDECIDED) & (sharper != UNDECIDED)
+                fresh &= (sharper != INTACT) | (close[:, 1] <= close[:, 0] + sharp)
+                fresh &= draw.axes[:, 0] <= encounter.height  # clear of the ground at any attitude
+                friction[fresh], decided[fresh] = close[fresh], sharper[fresh]
+    dynamic = decided == UNDECIDED
+    distance = np.full(n, passage.distance)
+    out = Judged([""] * n, np.full(n, np.nan), friction[:, 0].copy(), dynamic, [""] * n, distance)
+    for i in (int(k) for k in np.flatnonzero(~dynamic)):
+        intact = decided[i] == INTACT
+        out.verdict[i] = Verdict.INTACT if intact else Verdict.NOT_IN_EQUILIBRIUM
+        out.margin[i] = draw.phi[i] - friction[i, 1 if intact else 0]
+    todo = [int(k) for k in np.flatnonzero(dynamic)]
+    if todo and failure:
+        for i in todo:
+            out.error[i] = failure
+    elif todo:
+        encounter = passage.meet()
+        frame = periapsis_axes(encounter)
+        bodies = [draw.body(i, material) for i in todo]
+        turns = [frame @ attitudes.matrix(i) for i in todo]
+        table = flyby_many(bodies, [encounter] * len(todo), turns, tolerance=tolerance, workers=1)
+        for k, i in enumerate(todo):
+            out.error[i] = str(table.failure[k])
+            out.verdict[i] = "" if out.error[i] else str(table.verdict[k])
+            out.margin[i] = np.radians(table.margin[k].to_value(u.deg))
+        if measure and dynamic[0] and not out.error[0]:
+            looser = flyby_many(bodies[:1], [encounter], turns[:1], tolerance=LOOSER * tolerance, workers=1)
+            pair = [t.max_required_friction_angle[0].to_value(u.deg) for t in (looser, table)]
+            out.numerical = 0.0 if pair[0] == pair[1] else float(abs(pair[0] - pair[1]))
+    return out
+
+
+def judge_each(
+    passages: Sequence[Passage],
+    draw: Draws,
+    attitudes: Attitudes,
+    material: Material,
+    *,
+    tolerance: float = 1e-7,
+) -> Judged:
+    """Verdicts on bodies, each in a passage of its own (arguments as of :func:`judge`)."""
+    return Judged.joined(
+        [
+            judge(p, draw.part(i, i + 1), attitudes.part(i, i + 1), material, tolerance=tolerance)
+            for i, p in enumerate(passages)
+        ]
+    )
+
+
+def wilson(successes: int, trials: int, z: float = 1.959964) -> tuple[float, float]:
+    """Wilson score interval of a probability; (0, 1) without trials."""
+    if trials == 0:
+        return 0.0, 1.0
+    p = successes / trials
+    centre = p + z * z / (2 * trials)
+    half = z * np.sqrt(p * (1 - p) / trials + z * z / (4 * trials * trials))
+    scale = 1 + z * z / trials
+    # Without rounding at the ends: no success has the lower limit zero.
+    low = 0.0 if successes == 0 else (centre - half) / scale
+    return low, 1.0 if successes == trials else (centre + half) / scale
+
+
+def contributors(inputs: dict[str, Array], outcome: Array, most: int = 3) -> str:
+    """Inputs whose ranks follow the outcome most, with Spearman's rank correlation."""
+    good = np.isfinite(outcome)
+    if good.sum() < 8 or np.ptp(outcome[good]) == 0.0:
+        return ""
+    ranks = rankdata(outcome[good])
+    found = []
+    for name, values in inputs.items():
+        x = values[good]
+        if np.ptp(x) > 1e-12 * np.abs(x).max():
+            found.append((float(np.corrcoef(rankdata(x), ranks)[0, 1]), name))
+    found.sort(key=lambda f: -abs(f[0]))
+    return ", ".join(f"{name} {rho:+.2f}" for rho, name in found[:most])
+
+
+def inputs(draw: Draws) -> dict[str, Array]:
+    """The drawn inputs by name."""
+    return {
+        "friction angle": draw.phi,
+        "cohesion": draw.cohesion,
+        "density": draw.rho,
+        "size": np.cbrt(np.prod(draw.axes, axis=1)),
+        "b/a": draw.axes[:, 1] / draw.axes[:, 0],
+        "c/b": draw.axes[:, 2] / draw.axes[:, 1],
+        "spin period": draw.period,
+    }

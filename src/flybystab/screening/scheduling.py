@@ -1,0 +1,185 @@
+"""Work of a screening on the workers of an executor: what is sent next, and what has come back."""
+
+from __future__ import annotations
+
+import os
+from collections import deque
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any, NamedTuple, Protocol
+
+from flybystab.catalogues.catalogue import Asteroid
+from flybystab.errors import WorkersLost
+from flybystab.screening.encounters import Finder
+from flybystab.screening.sample_verdicts import Judged
+from flybystab.screening.settings import Settings
+from flybystab.screening.tasks import Begun, Part, Rows, begin, joined
+
+
+def _begin(
+    asteroids: list[Asteroid], settings: Settings, finder: Finder, block: int
+) -> list[list[Rows | Begun]]:
+    return [begin(a, settings, finder, block) for a in asteroids]
+
+
+def _judge(part: Part, settings: Settings) -> Judged:
+    return part.judged(settings)
+
+
+@dataclass(eq=False)
+class _Asteroid:
+    """An asteroid in work: its passages, how many of them are not done, and the samples that those began with."""
+
+    position: int
+    work: list[Rows | Begun]
+    open: int
+    samples: int
+    done: int = 0
+
+
+class _Piece(NamedTuple):
+    """Where the answer of a call for a part belongs."""
+
+    asteroid: _Asteroid
+    number: int
+    passage: Begun
+    first: int
+
+
+class Parts(Protocol):
+    """Keeps the parts of asteroids that take long."""
+
+    def add(self, asteroid: int, passage: int, first: int, judged: Judged) -> None:
+        """Keep a part: samples from `first` on of one of the asteroid's passages."""
+
+    def of(self, asteroid: int) -> Sequence[Mapping[str, Any]]:
+        """Parts of an asteroid that were kept before, with ``passage``, ``first`` and what `Judged.stored` gave."""
+
+
+class Here(Executor):
+    """Computes at once, in the caller."""
+
+    _max_workers = 1
+
+    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+        """The answer, in a future that is done."""
+        future: Future[Any] = Future()
+        try:
+            future.set_result(fn(*args, **kwargs))
+        except Exception as error:
+            future.set_exception(error)
+        return future
+
+
+def scheduled(
+    asteroids: Sequence[Asteroid],
+    todo: Iterable[int],
+    settings: Settings,
+    finder: Finder,
+    executor: Executor,
+    *,
+    chunk: int,
+    window: int,
+    block: int,
+    report: Callable[[float], None] | None = None,
+    parts: Parts | None = None,
+) -> Iterator[tuple[int, Rows]]:
+    """Rows of the asteroids at the positions `todo`, as they are done: (position, rows).
+
+    Parts of asteroids that are begun go before new asteroids, so that few are open at a time.
+
+    Parameters
+    ----------
+    chunk : int
+        Asteroids in one call of a worker.
+    window : int
+        Calls in flight at a time: memory does not grow with the length of the list.
+    block : int
+        Samples by the dynamics in one part (:func:`flybystab.screening.tasks.begun`).
+    report : callable, optional
+        Called after every part with what is done of the asteroids in work, as a number of asteroids.
+    parts : Parts, optional
+        Keeps parts that are done, and has those of an earlier run.
+
+    Raises
+    ------
+    WorkersLost
+        With the names of the asteroids in work.
+    """
+    positions = iter(todo)
+    waiting: deque[Iterator[tuple[_Piece, Part]]] = deque()
+    calls: dict[Future[Any], list[int] | _Piece] = {}
+    begun: dict[int, float] = {}
+
+    def send() -> bool:
+        """Send one call; False if there is nothing to send."""
+        while waiting:
+            if (found := next(waiting[0], None)) is not None:
+                piece, part = found
+                calls[executor.submit(_judge, part, settings)] = piece
+                return True
+            waiting.popleft()
+        if chosen := list(islice(positions, chunk)):
+            future = executor.submit(_begin, [asteroids[i] for i in chosen], settings, finder, block)
+            calls[future] = chosen
+        return bool(chosen)
+
+    try:
+        while True:
+            while len(calls) < window and send():
+                pass
+            if not calls:
+                return
+            finished, _ = wait(calls, return_when=FIRST_COMPLETED)
+            for future in finished:
+                call = calls.pop(future)
+                try:
+                    answer = future.result()
+                except (BrokenExecutor, CancelledError) as error:
+                    names = ", ".join(asteroids[i].name for i in _positions(call))
+                    raise WorkersLost(f"workers died or went away ({error}); in work: {names}") from None
+                if isinstance(call, _Piece):
+                    call.passage.take(call.first, answer)
+                    asteroid = call.asteroid
+                    if parts is not None:
+                        parts.add(asteroid.position, call.number, call.first, answer)
+                    asteroid.open -= not call.passage.left
+                    asteroid.done += len(answer.verdict)
+                    begun[asteroid.position] = asteroid.done / asteroid.samples
+                    if not asteroid.open:
+                        del begun[asteroid.position]
+                        yield asteroid.position, joined(asteroid.work, settings)
+                    elif report is not None:
+                        report(sum(begun.values()))
+                    continue
+                for i, work in zip(call, answer, strict=True):
+                    for part in () if parts is None else parts.of(i):
+                        found = work[part["passage"]] if part["passage"] < len(work) else None
+                        if isinstance(found, Begun):
+                            found.take_stored([part])
+                    left = [(n, w) for n, w in enumerate(work) if isinstance(w, Begun) and w.left]
+                    if left:
+                        samples = sum(w.left for _, w in left)
+                        waiting.append(_pieces(_Asteroid(i, work, len(left), samples), left))
+                    else:
+                        yield i, joined(work, settings)
+    finally:
+        for future in calls:
+            future.cancel()
+
+
+def _pieces(asteroid: _Asteroid, left: Sequence[tuple[int, Begun]]) -> Iterator[tuple[_Piece, Part]]:
+    for number, passage in left:
+        for first, part in list(passage.parts()):
+            yield _Piece(asteroid, number, passage, first), part
+
+
+def _positions(call: list[int] | _Piece) -> list[int]:
+    return [call.asteroid.position] if isinstance(call, _Piece) else call
+
+
+def window_of(executor: Executor) -> int:
+    """Calls in flight that keep all workers busy."""
+    return 4 * int(getattr(executor, "_max_workers", 0) or os.cpu_count() or 1)

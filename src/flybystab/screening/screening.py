@@ -1,0 +1,328 @@
+"""Many bodies through many encounters: which passages could reshape which asteroids, and how likely.
+
+Each asteroid is one task (:mod:`flybystab.screening.tasks`). Its encounters are found; at each one the catalogue body
+and the samples of :mod:`flybystab.screening.priors` meet the tide. What the bound of
+:mod:`flybystab.core.ellipsoid.yield_bound`
+decides is decided by it, the rest by the dynamics (:mod:`flybystab.screening.sample_verdicts`), split over the
+workers where
+there is much of it. Tasks share nothing, and their random numbers depend on the seed, the asteroid and the sample
+only, so that any executor gives the same rows.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import time as clock
+from collections import Counter
+from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from concurrent.futures import Executor
+from contextlib import AbstractContextManager, contextmanager
+from pathlib import Path
+from typing import Any
+
+import astropy.units as u
+from astropy.table import QTable
+from astropy.time import Time
+from astropy.units import Quantity
+
+from flybystab._version import __version__
+from flybystab.body.body import Material
+from flybystab.catalogues.catalogue import Asteroid
+from flybystab.errors import InvalidInput, OutputFailed
+from flybystab.orbit.ephemeris import ephemeris
+from flybystab.screening.columns import COLUMNS, SAMPLE_COLUMNS
+from flybystab.screening.encounters import Finder, passages
+from flybystab.screening.journal import Journal
+from flybystab.screening.outputs import Outputs
+from flybystab.screening.priors import Population
+from flybystab.screening.progress import Progress
+from flybystab.screening.result_rows import Row
+from flybystab.screening.results import Column, table_of
+from flybystab.screening.sample_verdicts import Judged
+from flybystab.screening.scheduling import Here, Parts, scheduled, window_of
+from flybystab.screening.selection import listed
+from flybystab.screening.settings import Settings, settings
+from flybystab.screening.table_files import check_output
+from flybystab.screening.tasks import Rows, block_of
+
+
+class Screening:
+    """A screening that can be run, stopped and taken up again.
+
+    Parameters
+    ----------
+    asteroids : sequence of Asteroid
+    settings : Settings
+    finder : callable
+        Finds the passages of an asteroid; those of its orbit by default.
+    """
+
+    def __init__(self, asteroids: Sequence[Asteroid], settings: Settings, finder: Finder = passages) -> None:
+        self.asteroids = tuple(asteroids)
+        self.settings = settings
+        self.finder = finder
+
+    def meta(self, *, complete: bool = True) -> dict[str, Any]:
+        """Provenance of the table."""
+        files = sorted({a.file for a in self.asteroids})
+        return {
+            "title": "encounters of asteroids and what they do to rubble piles",
+            "time_scale": "TDB",
+            "frame": "ICRF",
+            "complete": complete,
+            "asteroids": len(self.asteroids),
+            "catalogue": files if len(files) > 1 else (files[0] if files else ""),
+            "ephemeris": ephemeris().name,
+            "settings": self.settings.stated(),
+            "nominal": "catalogue values and the material given; unknown poles and angles are drawn",
+        }
+
+    def fingerprint(self) -> dict[str, Any]:
+        """What must agree for two runs to share a journal."""
+        digest = hashlib.sha256()
+        for a in self.asteroids:
+            digest.update(json.dumps(sorted(a.row.items())).encode())
+            if a.covariance is not None:
+                digest.update(a.covariance.values.tobytes() + a.covariance.matrix.tobytes())
+        settings = json.dumps(self.settings.stated() | {"ephemeris": ephemeris().name}, sort_keys=True)
+        digest.update(settings.encode())
+        return {
+            "flybystab": __version__,
+            "run": digest.hexdigest(),
+            "samples": self.settings.keep_samples,
+            "settings": self.settings.stated() | {"asteroids": len(self.asteroids)},
+        }
+
+    def results(
+        self,
+        executor: Executor | None = None,
+        *,
+        skip: Container[int] = (),
+        chunk: int = 1,
+        window: int | None = None,
+        block: int | None = None,
+        report: Callable[[float], None] | None = None,
+        parts: Parts | None = None,
+    ) -> Iterator[tuple[int, Rows]]:
+        """Results of the asteroids that are not in `skip`, as they are done: (position, result).
+
+        Parameters
+        ----------
+        executor : concurrent.futures.Executor, optional
+            Anything with ``submit``; without it, here.
+        chunk : int
+            Asteroids in one call of a worker.
+        window : int, optional
+            Calls in flight at a time; four a worker by default.
+        block : int, optional
+            Samples by the dynamics in one call of a worker. The rows do not depend on it.
+        report : callable, optional
+            Called with what is done of the asteroids in work, as a number of asteroids.
+        parts : Parts, optional
+            Keeps parts of asteroids that take long, and has those of an earlier run.
+        """
+        todo = (i for i in range(len(self.asteroids)) if i not in skip)
+        if executor is None:
+            executor, window = Here(), 1
+        yield from scheduled(
+            self.asteroids,
+            todo,
+            self.settings,
+            self.finder,
+            executor,
+            chunk=chunk,
+            window=window or window_of(executor),
+            block=block or block_of(self.settings.samples),
+            report=report,
+            parts=parts,
+        )
+
+    def run(
+        self,
+        output: str | Path,
+        *,
+        samples_output: str | Path | None = None,
+        overwrite: bool = False,
+        executor: Executor | None = None,
+        chunk: int = 1,
+        progress: Callable[[Progress], None] | None = None,
+    ) -> Progress:
+        """Compute what is missing and write the files.
+
+        Parameters
+        ----------
+        output : str or Path
+            Table of encounters, ``.ecsv`` or ``.parquet``. Its journal stands next to it meanwhile.
+        samples_output : str or Path, optional
+            Table of samples; needs ``keep_samples`` in the settings.
+        overwrite : bool
+            Replace tables of these names that are there already. Those of a run that this one takes up again are
+            replaced in any case.
+
+        Raises
+        ------
+        InvalidInput, MissingExtra
+            The output cannot be written, is there already, or another run's journal is in the way: before anything
+            is computed.
+        WorkersLost
+            Processes of the executor died; the rows so far are in the file and the same call goes on.
+        OutputFailed
+            The disk is full, or gone, in the middle; the rows so far are in the journal and the same call goes on.
+        KeyboardInterrupt
+            After the rows so far have been written into a valid file; the same call goes on later.
+        """
+        out = check_output(output)
+        tables: dict[str, tuple[Path, Mapping[str, Column]]] = {"rows": (out, COLUMNS)}
+        if samples_output is not None:
+            if not self.settings.keep_samples:
+                raise InvalidInput("samples_output", str(samples_output), "keep_samples in the settings")
+            tables["samples"] = check_output(samples_output), SAMPLE_COLUMNS
+        journal_file = out.with_name(out.name + ".journal")
+        if not overwrite and not journal_file.exists():
+            for path, _ in tables.values():
+                if path.exists():
+                    raise InvalidInput(
+                        "output",
+                        str(path),
+                        "a file that is not there yet; --overwrite (overwrite=True) replaces it",
+                    )
+        journal = Journal(journal_file, self.fingerprint())
+        began = clock.monotonic()
+        resumed = journal.count
+        counts: Counter[str] = Counter()
+
+        def count(rows: Iterable[Row]) -> None:
+            counts.update(r.get("verdict") or "error" for r in rows)
+
+        def state(begun: float = 0.0) -> Progress:
+            total, seconds = len(self.asteroids), clock.monotonic() - began
+            return Progress(journal.count, total, resumed, counts.total(), dict(counts), seconds, begun)
+
+        def tell(begun: float = 0.0) -> None:
+            if progress is not None:
+                progress(state(begun))
+
+        for task in journal.tasks():
+            count(task["rows"])
+
+        @contextmanager
+        def writing() -> Iterator[None]:
+            try:
+                yield
+            except OSError as error:
+                raise OutputFailed(
+                    f"{out.parent} cannot be written any more ({error.strerror or error}). {journal.count} of "
+                    f"{len(self.asteroids)} asteroids are safe in {journal.path}: make room and start the same "
+                    "run again"
+                ) from None
+
+        outputs: Outputs | None = None
+        try:
+            with writing():
+                outputs = Outputs(journal, tables, self.meta())
+                outputs.follow()
+            tell()
+            kept = _Kept(journal, writing)
+            for i, result in self.results(executor, skip=journal, chunk=chunk, report=tell, parts=kept):
+                with writing():
+                    journal.add(i, result)
+                    outputs.follow(i, result)
+                count(result["rows"])
+                tell()
+            with writing():
+                outputs.finish()
+        except BaseException:
+            try:
+                if outputs is not None:
+                    with writing():
+                        outputs.so_far(self.meta(complete=False))
+            finally:
+                journal.close()
+            raise
+        journal.close(remove=True)
+        return state()
+
+
+class _Kept:
+    """The parts of asteroids in work, in the journal."""
+
+    def __init__(self, journal: Journal, writing: Callable[[], AbstractContextManager[None]]) -> None:
+        self._journal, self._writing = journal, writing
+
+    def add(self, asteroid: int, passage: int, first: int, judged: Judged) -> None:
+        with self._writing():
+            self._journal.add_part(asteroid, passage, first, judged.stored())
+
+    def of(self, asteroid: int) -> list[dict[str, Any]]:
+        return self._journal.parts(asteroid)
+
+
+def screen(
+    asteroids: str | Path | Sequence[Asteroid | str | int | Path] | None,
+    start: Time | str,
+    stop: Time | str,
+    planets: Sequence[str] = ("earth",),
+    within: Quantity = 0.05 * u.au,
+    samples: int = 1,
+    seed: int = 0,
+    executor: Executor | None = None,
+    material: Material | None = None,
+    population: Population | None = None,
+    *,
+    tolerance: float = 1e-7,
+    progress: Callable[[Progress], None] | None = None,
+    finder: Finder = passages,
+) -> QTable:
+    """What the encounters of asteroids do to them as rubble piles.
+
+    Parameters
+    ----------
+    asteroids : sequence of Asteroid, str or int, or a path or name, or None
+        Asteroids, their names in the embedded catalogue, or paths of catalogue files (:func:`catalogue`); None
+        for the embedded catalogue.
+    start, stop : Time or str
+        Span; text is read as TDB.
+    planets : sequence of str
+        Planets whose encounters count.
+    within : Quantity
+        Largest distance of an encounter.
+    samples : int
+        Above one: draws of the uncertain inputs for every encounter, beside the catalogue's values.
+    seed : int
+        Fixes every draw, for any executor.
+    executor : concurrent.futures.Executor, optional
+        Where the asteroids are computed; here and one by one without it.
+    material : Material, optional
+        Of the catalogue body: 35 deg and no cohesion by default. Samples draw theirs from `population`.
+    population : Population, optional
+        Distributions of what is not known.
+    tolerance : float
+        Step tolerance of the dynamics.
+    progress : callable, optional
+        Called with a :class:`Progress` after every asteroid.
+    finder : callable
+        Finds the passages of an asteroid, instead of its orbit.
+
+    Returns
+    -------
+    QTable
+        One row per encounter (:data:`COLUMNS`), by asteroid and time; provenance in ``meta``.
+
+    Notes
+    -----
+    For long runs use :meth:`Screening.run`, which writes to a file and can be taken up again.
+    """
+    chosen = listed(asteroids)
+    wanted = settings(start, stop, planets, within, samples, seed, material, population, tolerance=tolerance)
+    run = Screening(chosen, wanted, finder)
+    began = clock.monotonic()
+    found: dict[int, list[dict[str, Any]]] = {}
+    counts: Counter[str] = Counter()
+    for i, result in run.results(executor):
+        found[i] = result["rows"]
+        counts.update(r.get("verdict") or "error" for r in result["rows"])
+        if progress is not None:
+            rows = sum(counts.values())
+            progress(Progress(len(found), len(chosen), 0, rows, dict(counts), clock.monotonic() - began))
+    return table_of((r for i in sorted(found) for r in found[i]), COLUMNS, run.meta())

@@ -1,0 +1,118 @@
+"""Settings of a screening: what it computes, apart from the list of asteroids."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import astropy.units as u
+import numpy as np
+from astropy.time import Time
+from astropy.units import Quantity
+
+from flybystab._version import __version__
+from flybystab.body.body import Material
+from flybystab.constants import AU
+from flybystab.errors import InvalidInput
+from flybystab.orbit.ephemeris import ephemeris
+from flybystab.orbit.planets import planet
+from flybystab.screening.priors import Population
+from flybystab.units import to_si, whole
+
+
+@dataclass(frozen=True)
+class Settings:
+    """What a screening computes, apart from the list of asteroids.
+
+    Attributes
+    ----------
+    start, stop : float
+        Julian dates, TDB.
+    planets : tuple of str
+    within : float
+        Largest distance, m.
+    samples, seed : int
+    material : Material
+        Of the catalogue body; yield surface and dilatancy also of the samples.
+    population : Population
+    tolerance : float
+        Step tolerance of the dynamics.
+    keep_samples : bool
+        Return the samples, too.
+    """
+
+    start: float
+    stop: float
+    planets: tuple[str, ...]
+    within: float
+    samples: int
+    seed: int
+    material: Material
+    population: Population
+    tolerance: float = 1e-7
+    keep_samples: bool = False
+
+    def stated(self) -> dict[str, Any]:
+        """Everything that fixes the rows, as plain data."""
+        m = self.material
+        return {
+            "start_jd_tdb": self.start,
+            "stop_jd_tdb": self.stop,
+            "planets": list(self.planets),
+            "within_au": self.within / AU,
+            "samples": self.samples,
+            "seed": self.seed,
+            "friction_angle_deg": float(np.rad2deg(m.phi)),
+            "cohesion_Pa": m.c_pa,
+            "yield_surface": m.yield_surface,
+            "dilatancy": m.dilatancy,
+            "brittle": m.brittle,
+            "population": self.population.stated(),
+            "tolerance": self.tolerance,
+            "flybystab": __version__,
+        }
+
+
+def settings(
+    start: Time | str,
+    stop: Time | str,
+    planets: Sequence[str] = ("earth",),
+    within: Quantity = 0.05 * u.au,
+    samples: int = 1,
+    seed: int = 0,
+    material: Material | None = None,
+    population: Population | None = None,
+    *,
+    tolerance: float = 1e-7,
+    keep_samples: bool = False,
+) -> Settings:
+    """Checked settings of a screening (arguments of :func:`flybystab.screen`)."""
+    dates = []
+    for name, date in (("start", start), ("stop", stop)):
+        try:
+            dates.append(float(Time(date, scale="tdb").jd if isinstance(date, str) else date.tdb.jd))
+        except (ValueError, AttributeError, TypeError):
+            raise InvalidInput(
+                name, date, "an astropy Time or an ISO date such as 2029-04-13 (TDB)"
+            ) from None
+    if not dates[0] < dates[1]:
+        raise InvalidInput("stop", stop, f"a date after start = {start}")
+    for name, number, least in (("samples", samples, 1), ("seed", seed, 0)):
+        whole(number, name, least)
+    ephemeris().check(*(Time(d, format="jd", scale="tdb") for d in dates))
+    names = (planets,) if isinstance(planets, str) else tuple(planets)
+    if not names:
+        raise InvalidInput("planets", planets, "at least one planet")
+    return Settings(
+        start=dates[0],
+        stop=dates[1],
+        planets=tuple(planet(p).name for p in names),
+        within=to_si(within, u.m, "within", low=0.0, open_low=True),
+        samples=int(samples),
+        seed=int(seed),
+        material=material or Material(),
+        population=population or Population(),
+        tolerance=tolerance,
+        keep_samples=keep_samples,
+    )

@@ -1,0 +1,52 @@
+"""Tables of encounters as files: ECSV with all columns as they are, or Parquet with one number a column."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import astropy.units as u
+import numpy as np
+from astropy.table import QTable
+from astropy.time import Time
+from astropy.units import Quantity
+
+from flybystab.screening.results import Column
+from flybystab.screening.table_files import check_output, write_rows
+
+
+def write_table(table: QTable, path: str | Path) -> None:
+    """Write a table as its ending says, with units and provenance.
+
+    In Parquet a time becomes text (ISO, TDB) and a vector three columns ``name_x``, ``name_y``, ``name_z``;
+    :func:`flybystab.screening.results.read_results` reads both.
+
+    Raises
+    ------
+    InvalidInput
+        The file cannot be written.
+    MissingExtra
+        A Parquet file without pyarrow.
+    """
+    out = check_output(path)
+    if out.suffix == ".ecsv":
+        table.write(out, format="ascii.ecsv", overwrite=True)
+        return
+    columns: dict[str, Column] = {}
+    values: dict[str, np.ndarray] = {}
+    for name in table.colnames:
+        column = table[name]
+        unit: u.UnitBase | None = None
+        if isinstance(column, Time):
+            column, name = column.tdb.isot, f"{name}_tdb"
+        elif isinstance(column, Quantity):
+            unit = None if column.unit == u.dimensionless_unscaled else column.unit
+            column = column.value
+        array = np.asarray(column)
+        parts = (
+            {name: array} if array.ndim == 1 else {f"{name}_{x}": array[:, k] for k, x in enumerate("xyz")}
+        )
+        kind = {"f": float, "i": int, "b": bool}.get(array.dtype.kind, str)
+        for key, part in parts.items():
+            columns[key], values[key] = Column(kind, unit, ""), part
+    rows = (dict(zip(values, cells, strict=True)) for cells in zip(*values.values(), strict=True))
+    write_rows(rows, out, columns, table.meta)

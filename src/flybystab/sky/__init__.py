@@ -1,1 +1,0 @@
-"""Where the asteroid goes: ephemeris, forces, orbit, encounter."""

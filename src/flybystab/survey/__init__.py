@@ -1,1 +1,0 @@
-"""Many asteroids: the catalogue, screening and its tables."""

@@ -1,0 +1,72 @@
+"""Kernels on disk follow the sources of all that they call."""
+
+import ast
+import os
+import subprocess
+import sys
+import textwrap
+
+from flybystab.core.numerics import kernel_cache
+from flybystab.core.numerics.kernel_cache import ROOT, imports, sources
+
+COMPILED = {key: value for key, value in os.environ.items() if key != "NUMBA_DISABLE_JIT"}
+
+
+def imported(file):
+    """The same by Python's own parser."""
+    names = set()
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            names |= {a.name for a in node.names}
+        elif isinstance(node, ast.ImportFrom) and node.module:
+            names |= {node.module} | {f"{node.module}.{a.name}" for a in node.names}
+    found = {kernel_cache._file(n) for n in names if n.split(".")[0] == ROOT.name}
+    return found - {None}
+
+
+def test_imports_are_those_that_python_reads():
+    # a line of a docstring may look like an import: one file too many does no harm
+    for file in ROOT.rglob("*.py"):
+        assert imported(file) <= imports(file), file
+
+
+def test_sources_reach_through_other_files():
+    found = {f.name for f in sources(ROOT / "core" / "dynamics" / "run.py")}
+    assert {"run.py", "potential.py", "constants.py", "jit.py"} <= found
+    assert not any("cli" in f.parts for f in sources(ROOT / "core" / "dynamics" / "run.py"))
+
+
+def test_a_changed_callee_is_seen(tmp_path):
+    """A caller that did not change answers with the new code of what it calls, and is cached where nothing changed."""
+    package = tmp_path / "flybystab"
+    (package / "core" / "numerics").mkdir(parents=True)
+    for name in ("core/numerics/kernel_cache.py", "core/numerics/jit.py"):
+        (package / name).write_bytes((ROOT / name).read_bytes())
+    (package / "__init__.py").touch()
+    (package / "core/__init__.py").touch()
+    (package / "core/numerics/__init__.py").touch()
+    (package / "values.py").write_text("FACTOR = 2.0\n")
+    (package / "inner.py").write_text(
+        "from flybystab.core.numerics.jit import kernel\nfrom flybystab.values import FACTOR\n\n"
+        "@kernel\ndef inner(x):\n    return FACTOR * x\n"
+    )
+    (package / "outer.py").write_text(
+        "from flybystab.core.numerics.jit import kernel\nfrom flybystab.inner import inner\n\n"
+        "@kernel\ndef outer(x):\n    return inner(x) + 1.0\n"
+    )
+    script = textwrap.dedent("""
+        from flybystab.outer import outer
+        print(outer(10.0), sum(outer.stats.cache_hits.values()))
+    """)
+
+    def run():
+        done = subprocess.run(
+            [sys.executable, "-c", script], capture_output=True, text=True, cwd=tmp_path, env=COMPILED
+        )
+        assert done.returncode == 0, done.stderr
+        return done.stdout.split()
+
+    assert run() == ["21.0", "0"]
+    assert run() == ["21.0", "1"]
+    (package / "values.py").write_text("FACTOR = 3.0\n")
+    assert run() == ["31.0", "0"]

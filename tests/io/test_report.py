@@ -1,0 +1,102 @@
+"""The report page: complete, self-contained, readable on a phone and in print."""
+
+import re
+import shutil
+import subprocess
+from html.parser import HTMLParser
+from pathlib import Path
+
+import pytest
+
+from flybystab.cli.main import main
+
+CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
+VOID = {"meta", "link", "img", "br"}
+
+
+class Page(HTMLParser):
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.links, self.images, self.words = [], [], [], []
+        self.feed(text)
+
+    def handle_starttag(self, tag, attributes):
+        found = dict(attributes)
+        self.links += [v for k, v in found.items() if k in ("src", "href", "srcset", "data")]
+        if tag == "img":
+            self.images.append(found)
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        self.words.append(data)
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    path = tmp_path_factory.mktemp("report") / "apophis report.html"
+    words = ["report", "Apophis", "--date", "2029-04-13", "--attitudes", "8", "--samples", "40"]
+    assert main([*words, "--output", str(path)]) == 0
+    return path
+
+
+def test_everything_is_in_it(page):
+    text = page.read_text()
+    parsed = Page(text)
+    assert parsed.open == []
+    said = " ".join(parsed.words)
+    for needed in (
+        "INTACT",
+        "2029-04-13 21:46:12 TDB",
+        "38,011.",
+        "JPL 220",
+        "assumed",
+        "8 of 8 sampled attitudes",
+        "95 % interval",
+        "Earth J2",
+        "not in it",
+        "flybystab report Apophis --date 2029-04-13",
+        "rebound ",
+    ):
+        assert needed in said, needed
+
+
+def test_nothing_is_loaded_from_elsewhere(page):
+    parsed = Page(page.read_text())
+    assert len(parsed.images) == 3
+    assert all(image["alt"] for image in parsed.images)
+    assert all(link.startswith("data:") for link in parsed.links)
+    assert "url(" not in re.search("<style>.*</style>", page.read_text(), re.S).group()
+
+
+def chromium(*arguments):
+    command = [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", *arguments]
+    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")
+def test_in_a_browser(page, tmp_path):
+    # what the page measures of itself at phone width, written where --dump-dom shows it
+    probe = (
+        "<script>addEventListener('load', () => { document.body.dataset.probe = "
+        "[document.documentElement.scrollWidth, innerWidth, "
+        "[...document.images].filter(i => !i.naturalWidth).length].join(' ') })</script></body>"
+    )
+    copy = tmp_path / "probe.html"
+    copy.write_text(page.read_text().replace("</body>", probe))
+    done = chromium("--window-size=500,900", "--dump-dom", copy.as_uri())
+    assert "CONSOLE" not in done.stderr
+    width, window, broken = map(int, re.search(r'data-probe="(\d+) (\d+) (\d+)"', done.stdout).groups())
+    assert width <= window
+    assert broken == 0
+    pdf = tmp_path / "report.pdf"
+    chromium(f"--print-to-pdf={pdf}", page.as_uri())
+    assert Path(pdf).read_bytes().startswith(b"%PDF")
+
+
+def test_the_place_is_checked_first(capsys):
+    assert main(["report", "Apophis", "--output", "report.doc"]) == 2
+    assert "ends in .html" in capsys.readouterr().err

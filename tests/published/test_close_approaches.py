@@ -1,0 +1,75 @@
+"""Close approaches of 2020 against JPL's list, with the orbits of the same solutions."""
+
+import csv
+import gzip
+
+import astropy.units as u
+import numpy as np
+import pytest
+from astropy.time import Time
+from reference import need_ephemeris
+
+from flybystab.encounter.encounter import Encounter
+from flybystab.orbit.orbit import Orbit
+from flybystab.orbit.search.encounter_finder import find_encounters
+
+#: Passages so slow that the Sun decides when they are closest.
+SLOW = ("2020 MB", "2008 EA9", "2020 PC", "2020 BO5", "2019 XN1", "2020 AU")
+
+
+@pytest.fixture(scope="module")
+def events(shared):
+    with gzip.open(shared / "cad_earth_2020_jan_jun.csv.gz", "rt") as file:
+        rows = [r for r in csv.DictReader(file) if float(r["dist"]) < 0.2]
+    tight = [r for r in rows if float(r["dist_max"]) - float(r["dist"]) < 1e-4]
+    return tight[::12] + [r for r in rows if r["des"] in SLOW]
+
+
+@pytest.fixture(scope="module")
+def orbits(shared, events):
+    want = {e["des"] for e in events}
+    out = {}
+    unit = u.au / u.d**2
+    with gzip.open(shared / "nea_sbdb_fullprec_2020-09.csv.gz", "rt") as file:
+        for row in csv.DictReader(file):
+            if row["pdes"] in want:
+                push = {k: float(row[k] or 0) * unit for k in ("A1", "A2", "A3")}
+                out[row["pdes"]] = Orbit.from_elements(
+                    Time(float(row["epoch"]), format="jd", scale="tdb"),
+                    float(row["a"]) * u.au,
+                    float(row["e"]),
+                    *(float(row[k]) * u.deg for k in ("i", "om", "w", "ma")),
+                    **push,
+                    name=row["pdes"],
+                )
+    return out
+
+
+@pytest.mark.parametrize(("name", "median"), [("de421", 0.25), ("de440", 0.15)])
+def test_none_is_missed_and_distances_are_jpls(events, orbits, name, median):
+    need_ephemeris(name)
+    known = [e for e in events if e["des"] in orbits]
+    assert len(known) > 60
+    names = sorted(orbits)
+    span = Time(2458840.5, format="jd", scale="tdb"), Time(2459040.5, format="jd", scale="tdb")
+    table = find_encounters([orbits[n] for n in names], *span, within=0.25 * u.au, ephemeris=name)
+    jd = np.array(table["time"].jd)
+    errors = []
+    for event in known:
+        rows = np.flatnonzero(np.array(table["asteroid"]) == event["des"])
+        best = rows[np.argmin(np.abs(jd[rows] - float(event["jd"])))]
+        if event["des"] in SLOW:
+            assert abs(jd[best] - float(event["jd"])) < 60 / 86400
+        errors.append((table["distance"][best] - float(event["dist"]) * u.au).to_value(u.km))
+    size = np.abs(errors)
+    assert np.median(size) < median
+    assert np.percentile(size, 90) < 0.6
+
+
+def test_slow_passage_by_rebound(events, orbits):
+    """The root is found where the two-body slope of r.v is far off."""
+    event = next(e for e in events if e["des"] == "2020 MB")
+    near = Time(float(event["jd"]), format="jd", scale="tdb")
+    enc = Encounter.from_orbit(orbits["2020 MB"], "earth", near, ephemeris="de421")
+    assert abs(enc.time.jd - float(event["jd"])) < 60 / 86400
+    assert abs(enc.distance.to_value(u.au) - float(event["dist"])) < 1e-8

@@ -1,0 +1,186 @@
+"""Many workers: the same rows from processes and from dask, with kills in the middle."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections import Counter
+from pathlib import Path
+
+import pytest
+from scripted import same, screening, slow, three
+
+from flybystab.errors import InvalidInput, WorkersLost
+from flybystab.screening.executors import workers
+from flybystab.screening.results import read_results
+
+HERE = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture(scope="module")
+def reference(tmp_path_factory):
+    path = tmp_path_factory.mktemp("reference") / "r.ecsv"
+    screening(16, three, samples=3, seed=4).run(path)
+    return read_results(path)
+
+
+def wait_for(condition, seconds=120.0):
+    end = time.monotonic() + seconds
+    while not condition():
+        assert time.monotonic() < end, "waited too long"
+        time.sleep(0.02)
+
+
+def lines(journal):
+    return journal.read_bytes().count(b"\n") if journal.exists() else 0
+
+
+def alive(pid):
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    # killed, and nobody has asked for its status yet
+    return Path(f"/proc/{pid}/stat").read_text().split()[2] != "Z" if Path("/proc").is_dir() else True
+
+
+def test_processes_give_the_same_rows(tmp_path, reference):
+    with workers(2) as pool:
+        screening(16, three, samples=3, seed=4).run(tmp_path / "p.ecsv", executor=pool)
+    same(read_results(tmp_path / "p.ecsv"), reference)
+
+
+def test_dead_process_is_named_and_the_run_goes_on(tmp_path, reference):
+    def kill(state):
+        if state.done == 4:
+            os.kill(next(iter(pool._processes)), signal.SIGKILL)
+
+    run = screening(16, three, samples=3, seed=4)
+    with workers(2) as pool, pytest.raises(WorkersLost, match="in work"):
+        run.run(tmp_path / "p.ecsv", executor=pool, chunk=1, progress=kill)
+    assert not read_results(tmp_path / "p.ecsv").meta["complete"]
+    states = []
+    with workers(1) as pool:
+        run.run(tmp_path / "p.ecsv", executor=pool, progress=states.append)
+    assert states[0].resumed >= 4
+    same(read_results(tmp_path / "p.ecsv"), reference)
+
+
+def test_ctrl_c_leaves_a_valid_file(tmp_path, reference):
+    out, hold = tmp_path / "c.ecsv", tmp_path / "hold"
+    run = subprocess.Popen(
+        [sys.executable, HERE / "scripted.py", out, "2"],
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        env=os.environ | {"HOLD": str(hold)},
+    )
+    wait_for(lambda: lines(tmp_path / "c.ecsv.journal") > 5)
+    os.killpg(run.pid, signal.SIGINT)  # as a terminal does: to all processes
+    hold.touch()
+    _, said = run.communicate(timeout=120)
+    assert run.returncode != 0
+    assert said.count("KeyboardInterrupt") == 1
+    part = read_results(out)
+    assert not part.meta["complete"]
+    assert 0 < len(part) < len(reference)
+    screening(16, slow, samples=3, seed=4).run(out)
+    same(read_results(out), reference)
+
+
+def test_workers_end_with_a_killed_parent(tmp_path):
+    marks = tmp_path / "marks"
+    marks.mkdir()
+    environment = os.environ | {"MARKS": str(marks), "HOLD": str(tmp_path / "never")}
+    run = subprocess.Popen([sys.executable, HERE / "scripted.py", tmp_path / "o.ecsv", "2"], env=environment)
+    wait_for(lambda: lines(tmp_path / "o.ecsv.journal") > 10 and len(list(marks.iterdir())) == 2)
+    pids = [int(f.name) for f in marks.iterdir()]
+    assert run.pid not in pids
+    run.kill()
+    run.wait()
+    wait_for(lambda: not any(map(alive, pids)))
+
+
+def test_workers_are_checked():
+    with pytest.raises(InvalidInput, match="jobs"), workers(0):
+        pass
+    pytest.importorskip("distributed")
+    with pytest.raises(WorkersLost, match="no dask scheduler"), workers(dask="tcp://127.0.0.1:9", timeout=1):
+        pass
+
+
+@pytest.mark.parametrize("suffix", ["ecsv", "parquet"])
+def test_killed_run_resumes_without_losing_or_repeating_a_row(tmp_path, reference, monkeypatch, suffix):
+    if suffix == "parquet":
+        pytest.importorskip("pyarrow")
+    out, marks = tmp_path / f"k.{suffix}", tmp_path / "marks"
+    marks.mkdir()
+    environment = os.environ | {"MARKS": str(marks), "HOLD": str(tmp_path / "never"), "ROW_GROUP": "4"}
+    journal = tmp_path / f"k.{suffix}.journal"
+    run = subprocess.Popen([sys.executable, HERE / "scripted.py", out], env=environment)
+    wait_for(lambda: lines(journal) > 5)
+    run.send_signal(signal.SIGKILL)
+    run.wait()
+    assert not out.exists()
+    assert (tmp_path / f"k.{suffix}.part").stat().st_size > 0  # row groups, or rows, without an end
+    assert 5 <= lines(journal) - 1 <= 10
+    monkeypatch.setenv("MARKS", str(marks))
+    screening(16, slow, samples=3, seed=4).run(out)
+    same(read_results(out), reference)
+    assert [f.name for f in tmp_path.iterdir() if f.is_file()] == [out.name]
+    computed = Counter(line for f in marks.iterdir() for line in f.read_text().split("\n") if line)
+    assert len(computed) == 16
+    # Only the asteroid in work when the run was killed may have been begun twice.
+    assert sum(computed.values()) <= 17
+
+
+@pytest.mark.slow
+def test_dask_with_a_killed_worker_gives_the_same_rows(tmp_path, reference):
+    distributed = pytest.importorskip("distributed")
+    marks, hold = tmp_path / "marks", tmp_path / "hold"
+    marks.mkdir()
+    environment = os.environ | {
+        "MARKS": str(marks),
+        "HOLD": str(hold),
+        "PYTHONPATH": os.pathsep.join([str(HERE), os.environ.get("PYTHONPATH", "")]),
+        "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "10",
+    }
+    python = [sys.executable, "-m"]
+    address = tmp_path / "scheduler.json"
+    quiet = {"env": environment, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+    scheduler = subprocess.Popen(
+        [*python, "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard",
+         "--scheduler-file", address], **quiet,
+    )  # fmt: skip
+    workers = []
+    try:
+        wait_for(address.exists)
+        workers = [
+            subprocess.Popen(
+                [*python, "distributed.cli.dask_worker", "--scheduler-file", address, "--nthreads", "1",
+                 "--no-nanny", "--no-dashboard", "--local-directory", tmp_path / f"w{k}"], **quiet,
+            )
+            for k in range(2)
+        ]  # fmt: skip
+        with distributed.Client(scheduler_file=str(address), timeout=60) as client:
+            client.wait_for_workers(2, timeout=60)
+
+            def kill():
+                wait_for(lambda: lines(tmp_path / "d.ecsv.journal") > 4 and len(list(marks.iterdir())) == 2)
+                workers[0].kill()
+                workers[0].wait()
+                hold.touch()
+
+            killer = threading.Thread(target=kill)
+            killer.start()
+            run = screening(16, slow, samples=3, seed=4)
+            run.run(tmp_path / "d.ecsv", executor=client.get_executor(), chunk=1)
+            killer.join()
+        assert workers[0].poll() is not None
+    finally:
+        for process in (*workers, scheduler):
+            process.kill()
+            process.wait()
+    same(read_results(tmp_path / "d.ecsv"), reference)

@@ -1,0 +1,52 @@
+"""The summary of a result table."""
+
+import astropy.units as u
+import pytest
+from astropy.table import QTable
+
+from flybystab.errors import InvalidInput
+from flybystab.plots.screening import results_figure
+from flybystab.screening.columns import COLUMNS, VERDICTS, share_of
+from flybystab.screening.results import table_of
+from flybystab.screening.summary import summary
+from flybystab.screening.table_files import write_rows
+
+ROWS = [
+    {"asteroid": "calm", "verdict": "INTACT", "margin": 12.0, "p_yield": 0.0, "samples": 10},
+    {"asteroid": "tight", "verdict": "INTACT", "margin": 0.5, "p_yield": 0.0, "samples": 10},
+    {"asteroid": "soft", "verdict": "RESHAPED", "margin": -3.0, "p_yield": 0.4, "samples": 10},
+    {"asteroid": "spun", "verdict": "NOT IN EQUILIBRIUM", "margin": -20.0, "samples": 0},
+    {"asteroid": "lost", "verdict": "", "error": "NotConverged: x"},
+]
+for row, n in zip(ROWS, (0, 5, 10, 0, 0), strict=True):
+    row |= {"contributors": "friction angle +0.99, size -0.10" if row.get("samples") else ""}
+    row |= {"decided_by": "dynamics" if row.get("margin", 9) < 9 else "bound"}
+    row |= {"samples_dynamic": n, "friction_rise": 0.1 * n}
+for k, row in enumerate(ROWS):
+    row |= {"planet": "earth", "time_tdb": "2029-04-13T21:46:00", "distance": 0.001 * (k + 1), "v_inf": 6.0}
+    row |= {share_of(v): float(row["verdict"] == v) for v in VERDICTS}
+
+
+def test_summary_counts_and_ranks(tmp_path):
+    s = summary(table_of(ROWS, COLUMNS, {"complete": False}), closest=2)
+    assert (s.rows, s.failed) == (5, 1)
+    assert s.verdicts == {"INTACT": 2, "RESHAPED": 1, "NOT IN EQUILIBRIUM": 1}
+    assert list(s.closest["asteroid"]) == ["soft", "tight"]
+    assert list(s.reshaped["asteroid"]) == ["soft"]
+    assert [str(n) for n in s.strongest["asteroid"]] == ["soft", "tight"]
+    assert s.dynamic_share == pytest.approx(0.5)
+    assert s.errors == {"NotConverged: x": 1}
+    assert s.contributors == {"friction angle": 3}
+    text = s.text()
+    assert "follows most (passages): friction angle (3)" in text
+    assert "unfinished" in text
+    assert "margin -3.00 deg, 1 deg by the passage, yields in 40 % of the samples" in text
+
+
+def test_summary_of_a_file_and_its_figure(tmp_path):
+    write_rows(ROWS, tmp_path / "x.ecsv", COLUMNS, {"title": "t"})
+    assert summary(tmp_path / "x.ecsv").rows == 5
+    assert results_figure(tmp_path / "x.ecsv", tmp_path / "x.png").read_bytes()[:4] == b"\x89PNG"
+    with pytest.raises(InvalidInput, match="columns"):
+        summary(QTable({"a": [1] * u.m}))
+    assert summary(table_of([], COLUMNS, {})).rows == 0
