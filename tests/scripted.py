@@ -6,6 +6,7 @@ import sys
 import time
 
 import astropy.units as u
+import numpy as np
 from astropy.time import Time
 
 from flybystab.catalogues.catalogue import Asteroid
