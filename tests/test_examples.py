@@ -121,3 +121,8 @@ def test_apophis_slopes():
     # the tilt of gravity on a sphere, (3/2) GM/d^3 over (4/3) pi G rho, is 1.73 deg; the ellipsoid is longer
     assert 1.73 < np.median(largest[1.29]) < 2.5
     assert np.median(largest[1.29]) / np.median(largest[2.2]) == pytest.approx(2.2 / 1.29, rel=0.05)
+
+
+def test_shape_slopes():
+    """Published for shapes with relief at 1.29 g/cm3: up to 4 deg; a sphere 1.73 deg."""
+    assert 1.73 < ran("shape_slopes.py")["largest"] < 4.5

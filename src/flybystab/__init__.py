@@ -25,6 +25,7 @@ _HOME = {
     "Material": "body.body",
     "Orbit": "orbit.orbit",
     "R_earth": "units",
+    "Shape": "body.shape",
     "Verdict": "flybys.verdict",
     "catalogue": "catalogues.catalogue",
     "encounter_distribution": "encounter.distribution",
@@ -48,6 +49,7 @@ __all__ = ["__version__", *_HOME]
 if TYPE_CHECKING:
     from flybystab.body.body import Body, Material
     from flybystab.body.equilibrium import equilibrium
+    from flybystab.body.shape import Shape
     from flybystab.body.stability import stability
     from flybystab.catalogues.asteroid import Asteroid
     from flybystab.catalogues.catalogue import catalogue

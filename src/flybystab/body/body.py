@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
 from difflib import get_close_matches
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import astropy.units as u
 import numpy as np
@@ -14,6 +14,9 @@ from numpy.typing import NDArray
 from flybystab.constants import G
 from flybystab.errors import InvalidInput, UnitMismatch, UnknownName
 from flybystab.units import brief, frozen, to_si
+
+if TYPE_CHECKING:
+    from flybystab.body.shape import Shape
 
 #: Yield surfaces, in the order of their integer codes in :mod:`flybystab.core.material.yield_surface`.
 YIELD_SURFACES = ("drucker-prager", "drucker-prager-extension", "mohr-coulomb", "matsuoka-nakai")
@@ -170,6 +173,27 @@ class Body:
             if isinstance(value, np.ndarray):
                 value.setflags(write=False)
             object.__setattr__(self, name, value)
+
+    @classmethod
+    def from_shape(
+        cls,
+        shape: Shape,
+        *,
+        density: Quantity,
+        spin_period: Quantity | None = None,
+        spin: Quantity | None = None,
+        material: Material | None = None,
+    ) -> Body:
+        """The ellipsoid that stands for a polyhedral shape: its dynamically equivalent one of equal volume.
+
+        Parameters
+        ----------
+        shape : Shape
+            Its principal axes are those of the body, longest first.
+        density, spin_period, spin, material
+            As for a body of given semi-axes.
+        """
+        return cls(shape.ellipsoid(), density, spin_period, spin, material or Material())
 
     @property
     def volume(self) -> Quantity:

@@ -1,0 +1,98 @@
+"""Slopes over the facets of a polyhedral shape, at rest and through an encounter.
+
+On each facet loose material feels ``g = grad U + (K_t - Omega^2 - Omegadot) x``: the gravity of the polyhedron, the
+tide, and the centrifugal and Euler accelerations of the rigid body. The gravity of a rigid body is constant in its own
+frame and is computed once.
+"""
+
+from __future__ import annotations
+
+import astropy.units as u
+import numpy as np
+from astropy.units import Quantity
+from numpy.typing import NDArray
+
+from flybystab.body.body import Body
+from flybystab.body.equilibrium import tide_components
+from flybystab.body.shape import Shape
+from flybystab.body.surface_slope import SlopeChange, SurfaceSlopes
+from flybystab.core.ellipsoid.surface_slope import effective_field
+from flybystab.errors import InvalidInput
+from flybystab.units import to_si
+
+Array = NDArray[np.float64]
+
+
+def shape_slopes(shape: Shape, body: Body, tide: Quantity | None = None) -> SurfaceSlopes:
+    """Slopes over the facets of a shape that rotates as a body does, in an optional tide.
+
+    Parameters
+    ----------
+    shape : Shape
+    body : Body
+        Density and spin, e.g. of :meth:`Body.from_shape`; its axes are the principal axes of the shape.
+    tide : Quantity, shape (3, 3), optional
+        Tidal tensor in the principal frame, s^-2.
+
+    Returns
+    -------
+    SurfaceSlopes
+        At the centroids of the facets.
+    """
+    gravity = _gravity(shape, body)
+    slope = _slopes(shape, gravity, _field(body, body.omega, tide_components(tide)))
+    return SurfaceSlopes(shape.centroids, shape.facet_area, np.rad2deg(slope) * u.deg)
+
+
+def shape_slope_change(shape: Shape, body: Body, spin: Quantity, tide: Quantity) -> SlopeChange:
+    """Slopes over the facets of a rigid shape through an encounter.
+
+    Parameters
+    ----------
+    shape, body
+        As in :func:`shape_slopes`; the spin of the body is not used.
+    spin : Quantity, shape (m, 3)
+        Angular velocity at ``m`` instants, principal frame.
+    tide : Quantity, shape (m, 6)
+        Tidal tensors ``xx, yy, zz, xy, xz, yz`` at the same instants, principal frame, s^-2. The first instant is
+        "before".
+
+    Returns
+    -------
+    SlopeChange
+        At the centroids of the facets.
+    """
+    with u.set_enabled_equivalencies(u.dimensionless_angles()):
+        w = to_si(spin, u.rad / u.s, "spin", shape=None)
+    k = to_si(tide, u.s**-2, "tide", shape=None)
+    if w.ndim != 2 or w.shape[1] != 3 or len(w) < 1:
+        raise InvalidInput("spin", np.shape(w), "shape (m, 3)")
+    if k.shape != (len(w), 6):
+        raise InvalidInput("tide", np.shape(k), f"shape ({len(w)}, 6)")
+    gravity = _gravity(shape, body)
+    before = _slopes(shape, gravity, _field(body, w[0], k[0]))
+    least, greatest = before.copy(), before.copy()
+    for omega, tensor in zip(w[1:], k[1:], strict=True):
+        now = _slopes(shape, gravity, _field(body, omega, tensor))
+        np.minimum(least, now, out=least)
+        np.maximum(greatest, now, out=greatest)
+    degrees = [np.rad2deg(v) * u.deg for v in (before, least, greatest)]
+    return SlopeChange(shape.centroids, shape.facet_area, *degrees)
+
+
+def _gravity(shape: Shape, body: Body) -> Array:
+    return np.asarray(shape.gravity(shape.centroids, body.density)[1].value)
+
+
+def _field(body: Body, omega: Array, tide: Array) -> Array:
+    """Matrix of the tide and the accelerations of the rotating frame, s^-2; no self-gravity."""
+    out = np.empty((3, 3))
+    effective_field(body.axes**2, 0.0, np.ascontiguousarray(omega), np.ascontiguousarray(tide), out)
+    return out
+
+
+def _slopes(shape: Shape, gravity: Array, field: Array) -> Array:
+    """Angle between the outward normal and ``-g``, rad; ``atan2`` keeps small slopes exact."""
+    down = -(gravity + shape.centroids.value @ field.T)
+    across = np.linalg.norm(np.cross(shape.normals, down), axis=1)
+    return np.asarray(np.arctan2(across, np.einsum("ni,ni->n", shape.normals, down)))

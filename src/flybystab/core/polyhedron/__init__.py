@@ -1,0 +1,1 @@
+"""A homogeneous polyhedron: gravity of its volume in closed form."""
