@@ -1,0 +1,1 @@
+"""Discrete elements: soft spheres with contact history, gravity and tide; clumps of them."""
