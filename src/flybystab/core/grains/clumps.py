@@ -45,46 +45,36 @@ def friends_of_friends(g: Grains, link: float, label: NDArray[np.int64]) -> int:
     return count
 
 
-@kernel
-def bound_to(g: Grains, member: NDArray[np.bool_]) -> None:
-    """Add to `member` the grains that are bound to it, until there are no more.
+def bound_clumps(g: Grains, label: NDArray[np.int64], largest: int) -> NDArray[np.bool_]:
+    """Which clumps are bound to the largest, it included; shape (clumps,).
 
-    A grain is bound if its energy in the frame of the members' centre of mass, with the potential of the members, is
-    negative; members that are not bound any more do not leave.
+    A clump, or a loose grain, is bound if its centre of mass has a negative energy as a two-body problem with the bound
+    ones together, whose potential is that of their grains. Repeated until no more join. Its own rotation keeps a clump
+    together and does not count: tested grain by grain, an escaping clump that spins would be bound in part.
     """
-    n = g.mass.shape[0]
+    held = label >= 0
+    count = int(label.max()) + 1
+    mass = np.bincount(label[held], weights=g.mass[held], minlength=count)
+    weights = g.mass[held, None]
+    x, v = np.zeros((count, 3)), np.zeros((count, 3))
+    np.add.at(x, label[held], weights * g.x[held])
+    np.add.at(v, label[held], weights * g.v[held])
+    x, v = x / mass[:, None], v / mass[:, None]
+    bound = np.zeros(count, np.bool_)
+    bound[largest] = True
     while True:
-        total = 0.0
-        c = np.zeros(3)
-        v = np.zeros(3)
-        for i in range(n):
-            if member[i]:
-                total += g.mass[i]
-                for k in range(3):
-                    c[k] += g.mass[i] * g.x[i, k]
-                    v[k] += g.mass[i] * g.v[i, k]
-        if total == 0.0:
-            return
-        for k in range(3):
-            v[k] /= total
-        fresh = np.zeros(n, np.bool_)
-        grown = False
-        for i in range(n):
-            if member[i] or g.mass[i] == 0.0:
-                continue
-            e = 0.5 * ((g.v[i, 0] - v[0]) ** 2 + (g.v[i, 1] - v[1]) ** 2 + (g.v[i, 2] - v[2]) ** 2)
-            for j in range(n):
-                if member[j]:
-                    d0, d1, d2 = g.x[j, 0] - g.x[i, 0], g.x[j, 1] - g.x[i, 1], g.x[j, 2] - g.x[i, 2]
-                    e -= g.mass[j] / np.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
-            if e < 0.0:
-                fresh[i] = True
-                grown = True
-        if not grown:
-            return
-        for i in range(n):
-            if fresh[i]:
-                member[i] = True
+        inside = np.zeros(len(label), np.bool_)
+        inside[held] = bound[label[held]]
+        total = mass[bound].sum()
+        velocity = mass[bound] @ v[bound] / total
+        rest = np.flatnonzero(~bound)
+        distance = np.linalg.norm(x[rest, None, :] - g.x[None, inside, :], axis=2)
+        potential = -(g.mass[inside] / distance).sum(axis=1)
+        energy = 0.5 * ((v[rest] - velocity) ** 2).sum(axis=1) + potential * (1.0 + mass[rest] / total)
+        joins = rest[energy < 0.0]
+        if len(joins) == 0:
+            return bound
+        bound[joins] = True
 
 
 def moments(g: Grains, member: NDArray[np.bool_]) -> tuple[float, Array, Array, Array, Array]:
