@@ -50,7 +50,7 @@ def mobilised(sim: Simulation) -> tuple[float, float, Array]:
     rho = 3.0 / (4.0 * np.pi * np.prod(axes))
     stress = np.empty(6)
     s = axes**2
-    rigid_stress(s[0], s[1], s[2], rho, np.pi * rho, spin, np.zeros(6), stress)
+    rigid_stress(s[0], s[1], s[2], float(rho), float(np.pi * rho), spin, np.zeros(6), stress)
     angle, _ = demand(DRUCKER_PRAGER, 0.0, 0.0, stress)
     return float(np.rad2deg(angle)), float(spin @ spin / (np.pi * rho)), axes
 

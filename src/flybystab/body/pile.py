@@ -151,14 +151,18 @@ def make_pile(body: Body, grains: int = 500, seed: int = 0, **options: Any) -> P
 
 def check_grains(body: Body, grains: int) -> None:
     """Refuse a number of grains, or a body, for which no pile is made."""
-    if not isinstance(grains, int | np.integer) or isinstance(grains, bool) or not LEAST <= grains:
+    if not isinstance(grains, int | np.integer) or isinstance(grains, bool) or not grains >= LEAST:
         raise InvalidInput("grains", grains, f"a whole number of grains, {LEAST} or more")
     most = min(MOST, int(_memory() / 4000))
     if grains > most:
-        raise InvalidInput("grains", grains, f"at most {most} grains, for the memory and the time that they take")
+        raise InvalidInput(
+            "grains", grains, f"at most {most} grains, for the memory and the time that they take"
+        )
     if body.material.c_pa > 0.0:
         raise InvalidInput(
-            "cohesion", body.material.cohesion, "no cohesion: that of grains is not calibrated against the bulk's"
+            "cohesion",
+            body.material.cohesion,
+            "no cohesion: that of grains is not calibrated against the bulk's",
         )
     contact_friction(body.material.phi)
 

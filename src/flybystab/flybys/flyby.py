@@ -17,6 +17,7 @@ from flybystab.encounter.attitude import attitude_matrix, periapsis_axes
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput, NotConverged
 from flybystab.flybys.batch import TOLERANCE, Judged, axis_ratio, judged, step_tolerance
+from flybystab.flybys.grains_flyby import SEEDS, handed_on, request
 from flybystab.flybys.result import FlybyError, FlybyResult, History
 from flybystab.flybys.verdict import letter_of
 
@@ -37,6 +38,9 @@ def flyby(
     history: bool = True,
     surfaces: str | Sequence[str] = (),
     max_axis_ratio: float = 6.0,
+    grains: int | str | None = None,
+    seeds: int | Sequence[int] = SEEDS,
+    model: str | None = None,
 ) -> FlybyResult:
     """Carry a body through an encounter.
 
@@ -58,6 +62,13 @@ def flyby(
         Other yield surfaces to run; the verdict is robust if they all agree.
     max_axis_ratio : float
         Axis ratio beyond which the homogeneous model is left.
+    grains : int or "always", optional
+        Number of grains of the piles that answer where the ellipsoid ends (beyond `max_axis_ratio`, with loss of
+        mass, out of contact); ``"always"`` runs 500 grains whatever the ellipsoid says.
+    seeds : int or sequence of int
+        How many piles, or which; their outcomes are the distribution ``result.grains``.
+    model : str, optional
+        ``"grains"`` forces grains, ``"ellipsoid"`` excludes them.
 
     Returns
     -------
@@ -74,6 +85,7 @@ def flyby(
     if not isinstance(encounter, Encounter):
         raise InvalidInput("encounter", encounter, "a flybystab.Encounter")
     tolerance, max_axis_ratio = step_tolerance(tolerance), axis_ratio(max_axis_ratio)
+    asked = request(grains, seeds, model)
     rotation = periapsis_axes(encounter).T @ attitude_matrix(attitude)
 
     def carried(a_body: Body, tol: float, keep: int = 0, needs: bool = True) -> Judged:
@@ -107,7 +119,7 @@ def flyby(
     onset = next((t for name, t, _ in main.events if name == "onset"), None)
     arrests = [t for name, t, _ in main.events if name in ("arrest", "jam")]
     lode = next((angle for name, _, angle in main.events if name == "onset"), None)
-    return FlybyResult(
+    result = FlybyResult(
         verdict=main.verdict,
         verdict_class=letter_of(main.verdict, main.bound),
         bound_fraction=main.bound,
@@ -133,7 +145,9 @@ def flyby(
         modelled=(*encounter.forces, *_modelled(body)),
         left_out=encounter.left_out,
         encounter=encounter,
+        rung="ellipsoid" if onset is not None else "rigid body",
     )
+    return handed_on(result, body, encounter, rotation, asked)
 
 
 def _compared(carried: Callable[[float], Judged], tolerance: float) -> Judged:

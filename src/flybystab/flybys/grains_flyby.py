@@ -11,7 +11,8 @@ import os
 import time as clock
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import NamedTuple
 
 import astropy.units as u
 import numpy as np
@@ -19,7 +20,7 @@ from astropy.table import QTable, vstack
 from astropy.units import Quantity
 from numpy.typing import NDArray
 
-from flybystab.body.body import Body
+from flybystab.body.body import DENSITY_RANGE, Body
 from flybystab.body.pile import Pile, check_grains, make_pile
 from flybystab.core.dynamics.ground import Ground, no_ground
 from flybystab.core.ellipsoid.tide import TidePanels
@@ -30,6 +31,7 @@ from flybystab.core.numerics.threads import in_order
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
 from flybystab.flybys.batch import ground_near, span_of
+from flybystab.flybys.result import FlybyResult
 from flybystab.flybys.verdict import Verdict, classed, letter_of
 from flybystab.units import brief
 
@@ -102,6 +104,11 @@ class GrainsRun:
         Angular velocity of the largest clump, and of the pile, frame of the encounter.
     fragments : QTable
         As :attr:`GrainsOutcome.fragments`, without the seed.
+    spin_ratio, pole_change : float, Quantity
+        Effective spin rate ``2 E/H`` of the largest clump over that of the pile at the start, and the angle between
+        their angular momenta; nan for a pile without spin.
+    axes_directions : ndarray (3, 3)
+        Principal axes of the largest clump as columns, frame of the encounter.
     settled : bool
         Whether clumps had stopped changing at the end of the run.
     end_time : Quantity
@@ -124,14 +131,17 @@ class GrainsRun:
     initial_semi_axes: Quantity
     spin_vector: Quantity
     initial_spin_vector: Quantity
+    spin_ratio: float
+    pole_change: Quantity
+    axes_directions: Array = field(repr=False)
     fragments: QTable = field(repr=False)
-    settled: bool = True
-    end_time: Quantity = field(default_factory=lambda: 0.0 * u.s)
-    course: GrainsCourse | None = field(default=None, repr=False)
-    radius: Quantity | None = field(default=None, repr=False)
-    label: NDArray[np.int64] | None = field(default=None, repr=False)
-    steps: int = 0
-    wall_time: Quantity = field(default_factory=lambda: 0.0 * u.s)
+    settled: bool
+    end_time: Quantity
+    course: GrainsCourse = field(repr=False)
+    radius: Quantity = field(repr=False)
+    label: NDArray[np.int64] = field(repr=False)
+    steps: int
+    wall_time: Quantity
 
     @property
     def stretch(self) -> float:
@@ -258,7 +268,9 @@ def grains_flyby(
     check_grains(body, grains)
     chosen = _seeds(seeds)
     if encounter.impact:
-        raise InvalidInput("encounter", encounter, "one whose path clears the planet: nothing is left for grains")
+        raise InvalidInput(
+            "encounter", encounter, "one whose path clears the planet: nothing is left for grains"
+        )
     if grains < FEW:
         warnings.warn(
             f"{grains} grains tell whether a body comes apart, not the mass of its fragments nor how far it stretches; "
@@ -280,9 +292,7 @@ def grains_flyby(
         rows.add_column(np.full(len(rows), run.seed), name="seed", index=0)
         tables.append(rows)
     friction = np.rad2deg(body.material.phi)
-    low, high = (
-        np.percentile([r.end_time.to_value(u.h) for r in runs], q) for q in (0, 100)
-    )
+    low, high = (np.percentile([r.end_time.to_value(u.h) for r in runs], q) for q in (0, 100))
     unsettled = sum(not r.settled for r in runs)
     modelled = (
         *encounter.forces,
@@ -318,6 +328,7 @@ def one_pile(pile: Pile, body: Body, encounter: Encounter, rotation: Array, seed
     sim.tide, sim.ground = _tide(encounter, unit), _ground(encounter, body, pile)
     start, stop, limit = span_of(encounter) / unit
     sim.time = float(start)
+    _, _, rate, momentum = _turning(_at_positions(sim), np.zeros(len(sim.grains.mass), np.int64))
     longest = min(float(limit), stop + LONGEST)
     rows: list[tuple[float, ...]] = []
     places: list[Array] = []
@@ -334,6 +345,7 @@ def one_pile(pile: Pile, body: Body, encounter: Encounter, rotation: Array, seed
         _record(sim, rows, places, masses)
     settled = _quiet(rows, masses)
     fragments, label = _fragments(sim, pile)
+    directions, _, rate_after, momentum_after = _turning(_at_positions(sim), label)
     last = rows[-1]
     total = 1.0  # of the body, scaled
     ground = total - float(sim.grains.mass.sum())
@@ -356,6 +368,9 @@ def one_pile(pile: Pile, body: Body, encounter: Encounter, rotation: Array, seed
         initial_semi_axes=pile.axes * u.m,
         spin_vector=np.array(last[6:9]) / unit * u.rad / u.s,
         initial_spin_vector=rotation @ pile.spin * u.rad / u.s,
+        spin_ratio=rate_after / rate if rate > 1e-9 else float("nan"),
+        pole_change=_angle(momentum, momentum_after) * u.deg if rate > 1e-9 else np.nan * u.deg,
+        axes_directions=directions,
         fragments=fragments,
         settled=settled,
         end_time=sim.time * unit * u.s,
@@ -409,10 +424,33 @@ def _record(sim: Simulation, rows: list[tuple[float, ...]], places: list[Array],
     mass, _, _, inertia, momentum = moments(g, member)
     axes, _ = semi_axes(mass, inertia)
     spin = spin_of(inertia, momentum)
-    bound = float(sizes[bound_clumps(g, label, int(np.argmax(sizes)))].sum())
-    rows.append((sim.time, mass, bound, *axes, *spin))
+    bound = bound_clumps(g, label, int(np.argmax(sizes)))
+    held = label >= 0
+    inside = held & bound[np.where(held, label, 0)]
+    rows.append((sim.time, _share(g, member), _share(g, inside), *axes, *spin))
     places.append(np.where((g.mass > 0.0)[:, None], g.x, np.nan))
     masses.append(np.sort(sizes[sizes >= SMALLEST])[::-1])
+
+
+def _turning(g: Grains, label: NDArray[np.int64]) -> tuple[Array, Array, float, Array]:
+    """Principal axes, angular velocity, ``2 E/H`` and angular momentum of the grains with the label zero."""
+    member = (label == 0) & (g.mass > 0.0)
+    if not member.any():
+        return np.full((3, 3), np.nan), np.full(3, np.nan), float("nan"), np.full(3, np.nan)
+    mass, _, _, inertia, momentum = moments(g, member)
+    spin = spin_of(inertia, momentum)
+    size = float(np.linalg.norm(momentum))
+    return semi_axes(mass, inertia)[1], spin, float(spin @ momentum) / size if size > 0.0 else 0.0, momentum
+
+
+def _angle(a: Array, b: Array) -> float:
+    """Angle between two vectors, deg."""
+    return float(np.rad2deg(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b)))
+
+
+def _share(g: Grains, member: NDArray[np.bool_]) -> float:
+    """Mass of some grains over that of the body; one, not one less rounding, if it is all of them."""
+    return 1.0 if member.all() else float(g.mass[member].sum())
 
 
 def _clumps(g: Grains) -> tuple[Array, NDArray[np.int64]]:
@@ -420,7 +458,8 @@ def _clumps(g: Grains) -> tuple[Array, NDArray[np.int64]]:
     label = np.empty(len(g.mass), np.int64)
     count = friends_of_friends(g, LINK, label)
     held = label >= 0
-    return np.bincount(label[held], weights=g.mass[held], minlength=count), label
+    sizes: Array = np.bincount(label[held], weights=g.mass[held], minlength=count).astype(float)
+    return sizes, label
 
 
 def _quiet(rows: list[tuple[float, ...]], masses: list[Array]) -> bool:
@@ -447,16 +486,16 @@ def _fragments(sim: Simulation, pile: Pile) -> tuple[QTable, NDArray[np.int64]]:
         mass, centre, velocity, inertia, momentum = moments(g, member)
         axes, _ = semi_axes(mass, inertia)
         spin = spin_of(inertia, momentum)
-        found.append((mass, axes, spin, centre, velocity))
+        found.append((_share(g, member), axes, spin, centre, velocity))
     n = len(found)
     parents, a, e = np.full(n, -1, np.int64), np.full(n, np.nan), np.full(n, np.nan)
     for i in range(n):
-        least = 0.0
+        least = np.float64(0.0)
         for j in range(i):  # the more massive ones
             total = found[i][0] + found[j][0]
             d, w = found[i][3] - found[j][3], found[i][4] - found[j][4]
-            r = np.linalg.norm(d)
-            energy = 0.5 * w @ w - total / r
+            r = float(np.linalg.norm(d))
+            energy = np.float64(0.5 * w @ w - total / r)
             if energy < least:
                 least = energy
                 parents[i], a[i] = j, -0.5 * total / energy
@@ -483,6 +522,85 @@ def _fragments(sim: Simulation, pile: Pile) -> tuple[QTable, NDArray[np.int64]]:
     return table, row_of
 
 
-def letter(outcome: GrainsOutcome) -> str | None:
-    """Class of Richardson et al. (1998) of an outcome: M, B, S or None."""
-    return letter_of(outcome.verdict, outcome.bound_fraction)
+#: Verdicts of the ellipsoid that hand on to grains: it cannot say what becomes of the body.
+HANDED_ON = (Verdict.BEYOND_MODEL, Verdict.MASS_LOSS, Verdict.DISRUPTED)
+#: Number of grains where it is not given.
+GRAINS = 500
+
+
+class Request(NamedTuple):
+    """When to run grains, and how many: ``grains=``, ``seeds=`` and ``model=`` of ``flyby``, checked."""
+
+    grains: int  #: 0 for never
+    always: bool
+    seeds: list[int]
+
+
+def request(grains: int | str | None, seeds: int | Sequence[int], model: str | None) -> Request:
+    """Check ``grains=``, ``seeds=`` and ``model=``.
+
+    Raises
+    ------
+    InvalidInput
+    """
+    if model not in (None, "ellipsoid", "grains"):
+        raise InvalidInput("model", model, "'ellipsoid', 'grains', or None for the first that can answer")
+    chosen = _seeds(seeds)
+    if grains is None and model != "grains":
+        return Request(0, False, chosen)
+    if model == "ellipsoid":
+        raise InvalidInput("model", model, "no grains= beside it")
+    if isinstance(grains, str) and grains != "always":
+        raise InvalidInput("grains", grains, "a number of grains, or 'always'")
+    count = GRAINS if grains is None or isinstance(grains, str) else grains
+    return Request(count, model == "grains" or grains == "always", chosen)
+
+
+def handed_on(
+    result: FlybyResult, body: Body, encounter: Encounter, rotation: Array, asked: Request
+) -> FlybyResult:
+    """The result of the ellipsoid, or of grains where it hands on to them or they are forced.
+
+    The ellipsoid hands on past its largest axis ratio, with loss of mass, and where its grains are out of contact at
+    the end. A centre that reaches the ground leaves nothing for grains.
+    """
+    if asked.grains == 0:
+        return result
+    check_grains(body, asked.grains)
+    apart = [name for name, _ in result.events if name in ("contact", "loss of contact")][-1:] == [
+        "loss of contact"
+    ]
+    needed = result.verdict in HANDED_ON or (apart and result.verdict != Verdict.IMPACT)
+    if encounter.impact or not (asked.always or needed):
+        return result
+    outcome = grains_flyby(body, encounter, rotation, grains=asked.grains, seeds=asked.seeds)
+    run, verdict = outcome.median, outcome.verdict
+    return replace(
+        result,
+        verdict=verdict,
+        verdict_class=letter_of(verdict, outcome.bound_fraction),
+        bound_fraction=outcome.bound_fraction,
+        semi_axes=run.semi_axes,
+        spin=run.spin,
+        spin_vector=run.spin_vector,
+        end_time=run.end_time - encounter.t_start * u.s,
+        spin_ratio=run.spin_ratio,
+        pole_change=run.pole_change,
+        body=_remnant(body, run),
+        modelled=outcome.modelled,
+        rung="grains",
+        grains=outcome,
+    )
+
+
+def _remnant(body: Body, run: GrainsRun) -> Body:
+    """The largest clump as a body."""
+    axes = run.semi_axes.to_value(u.m)
+    rho = float(run.largest_fraction * body.rho * np.prod(body.axes) / np.prod(axes))
+    return Body(
+        semi_axes=run.semi_axes,
+        density=rho * u.kg / u.m**3,
+        spin=run.axes_directions.T @ run.spin_vector,
+        material=body.material,
+        dispersed=not DENSITY_RANGE[0] <= rho <= DENSITY_RANGE[1],
+    )

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
 
 import astropy.units as u
 import numpy as np
+from astropy.table import QTable
 from astropy.units import Quantity
 from numpy.typing import NDArray
 
@@ -13,6 +15,9 @@ from flybystab.body.body import Body
 from flybystab.encounter.encounter import Encounter
 from flybystab.flybys.verdict import Verdict
 from flybystab.units import brief, counted
+
+if TYPE_CHECKING:
+    from flybystab.flybys.grains_flyby import GrainsOutcome
 
 Array = NDArray[np.float64]
 
@@ -148,6 +153,12 @@ class FlybyResult:
     modelled, left_out : tuple
         What the encounter and the body model contain, and what they leave out with its share.
     encounter : Encounter
+    rung : str
+        What gave the verdict: "rigid body", "ellipsoid" or "grains". Of grains, `semi_axes`, spin, `body` and
+        `bound_fraction` are those of the pile with the median bound share; onset, margin and history stay those of the
+        ellipsoid.
+    grains : GrainsOutcome or None
+        The distribution over piles of grains.
     """
 
     verdict: Verdict
@@ -175,6 +186,18 @@ class FlybyResult:
     modelled: tuple[str, ...] = field(repr=False)
     left_out: tuple[tuple[str, float], ...] = field(repr=False)
     encounter: Encounter = field(repr=False)
+    rung: str = "ellipsoid"
+    grains: GrainsOutcome | None = field(default=None, repr=False)
+
+    @property
+    def fragments(self) -> QTable | None:
+        """Clumps at the end, for every seed (:class:`GrainsOutcome`); None unless `rung` is "grains"."""
+        return None if self.grains is None else self.grains.fragments
+
+    @property
+    def largest_fraction(self) -> float:
+        """Mass of the largest remnant over that of the body: of grains the median of the largest clump, else bound."""
+        return self.bound_fraction if self.grains is None else self.grains.largest_fraction
 
     @property
     def contact(self) -> str | None:

@@ -103,4 +103,4 @@ def semi_axes(mass: float, inertia: Array) -> tuple[Array, Array]:
 
 def spin_of(inertia: Array, momentum: Array) -> Array:
     """Angular velocity of the rigid body with an inertia tensor and an angular momentum."""
-    return np.linalg.solve(inertia, momentum)
+    return np.asarray(np.linalg.solve(inertia, momentum), dtype=float)

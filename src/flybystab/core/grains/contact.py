@@ -6,7 +6,8 @@ radius ``beta R``: Zhang et al. 2017). With ``n`` the unit vector from grain i t
 ``u_t = (v_j - v_i)_t - (l_i w_i + l_j w_j) x n``:
 
 - normal force ``k_n d - C_n u_n`` less the cohesion ``c (2 beta R)^2``;
-- tangential force ``k_s S + C_s u_t``, ``dS/dt = u_t``, at most ``mu_s N``, ``N`` the repulsive part of the normal force;
+- tangential force ``k_s S + C_s u_t``, ``dS/dt = u_t``, at most ``mu_s N``, ``N`` the repulsive part of the normal
+  force;
 - rolling moment: stiffness ``k_n (beta R)^2``, at most ``mu_r beta R N``;
 - twisting moment: stiffness ``2 k_s (beta R)^2``, at most ``mu_t mu_s beta R N``.
 
