@@ -23,8 +23,16 @@ Array = NDArray[np.float64]
 
 R_E = R_EARTH * u.m
 
+#: Yield surface of the reference flybys P1-P3 and of the scenes whose numbers were computed with it.
+CONE = "drucker-prager"
+
 #: The rubble pile of Richardson, Bottke & Love (1998) and of the reference flybys.
-PILE = Body(semi_axes=[1400, 850, 750] * u.m, density=2000 * u.kg / u.m**3, spin_period=6 * u.h)
+PILE = Body(
+    semi_axes=[1400, 850, 750] * u.m,
+    density=2000 * u.kg / u.m**3,
+    spin_period=6 * u.h,
+    material=Material(yield_surface=CONE),
+)
 
 
 def earth(q: float, v_inf: float = 5.0, start: float = 10.0) -> Encounter:
@@ -35,8 +43,8 @@ def earth(q: float, v_inf: float = 5.0, start: float = 10.0) -> Encounter:
 
 
 def material(phi: float, **kwargs: Any) -> Material:
-    """Material with friction angle `phi` in deg."""
-    return Material(friction_angle=phi * u.deg, **kwargs)
+    """Material with friction angle `phi` in deg; on the cone through compression unless a surface is given."""
+    return Material(friction_angle=phi * u.deg, **({"yield_surface": CONE} | kwargs))
 
 
 def carried(

@@ -46,7 +46,9 @@ def test_sl9_at_jupiter():
 
 
 def test_anteros_bounds():
-    assert ran("anteros_bounds.py")["worst"] < 1e-9
+    assert (
+        ran("anteros_bounds.py")["worst"] < 1e-8
+    )  # a spheroid is at a corner: half the digits of its Lode angle
 
 
 def test_bounds_of_four():
@@ -76,7 +78,7 @@ def test_survival_from_target_plane(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     names = ran("survival_from_target_plane.py")
     assert names["hits"] == names["inside"]
-    assert names["probability"] == pytest.approx(0.713, abs=0.03)
+    assert names["probability"] == pytest.approx(0.643, abs=0.03)  # Mohr-Coulomb; 0.713 on the cone
     assert names["low"] < names["probability"] < names["high"]
 
 

@@ -10,7 +10,8 @@ from flybystab.body.equilibrium import equilibrium
 from flybystab.errors import InvalidInput
 
 GCC = u.g / u.cm**3
-FRICTION = Material(friction_angle=35 * u.deg)
+# the cone: the Lode angle of an oblate body at a corner of Mohr-Coulomb is known to half the digits only
+FRICTION = Material(friction_angle=35 * u.deg, yield_surface="drucker-prager")
 EXAMPLES = {
     # near-spheroidal, D 2.0-2.4 km, density unknown
     "Anteros": Body([1.1, 1.05, 1.05] * u.km, 2.0 * GCC, 2.8695 * u.h, material=FRICTION),

@@ -31,7 +31,7 @@ def test_friction_stops_a_gentle_push_of_a_sphere_after_the_strain_that_the_powe
     The pressure in flow is a reaction, p/(1 + beta k/3) in a sphere (theory, section 3): the criterion freezes it at
     p, which overrates the friction (k - beta) p of a flow between volume-preserving and associative.
     """
-    b = body((1, 1, 1), 0.0, 30)
+    b = body((1, 1, 1), 0.0, 30, yield_surface="drucker-prager")  # k below is the slope of that cone
     p1, p2, _ = (v.to_value(u.J) for v in push(b, STRETCH, [0.0], dilatancy=dilatancy).powers)
     k = 2 * 6**0.5 * 0.5 / 2.5
     beta = dilatancy * k

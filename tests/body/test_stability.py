@@ -240,7 +240,7 @@ def test_kappa_has_no_say_under_associative_flow():
 
 
 def test_kappa_crit_is_where_a_body_at_yield_turns_unstable():
-    b = body((1, 0.8, 0.7))
+    b = body((1, 0.8, 0.7), yield_surface="drucker-prager")  # one slope in every direction
     fastest = spin_limits(b)[1]
     b = b.with_(spin=u.Quantity([0 * fastest, 0 * fastest, fastest]))
     critical = stability(b, dilatancy=0.5).kappa_crit

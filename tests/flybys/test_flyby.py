@@ -33,8 +33,8 @@ def test_intact_with_margin():
 
 def test_weaker_friction_than_demanded_yields():
     demanded = flyby(PILE, earth(3.0)).max_required_friction_angle
-    below = PILE.with_(material=Material(friction_angle=demanded - 0.01 * u.deg))
-    above = PILE.with_(material=Material(friction_angle=demanded + 0.01 * u.deg))
+    below = PILE.with_(material=material(demanded.value - 0.01))
+    above = PILE.with_(material=material(demanded.value + 0.01))
     assert flyby(below, earth(3.0)).verdict == "RESHAPED"
     assert flyby(above, earth(3.0)).verdict == "INTACT"
 
@@ -299,3 +299,11 @@ def test_a_stalled_looser_run_costs_no_answer(monkeypatch):
 def test_samples_are_counted_in_whole_numbers(name, value):
     with pytest.raises(InvalidInput, match=f"{name} = "):
         spin_sample(PILE, earth(3.0), **{"n": 2, name: value})
+
+
+def test_the_default_yield_surface_is_mohr_coulomb():
+    """A pile at two radii flows further on the default than on the cone through compression."""
+    assert Material().yield_surface == "mohr-coulomb"
+    plain = flyby(PILE.with_(material=Material()), earth(2.3), history=False, error=False)
+    cone = flyby(PILE, earth(2.3), history=False, error=False)
+    assert plain.semi_axes[0] > 1.2 * cone.semi_axes[0]

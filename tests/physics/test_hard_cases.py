@@ -121,7 +121,7 @@ def test_just_enough_friction_never_yields():
 
 def test_repeated_onset_and_arrest():
     """A body that turns slowly on a parabola yields at each alignment and comes to rest between."""
-    body = Body(semi_axes=[1400, 1124, 552] * u.m, density=DENSITY, spin_period=-5.544 * u.h)
+    body = Body([1400, 1124, 552] * u.m, DENSITY, -5.544 * u.h, material=material(35))
     e = earth(4.5345, 0.0, 30.0)
     demand = carried(body, e.t_start, e.t_stop, e.tide, unyielding=True, tolerance=1e-10)
     weak = body.with_(material=material(0.8811 * np.rad2deg(demand.max_friction)))

@@ -17,7 +17,7 @@ from typing import Any
 import astropy.units as u
 import numpy as np
 
-from flybystab.body.body import Body
+from flybystab.body.body import Body, Material
 from flybystab.core.dynamics import rates as motion
 from flybystab.core.dynamics.moreau import follow_steps
 from flybystab.core.dynamics.run import parameters, passage
@@ -36,7 +36,10 @@ STARTS = 9
 
 def case() -> tuple[Body, Encounter]:
     """The pile and its passage at 2.2 radii: reference flyby P1."""
-    body = Body(semi_axes=[1400, 850, 750] * u.m, density=2000 * u.kg / u.m**3, spin_period=6 * u.h)
+    cone = Material(yield_surface="drucker-prager")  # reference flyby P1
+    body = Body(
+        semi_axes=[1400, 850, 750] * u.m, density=2000 * u.kg / u.m**3, spin_period=6 * u.h, material=cone
+    )
     encounter = Encounter.hyperbolic(
         "earth", periapsis=2.2 * R_earth, v_inf=5 * u.km / u.s, start_distance=10 * R_earth
     )

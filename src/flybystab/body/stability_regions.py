@@ -17,7 +17,7 @@ import numpy as np
 from astropy.units import Quantity
 from numpy.typing import NDArray
 
-from flybystab.body.body import YIELD_SURFACES, Body
+from flybystab.body.body import DEFAULT_SURFACE, YIELD_SURFACES, Body
 from flybystab.body.stability import LEVELS
 from flybystab.constants import G
 from flybystab.core.ellipsoid.potential import carlson_fd
@@ -141,7 +141,7 @@ def stability_map(
     friction_angle: Quantity,
     *,
     cohesion: float = 0.0,
-    yield_surface: str = "drucker-prager",
+    yield_surface: str = DEFAULT_SURFACE,
     dilatancy: float = 1.0,
     depth: str = "second",
     threads: int | None = None,

@@ -12,8 +12,8 @@ from typing import Any
 from flybystab.errors import InvalidInput, NothingComputed, WrongUsage
 from flybystab.plots.formats import FIGURES, FILMS
 
-#: Other yield surfaces that a verdict is checked on.
-OTHER_SURFACES = ("drucker-prager-extension", "mohr-coulomb", "matsuoka-nakai")
+#: Yield surfaces, the default first (named here as well: importing `Material` takes as long as ``--help``).
+SURFACES = ("mohr-coulomb", "matsuoka-nakai", "drucker-prager", "drucker-prager-extension")
 
 
 def material_arguments(sub: argparse.ArgumentParser) -> None:
@@ -25,9 +25,9 @@ def material_arguments(sub: argparse.ArgumentParser) -> None:
 
 def surface_argument(sub: argparse.ArgumentParser) -> None:
     """Add the yield surface."""
-    names = ", ".join(OTHER_SURFACES)
+    default, *others = SURFACES
     sub.add_argument(
-        "--surface", default="drucker-prager", metavar="NAME", help=f"yield surface (drucker-prager; {names})"
+        "--surface", default=default, metavar="NAME", help=f"yield surface ({default}; {', '.join(others)})"
     )
 
 

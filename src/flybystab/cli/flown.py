@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from flybystab.cli.common import (
-    OTHER_SURFACES,
+    SURFACES,
     asteroid_of,
     catalogue_argument,
     material_arguments,
@@ -67,6 +67,6 @@ def flown(options: argparse.Namespace) -> tuple[Any, Any, Any]:
         import astropy.units as u
 
         attitude = periapsis_axes(encounter) @ asteroid.attitude(0 * u.deg)
-    result = flyby(asteroid.body, encounter, attitude, surfaces=OTHER_SURFACES)
+    result = flyby(asteroid.body, encounter, attitude, surfaces=SURFACES)
     sample = spin_sample(asteroid, encounter, n=options.attitudes, seed=options.seed)
     return asteroid, result, sample

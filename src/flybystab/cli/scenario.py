@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 
 from flybystab.cli.common import (
-    OTHER_SURFACES,
+    SURFACES,
     check_picture,
     figure_argument,
     show,
@@ -33,8 +33,7 @@ def run(options: argparse.Namespace) -> None:
     script = scenario(options.file)
     figure = options.output or script.figure
     check_picture(figure, FIGURES + FILMS)
-    others = [s for s in (*OTHER_SURFACES, "drucker-prager") if s != script.body.material.yield_surface]
-    result = flyby(script.body, script.encounter, script.attitude, surfaces=others)
+    result = flyby(script.body, script.encounter, script.attitude, surfaces=SURFACES)
     if figure:
         write_picture(result, script.title, figure)
     show(

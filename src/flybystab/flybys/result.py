@@ -214,11 +214,12 @@ class FlybyResult:
     def __repr__(self) -> str:
         letter = f" ({self.verdict_class})" if self.verdict_class else ""
         phi = self.max_required_friction_angle
-        need = f"mobilises {brief(phi)}" if np.isfinite(phi) else "no friction would keep it rigid"
+        own = brief(self.body.material.friction_angle)
+        need = f"mobilises {brief(phi)} of {own}" if np.isfinite(phi) else "no friction keeps it rigid"
         robust = {None: "", True: ", robust", False: ", depends on the yield surface"}[self.robust]
         return (
-            f"<FlybyResult {self.verdict}{letter}{robust}: {need} of {brief(self.body.material.friction_angle)}, "
-            f"bound {self.bound_fraction:.4g}, afterwards {brief(self.semi_axes, u.m)}, "
+            f"<FlybyResult {self.verdict}{letter}{robust}: {need}, "
+            f"bound {self.bound_fraction:.4g}, then {brief(self.semi_axes, u.m)}, "
             f"spin rate x {self.spin_ratio:.4g}>"
         )
 

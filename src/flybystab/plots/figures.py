@@ -8,7 +8,7 @@ import astropy.units as u
 import numpy as np
 from matplotlib.figure import Figure
 
-from flybystab.body.body import Body, Material
+from flybystab.body.body import DEFAULT_SURFACE, Body, Material
 from flybystab.body.fluids import roche_limit
 from flybystab.constants import GM_EARTH, R_EARTH, G
 from flybystab.plots.stability import (
@@ -45,7 +45,7 @@ def catalogue_bodies() -> dict[str, Body]:
     return {a.name: a.body for a in catalogue() if not a.tumbles}
 
 
-def regions_figure(bodies: Mapping[str, Body], surface: str = "drucker-prager", cells: int = 200) -> Figure:
+def regions_figure(bodies: Mapping[str, Body], surface: str = DEFAULT_SURFACE, cells: int = 200) -> Figure:
     """Shapes that stand, by friction angle, at four spins; each body on the panel of the spin nearest to its own."""
     figure = Figure(figsize=(9.0, 8.6), layout="constrained")
     w2 = {name: float(b.omega @ b.omega) * b.dynamical_time**2 for name, b in bodies.items()}
@@ -55,7 +55,7 @@ def regions_figure(bodies: Mapping[str, Body], surface: str = "drucker-prager", 
     return figure
 
 
-def spin_figure(bodies: Mapping[str, Body], surface: str = "drucker-prager") -> Figure:
+def spin_figure(bodies: Mapping[str, Body], surface: str = DEFAULT_SURFACE) -> Figure:
     """Spin limits against the axis ratio, oblate and prolate, with bodies by ``a3/a1`` and ``omega^2/(pi G rho)``."""
     figure = Figure(figsize=(9.6, 4.8), layout="constrained")
     flat, long = figure.subplots(1, 2, sharey=True)
@@ -79,7 +79,7 @@ def barrier_figure(body: Body) -> Figure:
     return figure
 
 
-def failure_figure(surface: str = "drucker-prager") -> Figure:
+def failure_figure(surface: str = DEFAULT_SURFACE) -> Figure:
     """Static failure distance from the Earth against the friction angle: bodies with their own spin, and satellites."""
     figure = Figure(figsize=(9.6, 4.4), layout="constrained")
     free, bound = figure.subplots(1, 2)

@@ -9,7 +9,7 @@ import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
 
-from flybystab.body.body import Body, Material
+from flybystab.body.body import DEFAULT_SURFACE, Body, Material
 from flybystab.body.equilibrium import failure_distance, spin_limits
 from flybystab.body.fluids import jacobi, maclaurin
 from flybystab.body.stability import push, stability
@@ -41,7 +41,7 @@ def regions_plot(
     w2: float = 0.0,
     angles: Sequence[float] = ANGLES,
     *,
-    yield_surface: str = "drucker-prager",
+    yield_surface: str = DEFAULT_SURFACE,
     bodies: Mapping[str, Body] | None = None,
     named: Sequence[str] | None = None,
     cells: int = 200,
@@ -107,7 +107,7 @@ def spin_plot(
     angles: Sequence[float] = ANGLES,
     *,
     prolate: bool = False,
-    yield_surface: str = "drucker-prager",
+    yield_surface: str = DEFAULT_SURFACE,
     bodies: Mapping[str, Body] | None = None,
     named: Sequence[str] | None = None,
 ) -> Any:

@@ -19,7 +19,7 @@ from astropy.table import QTable
 from astropy.time import Time
 from astropy.units import Quantity
 
-from flybystab.body.body import Body, Material
+from flybystab.body.body import DEFAULT_SURFACE, Body, Material
 from flybystab.catalogues.asteroid import identity
 from flybystab.catalogues.catalogue import Asteroid
 from flybystab.catalogues.tumbling import attitude_matrix, isotropic_direction
@@ -47,7 +47,7 @@ def infer(
     *,
     attitudes: int = 32,
     seed: int = 0,
-    yield_surface: str = "drucker-prager",
+    yield_surface: str = DEFAULT_SURFACE,
 ) -> QTable:
     """Least friction angles that are compatible with a body's shape and spin and with its passages.
 
