@@ -51,7 +51,7 @@ def test_the_ladder_hands_on_only_where_it_must(deep):
     distant = fs.flyby(BODY, earth(5.96), grains=150, seeds=2)
     assert (distant.rung, distant.grains, distant.fragments) == ("rigid body", None, None)
     assert distant.largest_fraction == distant.bound_fraction == 1.0
-    flows = fs.flyby(BODY, earth(2.0), grains=150, seeds=2)
+    flows = fs.flyby(BODY, earth(2.2), grains=150, seeds=2)
     assert (flows.rung, flows.verdict) == ("ellipsoid", "RESHAPED")
     ellipsoid = fs.flyby(BODY.with_(material=fs.Material(yield_surface="mohr-coulomb")), earth(1.6))
     assert ellipsoid.verdict == "BEYOND MODEL"
