@@ -30,6 +30,7 @@ _HOME = {
     "catalogue": "catalogues.catalogue",
     "encounter_distribution": "encounter.distribution",
     "cite": "io.citation",
+    "encounter_rates": "population.rates",
     "equilibrium": "body.equilibrium",
     "find_encounters": "orbit.search.encounter_finder",
     "flyby": "flybys.flyby",
@@ -68,6 +69,7 @@ if TYPE_CHECKING:
     from flybystab.io.citation import cite
     from flybystab.orbit.orbit import Orbit
     from flybystab.orbit.search.encounter_finder import find_encounters
+    from flybystab.population.rates import encounter_rates
     from flybystab.screening.inference import infer
     from flybystab.screening.screening import screen
     from flybystab.units import R_earth

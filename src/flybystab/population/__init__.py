@@ -1,0 +1,1 @@
+"""Encounter rates of populations of asteroids with the planets."""

@@ -1,0 +1,234 @@
+"""How often the asteroids of a population pass a planet within a distance."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import astropy.units as u
+import numpy as np
+from astropy.table import QTable, Table
+from astropy.units import Quantity
+from numpy.typing import NDArray
+
+from flybystab.constants import AU
+from flybystab.core.numerics.threads import in_order
+from flybystab.errors import InvalidInput
+from flybystab.orbit.elements import GM_SUN
+from flybystab.orbit.orbit import Orbit
+from flybystab.orbit.planets import Planet, planet
+from flybystab.population.mean_orbits import mean_orbit
+from flybystab.population.wetherill import NODES_R, NODES_S, encounter_rates_of, rate_at_speeds
+from flybystab.units import to_si, whole
+
+Array = NDArray[np.float64]
+
+#: Orbits of one task of a thread.
+BLOCK = 20_000
+
+
+@dataclass(frozen=True, eq=False)
+class EncounterRates:
+    """Mean rates of encounters of orbits with one planet.
+
+    Attributes
+    ----------
+    planet : Planet
+    periapsis : Quantity
+        Encounters are those with a smaller periapsis distance, gravitational focusing counted.
+    rate : Quantity, shape (n,)
+        1/yr; zero for an orbit that does not reach the planet's.
+    v_inf : Quantity, shape (n,)
+        Mean hyperbolic excess speed of these encounters, km/s; nan without encounters.
+    v_inf_dispersion : Quantity, shape (n,)
+        Its standard deviation.
+    """
+
+    planet: Planet
+    periapsis: Quantity
+    rate: Quantity
+    v_inf: Quantity
+    v_inf_dispersion: Quantity
+    _elements: Array
+    _orbit: Array
+
+    @property
+    def total(self) -> Quantity:
+        """Rate of all orbits together, 1/yr."""
+        return self.rate.sum()
+
+    def sample(self, count: int, seed: int) -> QTable:
+        """Encounters drawn from the population in proportion to their rates.
+
+        Parameters
+        ----------
+        count : int
+        seed : int
+
+        Returns
+        -------
+        QTable
+            ``orbit`` (row number), ``v_inf`` (km/s) and ``periapsis`` (km). The periapsis follows the focused
+            cross-section ``q^2 + 2 GM q/v_inf^2``, from zero to the limit: those below the planet's radius are impacts.
+        """
+        if not self.total > 0.0 / u.yr:
+            raise InvalidInput("count", count, "orbits that meet the planet: none does")
+        rng = np.random.default_rng(whole(seed, "seed", 0))
+        share = self.rate.value / self.rate.value.sum()
+        chosen = rng.choice(len(share), size=whole(count, "count", 1), p=share)
+        speed = np.empty(len(chosen))
+        limit, gm = self.periapsis.to_value(u.m), self.planet.gm
+        speeds, weights = np.empty(4 * NODES_R * NODES_S), np.empty(4 * NODES_R * NODES_S)
+        order = np.argsort(chosen, kind="stable")
+        rows, starts = np.unique(chosen[order], return_index=True)
+        for row, block in zip(rows, np.split(order, starts[1:]), strict=True):
+            a, e, i = self._elements[row]
+            m = rate_at_speeds(
+                a, e, np.sin(i), np.cos(i), self._orbit[0], self._orbit[1], np.sin(self._orbit[2]), GM_SUN,
+                speeds, weights,
+            )  # fmt: skip
+            cross = weights[:m] * limit * (limit + 2.0 * gm / speeds[:m] ** 2)
+            speed[block] = rng.choice(speeds[:m], size=len(block), p=cross / cross.sum())
+        # q^2 + 2 f q = x (L^2 + 2 f L), f = GM/U^2
+        f = gm / speed**2
+        x = rng.random(len(chosen)) * limit * (limit + 2.0 * f)
+        q = x / (f + np.sqrt(f * f + x))
+        return QTable({"orbit": chosen, "v_inf": speed / 1e3 * u.km / u.s, "periapsis": q / 1e3 * u.km})
+
+    def __repr__(self) -> str:
+        return (
+            f"<EncounterRates {len(self.rate)} orbits, {self.planet.name} within {self.periapsis:.6g}: "
+            f"{self.total.value:.4g} a year>"
+        )
+
+
+def encounter_rates(
+    orbits: Any,
+    planet_name: str | Planet = "earth",
+    periapsis: Quantity | None = None,
+    *,
+    planet_orbit: tuple[Quantity, float, Quantity] | None = None,
+    workers: int | None = None,
+) -> EncounterRates:
+    """Mean rate of encounters with a planet within a periapsis distance, on the time scale of precession.
+
+    Parameters
+    ----------
+    orbits : table, sequence of Orbit or of Asteroid, or one of them
+        A table has columns ``a``, ``e`` and ``i`` (with units; without: au and deg).
+    planet_name : str or Planet
+    periapsis : Quantity, optional
+        Largest distance from the planet's centre; its radius by default (impacts on the surface).
+    planet_orbit : (Quantity, float, Quantity), optional
+        Semi-major axis, eccentricity and inclination; its mean orbit by default.
+    workers : int, optional
+        Threads; one a core by default.
+
+    Returns
+    -------
+    EncounterRates
+
+    Raises
+    ------
+    InvalidInput, UnitMismatch, UnknownName
+
+    Notes
+    -----
+    Angles are taken to circulate uniformly (:mod:`flybystab.population.wetherill`): resonances, correlated returns and
+    the evolution of ``a``, ``e`` and ``i`` are left out. For a single asteroid the rate over the next centuries can
+    differ by any factor; for a population the mean rate is that of the counted passages (tests/population).
+    """
+    body = planet(planet_name)
+    distance = body.radius * u.m if periapsis is None else periapsis
+    limit = to_si(distance, u.m, "periapsis", low=0.0, open_low=True)
+    elements = _elements(orbits)
+    if planet_orbit is None:
+        target = mean_orbit(body.name)
+    else:
+        a, e, i = planet_orbit
+        target = np.array(
+            [
+                to_si(a, u.m, "planet_orbit[0]", low=0.0, open_low=True),
+                to_si(e, u.dimensionless_unscaled, "planet_orbit[1]", low=0.0, high=1.0, open_high=True),
+                to_si(i, u.rad, "planet_orbit[2]", low=0.0, high=np.pi),
+            ]
+        )
+    threads = (os.cpu_count() or 1) if workers is None else whole(workers, "workers", 1)
+    rate, moments = np.empty(len(elements)), np.empty((len(elements), 2))
+
+    def part(first: int) -> None:
+        block = slice(first, first + BLOCK)
+        encounter_rates_of(elements[block], target, GM_SUN, body.gm, limit, rate[block], moments[block])
+
+    list(in_order(part, range(0, len(elements), BLOCK), threads))
+    mean = moments[:, 0]
+    spread = np.sqrt(np.maximum(0.0, moments[:, 1] - mean**2))
+    return EncounterRates(
+        body,
+        (limit * u.m).to(u.km),
+        (rate / u.s).to(1 / u.yr),
+        mean / 1e3 * u.km / u.s,
+        spread / 1e3 * u.km / u.s,
+        elements,
+        target,
+    )
+
+
+def _elements(orbits: Any) -> Array:
+    """Semi-major axis (m), eccentricity and inclination (rad) of each orbit, ``(n, 3)``."""
+    if isinstance(orbits, Table):
+        columns = []
+        for name, unit, factor in (
+            ("a", u.m, AU),
+            ("e", u.dimensionless_unscaled, 1.0),
+            ("i", u.rad, np.pi / 180),
+        ):
+            if name not in orbits.colnames:
+                raise InvalidInput("orbits", orbits.colnames, "columns a, e and i")
+            column = orbits[name]
+            given = getattr(column, "unit", None) not in (None, u.dimensionless_unscaled)
+            columns.append(
+                Quantity(column).to_value(unit) if given else np.asarray(column, dtype=float) * factor
+            )
+        out = np.column_stack(columns)
+    else:
+        many = orbits if isinstance(orbits, Iterable) and not isinstance(orbits, str) else [orbits]
+        out = np.array([_of_orbit(getattr(o, "orbit", o), k) for k, o in enumerate(many)]).reshape(-1, 3)
+    bad = ~(
+        np.isfinite(out).all(axis=1) & (out[:, 0] > 0) & (out[:, 1] >= 0) & (out[:, 1] < 1) & (out[:, 2] >= 0)
+        & (out[:, 2] <= np.pi)
+    )  # fmt: skip
+    if np.any(bad):
+        k = int(np.flatnonzero(bad)[0])
+        a, e, i = out[k]
+        raise InvalidInput(
+            f"orbits[{k}]",
+            f"a = {a / AU:g} au, e = {e:g}, i = {np.degrees(i):g} deg",
+            "an elliptic orbit: a above 0, e in [0, 1), i in [0, 180] deg",
+        )
+    return np.ascontiguousarray(out)
+
+
+def _of_orbit(orbit: Any, number: int) -> tuple[float, float, float]:
+    if not isinstance(orbit, Orbit):
+        raise InvalidInput(
+            f"orbits[{number}]", orbit, "an Orbit, an Asteroid with one, or a table with a, e, i"
+        )
+    from flybystab.orbit.orbit import heliocentric
+
+    state = heliocentric(orbit)
+    return elements_of(state[:3], state[3:])
+
+
+def elements_of(position: Array, velocity: Array) -> tuple[float, float, float]:
+    """Semi-major axis (m), eccentricity and ecliptic inclination (rad) of a heliocentric ICRF state (m, m/s)."""
+    from flybystab.orbit.elements import ecliptic_to_icrf
+
+    x, v = ecliptic_to_icrf().T @ position, ecliptic_to_icrf().T @ velocity
+    r = float(np.linalg.norm(x))
+    h = np.cross(x, v)
+    a = 1.0 / (2.0 / r - float(v @ v) / GM_SUN)
+    vector = np.cross(v, h) / GM_SUN - x / r
+    return a, float(np.linalg.norm(vector)), float(np.arctan2(np.hypot(h[0], h[1]), h[2]))
