@@ -37,7 +37,7 @@ class Page(HTMLParser):
 
 @pytest.fixture(scope="module")
 def page(tmp_path_factory):
-    path = tmp_path_factory.mktemp("report") / "apophis report.html"
+    path = tmp_path_factory.mktemp("report") / "apophis <b> & report.html"
     words = ["report", "Apophis", "--date", "2029-04-13", "--attitudes", "8", "--samples", "40"]
     assert main([*words, "--output", str(path)]) == 0
     return path
@@ -57,11 +57,21 @@ def test_everything_is_in_it(page):
         "8 of 8 sampled attitudes",
         "95 % interval",
         "Earth J2",
-        "not in it",
+        "excludes the orbit uncertainty",
+        "hyperbolic excess speed",
+        "orbit quality",
+        "over the sampled attitudes",
         "flybystab report Apophis --date 2029-04-13",
         "rebound ",
     ):
         assert needed in said, needed
+
+
+def test_values_are_escaped(page):
+    """The command under Provenance holds the name of the file."""
+    text = page.read_text()
+    assert "apophis &lt;b&gt; &amp; report.html" in text
+    assert "<b>" not in text
 
 
 def test_nothing_is_loaded_from_elsewhere(page):

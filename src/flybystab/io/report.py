@@ -1,20 +1,19 @@
-"""One self-contained page about one asteroid and one encounter: figures embedded, nothing loaded from elsewhere."""
+"""HTML report of one encounter: a self-contained page with embedded figures (template ``templates/report.html``)."""
 
 from __future__ import annotations
 
 import base64
-import html
 import io
 import os
 import platform
 import sys
-from collections.abc import Iterable
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
 from typing import Any
 
 import astropy.units as u
+import jinja2
 import numpy as np
 from astropy.table import Row
 
@@ -27,31 +26,11 @@ from flybystab.orbit.ephemeris import ephemeris
 from flybystab.plots.flyby import BLUE, flyby_panels
 from flybystab.plots.scene import scene_plot
 
-#: Packages whose versions belong to the provenance of a number.
-PACKAGES = ("numpy", "scipy", "numba", "astropy", "rebound", "jplephem", "skyfield-data")
+#: Rows of a table: label and text.
+Rows = list[tuple[str, str]]
 
-_STYLE = """
-:root { color-scheme: light; }
-* { box-sizing: border-box; }
-body { font: 16px/1.5 system-ui, "DejaVu Sans", sans-serif; color: #1a1a1a; background: #fff; margin: 0 auto;
-  max-width: 54rem; padding: 1rem; }
-h1 { font-size: 1.5rem; line-height: 1.25; margin: 0.5rem 0; }
-h2 { font-size: 1.15rem; margin: 2rem 0 0.5rem; border-bottom: 1px solid #bbb; }
-.verdict { border-left: 0.5rem solid #0072B2; background: #eef4f8; padding: 0.75rem 1rem; }
-.verdict strong { font-size: 1.3rem; }
-figure { margin: 1rem 0; }
-figure img { width: 100%; height: auto; display: block; }
-figcaption { font-size: 0.9rem; color: #444; }
-.wide { overflow-x: auto; }
-table { border-collapse: collapse; width: 100%; font-size: 0.95rem; }
-th, td { text-align: left; vertical-align: top; padding: 0.25rem 0.75rem 0.25rem 0; border-bottom: 1px solid #ddd;
-  overflow-wrap: anywhere; }
-th { font-weight: 600; width: 38%; }
-td.n { font-variant-numeric: tabular-nums; }
-.assumed { background: #fdf3c8; padding: 0 0.3em; }
-@media print { body { max-width: none; padding: 0; font-size: 10.5pt; } h2 { break-after: avoid; }
-  figure, table, .verdict { break-inside: avoid; } a { color: inherit; } }
-"""
+#: Packages whose versions are listed under Provenance.
+PACKAGES = ("numpy", "scipy", "numba", "astropy", "rebound", "jplephem", "skyfield-data")
 
 
 def report(
@@ -63,59 +42,42 @@ def report(
     screened: Row | None = None,
     command: str = "",
 ) -> Path:
-    """Write the page; returns its path.
+    """Write the report; returns its path.
 
     Parameters
     ----------
     asteroid : Asteroid
     result : FlybyResult
-        Of its body, on its real orbit, with history.
+        Its flyby on its real orbit, with history.
     sample : SpinSample
-        The same encounter at many attitudes.
+        The same encounter at other attitudes.
     path : str or Path
         The file, ``.html``.
     screened : Row, optional
-        Row of :func:`flybystab.screen` for the encounter, with samples of the uncertain inputs.
+        Row of :func:`flybystab.screen` for the encounter, with sampled inputs.
     command : str
-        What made the page, for its provenance.
+        Command line that made the report, shown under Provenance.
     """
     encounter = result.encounter
     when = "" if encounter.time is None else encounter.time.tdb.iso[:19] + " TDB"
     planet = encounter.planet.name.capitalize()
-    title = f"{asteroid.label} passes {planet if planet != 'Earth' else 'the Earth'}, {when[:10]}"
-    parts = [
-        f"<h1>{_e(title)}</h1>",
-        _verdict(result, sample),
-        "<h2>Encounter</h2>",
-        _table(_encounter_rows(result, when)),
-        "<h2>Margins and error</h2>",
-        _table(_margin_rows(result)),
-        _figure(_history_picture(result), "History of the encounter", _HISTORY_NOTE),
-        "<h2>Attitude at the encounter</h2>",
-        _sample_text(sample),
-        _figure(_sample_picture(sample), "Change of spin over the sample", _SAMPLE_NOTE),
-        _figure(_scene_picture(result), "Path and body", "The planet and the path are to scale."),
-    ]
-    if screened is not None:
-        parts += ["<h2>Uncertain inputs</h2>", _table(_probability_rows(screened))]
-    parts += [
-        "<h2>The asteroid</h2>",
-        _table(_body_rows(asteroid)),
-        "<h2>Modelled, and left out</h2>",
-        _table(_model_rows(result)),
-        "<p>A homogeneous ellipsoid has no necking, no landslides and no local failure of its surface; yield of the "
-        "volume average is necessary for the yield of each point, not sufficient. Axis ratios beyond 6:1 are "
-        "outside the model.</p>",
-        "<h2>Provenance</h2>",
-        _table(_provenance_rows(asteroid, sample, command)),
-    ]
-    page = (
-        '<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        '<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        '<link rel="icon" href="data:,">\n'
-        f"<title>{_e(title)}</title>\n<style>{_STYLE}</style>\n</head>\n<body>\n"
-        + "\n".join(parts)
-        + "\n</body>\n</html>\n"
+    page = _template().render(
+        title=f"{asteroid.label} passes {planet if planet != 'Earth' else 'the Earth'}, {when[:10]}",
+        verdict=str(result.verdict) + (f" (class {result.verdict_class})" if result.verdict_class else ""),
+        verdict_text=_verdict(result, sample),
+        encounter=_encounter_rows(result, when),
+        margins=_margin_rows(result, sample),
+        sample_text=_sample_text(sample),
+        probabilities=None if screened is None else _probability_rows(screened),
+        body=_body_rows(asteroid),
+        assumed={_INPUTS[column] for column in asteroid.assumed if column in _INPUTS},
+        model=_model_rows(result),
+        provenance=_provenance_rows(asteroid, sample, command),
+        pictures={
+            "history": _history_picture(result),
+            "sample": _sample_picture(sample),
+            "scene": _scene_picture(result),
+        },
     )
     target = Path(path)
     part = target.with_name(target.name + ".part")
@@ -124,28 +86,18 @@ def report(
     return target
 
 
-_HISTORY_NOTE = (
-    "Distance from the planet's centre; friction angle that the stress mobilises against that of the material; spin "
-    "rate; semi-axes. Shaded where the body flows."
-)
-_SAMPLE_NOTE = "Each point is the encounter at another phase of the spin (and pole, where it is not known)."
-
-
-def _e(text: object) -> str:
-    return html.escape(str(text))
-
-
-def _table(rows: Iterable[tuple[str, str]]) -> str:
-    cells = "\n".join(f'<tr><th scope="row">{_e(a)}</th><td class="n">{b}</td></tr>' for a, b in rows)
-    return f'<div class="wide"><table>\n{cells}\n</table></div>'
-
-
-def _figure(picture: str, title: str, note: str) -> str:
-    return f'<figure><img src="{picture}" alt="{_e(title)}"><figcaption>{_e(title)}. {_e(note)}</figcaption></figure>'
+def _template() -> jinja2.Template:
+    """The page, in which every value is escaped."""
+    environment = jinja2.Environment(
+        loader=jinja2.PackageLoader("flybystab.io"),
+        autoescape=True,
+        undefined=jinja2.StrictUndefined,
+        keep_trailing_newline=True,
+    )
+    return environment.get_template("report.html")
 
 
 def _verdict(r: FlybyResult, s: SpinSample) -> str:
-    letter = f" (class {r.verdict_class})" if r.verdict_class else ""
     agree = ""
     if r.robust is not None:
         agree = (
@@ -156,61 +108,66 @@ def _verdict(r: FlybyResult, s: SpinSample) -> str:
             + "."
         )
     same = int(np.count_nonzero(s.verdict == str(r.verdict)))
-    return (
-        f'<div class="verdict" id="verdict"><strong>{_e(r.verdict)}{_e(letter)}</strong><br>The body '
-        f"{_e(MEANING[str(r.verdict)])}.{_e(agree)} {same} of {len(s)} sampled attitudes give the same verdict.</div>"
-    )
+    return f"The body {MEANING[str(r.verdict)]}.{agree} {same} of {len(s)} sampled attitudes give the same verdict."
 
 
-def _encounter_rows(r: FlybyResult, when: str) -> list[tuple[str, str]]:
+def _encounter_rows(r: FlybyResult, when: str) -> Rows:
     e = r.encounter
     q = e.distance.to_value(u.km)
     rows = [
-        ("planet", _e(e.planet.name.capitalize())),
-        ("closest approach", _e(when or "scripted")),
+        ("planet", e.planet.name.capitalize()),
+        ("closest approach", when or "hyperbolic encounter without a date"),
         ("distance between the centres", f"{q:,.1f} km ({q * 1e3 / e.planet.radius:.3f} planet radii)"),
-        ("speed there", f"{e.v_periapsis.to_value(u.km / u.s):.4f} km/s"),
-        ("speed far away, v_inf", f"{e.v_inf.to_value(u.km / u.s):.4f} km/s"),
-    ]  # fmt: skip
+        ("speed at closest approach", f"{e.v_periapsis.to_value(u.km / u.s):.4f} km/s"),
+        ("hyperbolic excess speed", f"{e.v_inf.to_value(u.km / u.s):.4f} km/s"),
+    ]
     if e.distance_error is not None and e.time_error is not None:
         rows.append(
             (
                 "numerical error",
-                f"{e.distance_error.to_value(u.km):.1g} km, {e.time_error.to_value(u.s):.1g} s; the uncertainty of the "
-                "orbit itself is not in it",
+                f"{e.distance_error.to_value(u.km):.1g} km, {e.time_error.to_value(u.s):.1g} s "
+                "(excludes the orbit uncertainty)",
             )
         )
-        rows.append(("how well the encounter is known", _e(known(e))))
+        rows.append(("orbit quality", known(e)))
     if e.impact:
-        rows.append(("impact", f"reaches the {_e(e.impact_level)}"))
+        rows.append(("impact", f"reaches the {e.impact_level}"))
     if r.contact is not None:
-        rows.append(("contact", _e(contact(r))))
+        rows.append(("contact", contact(r)))
     return rows
 
 
-def _margin_rows(r: FlybyResult) -> list[tuple[str, str]]:
+def _margin_rows(r: FlybyResult, s: SpinSample) -> Rows:
+    """Nominal values, each with its range over the sampled attitudes where it depends on the attitude."""
     m = r.body.material
+    phi = m.friction_angle.to_value(u.deg)
+    needed = s.max_required_friction_angle.to_value(u.deg)
     rows = [
-        (
-            "friction angle of the material",
-            f"{m.friction_angle.to_value(u.deg):g} deg (a choice, not measured)",
-        ),
+        ("friction angle of the material", f"{phi:g} deg (chosen, not measured)"),
         ("cohesion", f"{m.cohesion.to_value(u.Pa):g} Pa"),
-        ("largest friction angle mobilised", _e(angle(r.max_required_friction_angle))),
-        ("margin", _e(angle(r.margin))),
-        ("spin rate afterwards over before", f"{r.spin_ratio:.4f}"),
-        ("change of the pole", f"{r.pole_change.to_value(u.deg):.2f} deg"),
-        ("bound share of the mass", f"{r.bound_fraction:.1%}"),
-        ("semi-axes afterwards", " × ".join(f"{a:.4g}" for a in r.semi_axes.to_value(u.m)) + " m"),
+        (
+            "largest friction angle mobilised",
+            _nominal(angle(r.max_required_friction_angle), _range(needed, "deg", 2)),
+        ),
+        ("margin", _nominal(angle(r.margin), _range(phi - needed, "deg", 2))),
+        ("spin rate after / before", _nominal(f"{r.spin_ratio:.4f}", _range(s.spin_ratio, "", 2))),
+        (
+            "rotation of the spin axis",
+            _nominal(
+                f"{r.pole_change.to_value(u.deg):.2f} deg", _range(s.pole_change.to_value(u.deg), "deg", 1)
+            ),
+        ),
+        ("bound mass fraction", f"{r.bound_fraction:.1%}"),
+        ("semi-axes after", " × ".join(f"{a:.4g}" for a in r.semi_axes.to_value(u.m)) + " m"),
     ]
     if r.required_cohesion > 0 * u.Pa:
-        rows.append(("cohesion that would hold the body", f"{r.required_cohesion.to_value(u.Pa):.3g} Pa"))
+        rows.append(("cohesion needed", f"{r.required_cohesion.to_value(u.Pa):.3g} Pa"))
     if r.onset_time is not None:
-        rows.append(("first yield after the start", f"{r.onset_time.to_value(u.h):.3f} h"))
+        rows.append(("onset of yield", f"{r.onset_time.to_value(u.h):.3f} h after the start"))
     if r.error is not None:
         rows.append(
             (
-                "measured numerical error",
+                "numerical error (measured)",
                 f"semi-axes {r.error.semi_axes:.1e}, spin {r.error.spin:.1e} (relative), friction angle "
                 f"{r.error.required_friction_angle.to_value(u.deg):.1e} deg, tide {r.error.tide:.1e} (relative)",
             )
@@ -218,65 +175,83 @@ def _margin_rows(r: FlybyResult) -> list[tuple[str, str]]:
     return rows
 
 
+def _nominal(value: str, extent: str) -> str:
+    return f"{value} at the nominal attitude; {extent} over the sampled attitudes"
+
+
+def _range(values: np.ndarray, unit: str, digits: int) -> str:
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        return "none is enough"
+    text = f"{finite.min():.{digits}f} to {finite.max():.{digits}f} {unit}".rstrip()
+    return text if len(finite) == len(values) else f"{text} (none is enough at {len(values) - len(finite)})"
+
+
 def _sample_text(s: SpinSample) -> str:
     low, mid, high = np.quantile(s.spin_ratio, [0.0, 0.5, 1.0])
     turn = np.quantile(s.pole_change.to_value(u.deg), [0.0, 0.5, 1.0])
-    phi = np.quantile(s.max_required_friction_angle.to_value(u.deg), [0.0, 1.0])
     known = (
-        "the catalogued pole and unknown phases" if s.pole_known else "an unknown pole (isotropic) and phase"
+        "the catalogued pole and random rotation phases"
+        if s.pole_known
+        else "an isotropic pole (unknown) and random rotation phases"
     )
     return (
-        f"<p>{len(s)} attitudes, with {known}: the spin rate changes by a factor of {low:.2f} to {high:.2f} (median "
-        f"{mid:.2f}), the pole moves by {turn[0]:.1f} to {turn[2]:.1f} deg (median {turn[1]:.1f}), and "
-        f"{phi[0]:.2f} to {phi[1]:.2f} deg of friction are mobilised.</p>"
+        f"{len(s)} attitudes with {known}: the spin rate changes by a factor of {low:.2f} to {high:.2f} (median "
+        f"{mid:.2f}) and the pole moves by {turn[0]:.1f} to {turn[2]:.1f} deg (median {turn[1]:.1f}); friction "
+        f"angles of {_range(s.max_required_friction_angle.to_value(u.deg), 'deg', 2)} are mobilised."
     )
 
 
-def _probability_rows(row: Row) -> list[tuple[str, str]]:
+def _probability_rows(row: Row) -> Rows:
     return [
-        ("samples", f"{int(row['samples'])} ({int(row['samples_dynamic'])} by the dynamics, the rest by a bound)"),
+        (
+            "samples",
+            f"{int(row['samples'])} ({int(row['samples_dynamic'])} integrated, the others decided by a bound)",
+        ),
         (
             "probability of yielding",
             f"{float(row['p_yield']):.3g} (95 % interval {float(row['p_yield_low']):.2g} to "
-            f"{float(row['p_yield_high']):.2g}), among bodies that can exist on their own",
+            f"{float(row['p_yield_high']):.2g}), among bodies in equilibrium before the encounter",
         ),
         ("not in equilibrium", f"{float(row['p_not_in_equilibrium']):.3g} of the samples"),
-        ("drawn from distributions", _e(row["drawn"])),
-        ("what the margin follows (rank correlation)", _e(row["contributors"])),
-    ]  # fmt: skip
+        ("drawn from distributions", str(row["drawn"])),
+        ("margin most sensitive to (Spearman rho)", str(row["contributors"])),
+    ]
 
 
-def _body_rows(a: Asteroid) -> list[tuple[str, str]]:
-    assumed = a.assumed
-    names = {
-        "semi_axis_a_m": "long semi-axis", "semi_axis_b_m": "middle semi-axis", "semi_axis_c_m": "short semi-axis",
-        "density_kg_m3": "density", "spin_period_h": "spin period", "precession_period_h": "precession period",
-        "rotation_period_h": "rotation period",
-    }  # fmt: skip
+#: Columns of the catalogue shown on the page.
+_INPUTS = {
+    "semi_axis_a_m": "long semi-axis",
+    "semi_axis_b_m": "intermediate semi-axis",
+    "semi_axis_c_m": "short semi-axis",
+    "density_kg_m3": "density",
+    "spin_period_h": "spin period",
+    "precession_period_h": "precession period",
+    "rotation_period_h": "rotation period",
+}
+
+
+def _body_rows(a: Asteroid) -> Rows:
     rows = []
-    for column, name in names.items():
+    for column, name in _INPUTS.items():
         if a.knows(column):
             value = a.quantity(column)
-            mark = ' <span class="assumed">assumed</span>' if column in assumed else ""
-            unit = _e(value.unit).replace(" / ", "/")
-            rows.append(
-                (name, f"{value.value:{'.4g' if column.startswith('semi_axis') else 'g'}} {unit}{mark}")
-            )
-    rows += [(f"source of {k.replace('_', ' ')}", _e(v)) for k, v in a.sources.items() if k in _SHOWN]
+            digits = ".4g" if column.startswith("semi_axis") else "g"
+            rows.append((name, f"{value.value:{digits}} {value.unit}".replace(" / ", "/")))
+    rows += [(f"source of {k.replace('_', ' ')}", v) for k, v in a.sources.items() if k in _SHOWN]
     if a.assumptions:
-        rows.append(("not measured", _e("; ".join(a.assumptions))))
+        rows.append(("not measured", "; ".join(a.assumptions)))
     return rows
 
 
 _SHOWN = ("semi_axes", "spin", "pole", "tumbling", "density", "orbit")
 
 
-def _model_rows(r: FlybyResult) -> list[tuple[str, str]]:
-    rows = [(name, _e(what)) for name, what in modelled(r).items()]
-    return [*rows, ("left out, with the largest share", _e(left_out(r, 6)) or "nothing")]
+def _model_rows(r: FlybyResult) -> Rows:
+    return [*modelled(r).items(), ("neglected (largest relative effect)", left_out(r, 6) or "nothing")]
 
 
-def _provenance_rows(a: Asteroid, s: SpinSample, command: str) -> list[tuple[str, str]]:
+def _provenance_rows(a: Asteroid, s: SpinSample, command: str) -> Rows:
     versions = []
     for name in PACKAGES:
         try:
@@ -284,19 +259,19 @@ def _provenance_rows(a: Asteroid, s: SpinSample, command: str) -> list[tuple[str
         except metadata.PackageNotFoundError:
             continue
     rows = [
-        ("flybystab", _e(__version__)),
-        ("made", datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")),
-        ("orbit solution", _e(a.row.get("orbit_solution", ""))),
-        ("catalogue", _e(a.file)),
-        ("ephemeris", _e(ephemeris().name.upper())),
+        ("flybystab", __version__),
+        ("created", datetime.now(UTC).strftime("%Y-%m-%d %H:%M UTC")),
+        ("orbit solution", str(a.row.get("orbit_solution", ""))),
+        ("catalogue", str(a.file)),
+        ("ephemeris", ephemeris().name.upper()),
         ("seed of the attitudes", str(s.seed)),
         (
             "Python and packages",
-            _e(f"Python {platform.python_version()} ({sys.platform}); " + ", ".join(versions)),
+            f"Python {platform.python_version()} ({sys.platform}); " + ", ".join(versions),
         ),
     ]
     if command:
-        rows.insert(1, ("command", f"<code>{_e(command)}</code>"))
+        rows.insert(1, ("command", command))
     return rows
 
 
@@ -325,7 +300,7 @@ def _scene_picture(r: FlybyResult) -> str:
     figure = _blank(7.2, 3.2)
     scene_plot(figure.add_subplot(projection="3d"), r)
     stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=130)  # thousands of facets: smaller as pixels
+    figure.savefig(stream, format="png", dpi=130)  # a bitmap is smaller than thousands of vector facets
     return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
 
 
@@ -336,12 +311,12 @@ def _sample_picture(s: SpinSample) -> str:
 
 
 def sample_plot(axes: Any, sample: SpinSample) -> Any:
-    """Change of the pole against the change of the spin rate, a point for each attitude."""
+    """Plot the rotation of the spin axis against the change of the spin rate, one point for each attitude."""
     axes.plot(
         sample.spin_ratio, sample.pole_change.to_value(u.deg), "o", ms=4, color=BLUE, mec="white", mew=0.4
     )
     axes.axvline(1.0, color="0.5", lw=0.8, ls="--")
-    axes.set_xlabel("spin rate after over before")
-    axes.set_ylabel("change of the pole (deg)")
+    axes.set_xlabel("spin rate after / before")
+    axes.set_ylabel("rotation of the spin axis (deg)")
     axes.set_ylim(bottom=0.0)
     return axes
