@@ -2,6 +2,8 @@
 
 import io
 import json
+import re
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -313,6 +315,8 @@ def test_an_unknown_pole_is_said(capsys):
         ("flybystab fl", "flyby"),
         ("flybystab flyby Apop", "Apophis"),
         ("flybystab flyby Apophis --at", "--attitudes"),
+        ("flybystab flyby Apophis --date 2029-04-13 --pl", "--planet"),
+        ("flybystab encounters Toutat", "Toutatis"),
         ("flybystab completion z", "zsh"),
     ],
 )
@@ -320,18 +324,36 @@ def test_completion(capsys, words, expected):
     status, out, _ = run(capsys, "completion", "bash")
     assert status == 0
     code = f"""{out}
-COMP_WORDS=({words}); COMP_CWORD=$(( ${{#COMP_WORDS[@]}} - 1 )); _flybystab; printf '%s\\n' "${{COMPREPLY[@]}}"
+COMP_WORDS=({words}); COMP_CWORD=$(( ${{#COMP_WORDS[@]}} - 1 ))
+function=$(complete -p flybystab | sed 's/.*-F \\([^ ]*\\).*/\\1/'); "$function" flybystab
+printf '%s\\n' "${{COMPREPLY[@]}}"
 """
     done = subprocess.run(["/bin/bash", "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == [expected]
     assert done.stderr == ""
 
 
-def test_zsh_reads_the_script_of_bash(capsys):
-    _, bash, _ = run(capsys, "completion", "bash")
+def test_files_are_completed_too(capsys, tmp_path):
+    (tmp_path / "Apo.ke1").touch()
+    (tmp_path / "own.csv").touch()
+    _, out, _ = run(capsys, "completion", "bash")
+    for words, expected in (("flyby Apo", ["Apo.ke1", "Apollo", "Apophis"]), ("show ow", ["own.csv"])):
+        code = (
+            f"{out}\nCOMP_WORDS=(flybystab {words}); COMP_CWORD=2; _shtab_flybystab; echo ${{COMPREPLY[@]}}"
+        )
+        done = subprocess.run(
+            ["/bin/bash", "-c", code], capture_output=True, text=True, check=True, cwd=tmp_path
+        )
+        assert sorted(done.stdout.split()) == expected
+
+
+def test_the_script_of_zsh(capsys):
     _, zsh, _ = run(capsys, "completion", "zsh")
-    assert zsh.endswith(bash)
-    assert "bashcompinit" in zsh
+    assert zsh.startswith("#compdef flybystab")
+    assert re.search(r"names=\(.* Apophis .*\)", zsh)
+    assert re.search(r":.*:_flybystab_asteroids", zsh)
+    if shutil.which("zsh"):
+        subprocess.run(["zsh", "-n"], input=zsh, text=True, check=True)
 
 
 def test_stability_of_a_whole_catalogue(tmp_path, capsys):

@@ -6,6 +6,7 @@ import argparse
 
 from flybystab._version import __version__
 from flybystab.cli.common import show
+from flybystab.cli.tab_completion import SHELLS
 
 HELP = "completion with the tab key"
 EXAMPLE = 'eval "$(flybystab completion bash)"'
@@ -13,7 +14,7 @@ EXAMPLE = 'eval "$(flybystab completion bash)"'
 
 def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
-    sub.add_argument("shell", choices=["bash", "zsh"], help="for which shell")
+    sub.add_argument("shell", choices=SHELLS, help="for which shell")
 
 
 def run(options: argparse.Namespace) -> None:

@@ -13,10 +13,12 @@ import sys
 import warnings
 from collections.abc import Sequence
 from difflib import get_close_matches
+from typing import Any
 
 from flybystab._version import __version__
 from flybystab.cli import COMMANDS
 from flybystab.cli.arguments import check_arguments
+from flybystab.cli.tab_completion import ASTEROID, FILE
 from flybystab.errors import FlybystabError, WrongUsage
 
 
@@ -68,6 +70,19 @@ def main(argv: Sequence[str] | None = None) -> int:
     return 0
 
 
+class _Parser(argparse.ArgumentParser):
+    """Marks arguments for tab completion: FILE is completed with files, ``name`` also with asteroids."""
+
+    def add_argument(self, *args: Any, **kwargs: Any) -> argparse.Action:
+        """Add an argument."""
+        action = super().add_argument(*args, **kwargs)
+        if action.dest == "name":
+            action.complete = ASTEROID  # type: ignore[attr-defined]
+        elif action.dest in ("file", "asteroids") or action.metavar == "FILE":
+            action.complete = FILE  # type: ignore[attr-defined]
+        return action
+
+
 class _Help(argparse.RawDescriptionHelpFormatter):
     """Examples as they are written, and no line broken after the name of a command."""
 
@@ -78,7 +93,7 @@ class _Help(argparse.RawDescriptionHelpFormatter):
 
 def command_parser() -> argparse.ArgumentParser:
     """The parser of every command."""
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="flybystab",
         description="Do rubble-pile asteroids survive their close planetary encounters?",
         epilog="examples:\n  flybystab flyby Apophis --output apophis.png\n  flybystab scenario p2.toml --json\n"
