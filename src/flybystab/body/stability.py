@@ -29,6 +29,7 @@ from numpy.typing import NDArray
 
 from flybystab.body.body import Body, check_body
 from flybystab.body.equilibrium import Equilibrium, equilibrium, spin_limits
+from flybystab.body.spin_state import SpinState, spin_state
 from flybystab.constants import G
 from flybystab.core.ellipsoid.potential import carlson_fd
 from flybystab.core.ellipsoid.tide import tensor
@@ -129,7 +130,10 @@ class Stability:
         bodies that do not spin about ``a3``. Pushes that add angular momentum are judged by this, not by the
         critical energy.
     steady : bool
-        Whether the spin is about a principal axis; a tumbling body is judged at its present instant.
+        Whether the spin is about a principal axis; of a tumbling body the criterion takes the present instant.
+    spin_state : SpinState
+        State of rotation. Spin about the middle axis is an unstable motion, at the growth rate given there, whatever
+        the levels say: they hold the angular velocity for the short time of a deformation.
     """
 
     body: Body
@@ -151,6 +155,7 @@ class Stability:
     spin_limits: Quantity
     critical_momentum: Quantity
     steady: bool
+    spin_state: SpinState
 
     @property
     def direction(self) -> Array:
@@ -164,9 +169,12 @@ class Stability:
 
     def __repr__(self) -> str:
         energies = [f"{float(e / self.binding_energy):.3g}" for e in self.critical_energy]
+        rotation = (
+            "" if self.spin_state.steady and not self.spin_state.unstable else self.spin_state.description
+        )
         return (
             f"<Stability {self.verdict}; critical energy over binding energy {', '.join(energies)} "
-            "(second order, third order, barrier)>"
+            f"(second order, third order, barrier){'; ' + rotation if rotation else ''}>"
         )
 
 
@@ -212,7 +220,7 @@ def stability(body: Body, *, dilatancy: float | None = 1.0) -> Stability:
     strains = Orders(*(float(row[i]) for i in (columns.STRAIN_2, columns.STRAIN_3, columns.STRAIN_B)))
     values = np.array([q.value for q in energies])
     finite = np.all(np.isfinite(values)) and values.min() > 0.0
-    steady = np.count_nonzero(body.omega) <= 1
+    rotation = spin_state(body)
     limits = spin_limits(body)
     rate = abs(body.omega[2])
     about_a3 = body.omega[0] == 0.0 and body.omega[1] == 0.0
@@ -242,7 +250,8 @@ def stability(body: Body, *, dilatancy: float | None = 1.0) -> Stability:
         kappa_crit=None if np.isnan(row[columns.KAPPA]) else row[columns.KAPPA] * units.stress * u.Pa,
         spin_limits=limits,
         critical_momentum=margin * u.kg * u.m**2 / u.s,
-        steady=bool(steady),
+        steady=rotation.steady,
+        spin_state=rotation,
     )
 
 

@@ -131,11 +131,14 @@ def _asteroid(options: argparse.Namespace) -> None:
                 "lode_angle_deg": e.lode_angle.to_value(u.deg),
                 "stress_Pa": e.stress.to_value(u.Pa),
                 "spin_limits_rad_s": list(limits),
+                "spin_mode": s.spin_state.mode,
+                "spin_growth_rate_per_s": s.spin_state.growth_rate.value,
                 "assumed": asteroid.assumptions,
             }
         ),
         lambda: [
             *equilibrium_lines(asteroid.label, e),
+            f"rotation                  {s.spin_state.description}",
             f"small perturbations       {'stable' if s.stable_infinitesimal else 'not stable'}",
             f"critical strain           {s.critical_strain.second:.3g} (second order), "
             f"{s.critical_strain.third:.3g} (third), {s.critical_strain.barrier:.3g} (barrier)",
