@@ -30,6 +30,7 @@ _HOME = {
     "catalogue": "catalogues.catalogue",
     "encounter_distribution": "encounter.distribution",
     "cite": "io.citation",
+    "disruption_rates": "population.disruption",
     "encounter_rates": "population.rates",
     "equilibrium": "body.equilibrium",
     "find_encounters": "orbit.search.encounter_finder",
@@ -69,6 +70,7 @@ if TYPE_CHECKING:
     from flybystab.io.citation import cite
     from flybystab.orbit.orbit import Orbit
     from flybystab.orbit.search.encounter_finder import find_encounters
+    from flybystab.population.disruption import disruption_rates
     from flybystab.population.rates import encounter_rates
     from flybystab.screening.inference import infer
     from flybystab.screening.screening import screen

@@ -25,6 +25,8 @@ from flybystab.units import to_si, whole
 
 Array = NDArray[np.float64]
 
+#: Julian year, s.
+YEAR = 365.25 * 86400.0
 #: Orbits of one task of a thread.
 BLOCK = 20_000
 
@@ -59,27 +61,32 @@ class EncounterRates:
         """Rate of all orbits together, 1/yr."""
         return self.rate.sum()
 
-    def sample(self, count: int, seed: int) -> QTable:
+    def sample(self, count: int, seed: int, *, above: Quantity | None = None) -> QTable:
         """Encounters drawn from the population in proportion to their rates.
 
         Parameters
         ----------
         count : int
         seed : int
+        above : Quantity, optional
+            Least periapsis distance, below :attr:`periapsis`; zero by default.
 
         Returns
         -------
         QTable
             ``orbit`` (row number), ``v_inf`` (km/s) and ``periapsis`` (km). The periapsis follows the focused
-            cross-section ``q^2 + 2 GM q/v_inf^2``, from zero to the limit: those below the planet's radius are impacts.
+            cross-section ``q^2 + 2 GM q/v_inf^2``: those below the planet's radius are impacts.
         """
-        if not self.total > 0.0 / u.yr:
-            raise InvalidInput("count", count, "orbits that meet the planet: none does")
         rng = np.random.default_rng(whole(seed, "seed", 0))
-        share = self.rate.value / self.rate.value.sum()
-        chosen = rng.choice(len(share), size=whole(count, "count", 1), p=share)
+        high, gm = self.periapsis.to_value(u.m), self.planet.gm
+        low = 0.0 if above is None else to_si(above, u.m, "above", low=0.0, high=high, open_high=True)
+        rate = self.rate.value
+        if low > 0.0:
+            rate = rate - rates_within(self._elements, self._orbit, gm, low)[0] * YEAR
+        if not rate.sum() > 0.0:
+            raise InvalidInput("count", count, "orbits that meet the planet: none does")
+        chosen = rng.choice(len(rate), size=whole(count, "count", 1), p=rate / rate.sum())
         speed = np.empty(len(chosen))
-        limit, gm = self.periapsis.to_value(u.m), self.planet.gm
         speeds, weights = np.empty(4 * NODES_R * NODES_S), np.empty(4 * NODES_R * NODES_S)
         order = np.argsort(chosen, kind="stable")
         rows, starts = np.unique(chosen[order], return_index=True)
@@ -89,11 +96,11 @@ class EncounterRates:
                 a, e, np.sin(i), np.cos(i), self._orbit[0], self._orbit[1], np.sin(self._orbit[2]), GM_SUN,
                 speeds, weights,
             )  # fmt: skip
-            cross = weights[:m] * limit * (limit + 2.0 * gm / speeds[:m] ** 2)
+            cross = weights[:m] * (high - low) * (high + low + 2.0 * gm / speeds[:m] ** 2)
             speed[block] = rng.choice(speeds[:m], size=len(block), p=cross / cross.sum())
-        # q^2 + 2 f q = x (L^2 + 2 f L), f = GM/U^2
+        # q^2 + 2 f q = x is uniform between its values at the two limits, f = GM/U^2
         f = gm / speed**2
-        x = rng.random(len(chosen)) * limit * (limit + 2.0 * f)
+        x = low * (low + 2.0 * f) + rng.random(len(chosen)) * (high - low) * (high + low + 2.0 * f)
         q = x / (f + np.sqrt(f * f + x))
         return QTable({"orbit": chosen, "v_inf": speed / 1e3 * u.km / u.s, "periapsis": q / 1e3 * u.km})
 
@@ -156,13 +163,7 @@ def encounter_rates(
             ]
         )
     threads = (os.cpu_count() or 1) if workers is None else whole(workers, "workers", 1)
-    rate, moments = np.empty(len(elements)), np.empty((len(elements), 2))
-
-    def part(first: int) -> None:
-        block = slice(first, first + BLOCK)
-        encounter_rates_of(elements[block], target, GM_SUN, body.gm, limit, rate[block], moments[block])
-
-    list(in_order(part, range(0, len(elements), BLOCK), threads))
+    rate, moments = rates_within(elements, target, body.gm, limit, threads)
     mean = moments[:, 0]
     spread = np.sqrt(np.maximum(0.0, moments[:, 1] - mean**2))
     return EncounterRates(
@@ -174,6 +175,20 @@ def encounter_rates(
         elements,
         target,
     )
+
+
+def rates_within(
+    elements: Array, target: Array, gm: float, limit: float, workers: int = 1
+) -> tuple[Array, Array]:
+    """Rates (1/s) within a periapsis (m), and the mean and mean square of the excess speed, on threads."""
+    rate, moments = np.empty(len(elements)), np.empty((len(elements), 2))
+
+    def part(first: int) -> None:
+        block = slice(first, first + BLOCK)
+        encounter_rates_of(elements[block], target, GM_SUN, gm, limit, rate[block], moments[block])
+
+    list(in_order(part, range(0, len(elements), BLOCK), workers))
+    return rate, moments
 
 
 def _elements(orbits: Any) -> Array:
