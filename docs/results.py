@@ -21,7 +21,7 @@ from flybystab.catalogues.catalogue import catalogue, find
 from flybystab.catalogues.formats import with_physical_data
 from flybystab.plots.screening import inference_figure, results_figure
 from flybystab.screening.columns import YIELDED
-from flybystab.screening.executors import workers
+from flybystab.screening.executors import open_executor
 from flybystab.screening.inference import infer, strongest_passage, survived
 from flybystab.screening.priors import Population
 from flybystab.screening.progress import ProgressBar
@@ -92,7 +92,7 @@ def run(name, data, jobs, keep):
         ),
     )
     began = time.monotonic()
-    with workers(jobs) as pool:
+    with open_executor(jobs) as pool:
         screening.run(path, overwrite=True, executor=pool, progress=ProgressBar())
     seconds = time.monotonic() - began
     (OUT / f"{name}.seconds").write_text(f"{seconds:.1f} {jobs}\n")

@@ -15,7 +15,7 @@ from flybystab.encounter.encounter import Encounter
 from flybystab.errors import NotConverged
 from flybystab.screening import table_files
 from flybystab.screening.encounters import Passage
-from flybystab.screening.executors import workers
+from flybystab.screening.executors import open_executor
 from flybystab.screening.screening import Screening
 from flybystab.screening.settings import settings
 
@@ -79,5 +79,5 @@ if __name__ == "__main__":
     # Tests may themselves run in the background, where a shell has interrupts ignored.
     signal.signal(signal.SIGINT, signal.default_int_handler)
     table_files.ROW_GROUP = int(os.environ.get("ROW_GROUP", table_files.ROW_GROUP))
-    with workers(int([*sys.argv, "1"][2])) as pool:
+    with open_executor(int([*sys.argv, "1"][2])) as pool:
         screening(16, slow, samples=3, seed=4).run(sys.argv[1], executor=pool, chunk=1)

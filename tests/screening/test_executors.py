@@ -13,7 +13,9 @@ import pytest
 from scripted import same, screening, slow, three
 
 from flybystab.errors import InvalidInput, WorkersLost
-from flybystab.screening.executors import workers
+from flybystab.screening import executors
+from flybystab.screening.classification import classification
+from flybystab.screening.executors import open_executor
 from flybystab.screening.results import read_results
 
 HERE = Path(__file__).resolve().parents[1]
@@ -47,7 +49,7 @@ def alive(pid):
 
 
 def test_processes_give_the_same_rows(tmp_path, reference):
-    with workers(2) as pool:
+    with open_executor(2) as pool:
         screening(16, three, samples=3, seed=4).run(tmp_path / "p.ecsv", executor=pool)
     same(read_results(tmp_path / "p.ecsv"), reference)
 
@@ -58,11 +60,11 @@ def test_dead_process_is_named_and_the_run_goes_on(tmp_path, reference):
             os.kill(next(iter(pool._processes)), signal.SIGKILL)
 
     run = screening(16, three, samples=3, seed=4)
-    with workers(2) as pool, pytest.raises(WorkersLost, match="in work"):
+    with open_executor(2) as pool, pytest.raises(WorkersLost, match="in work"):
         run.run(tmp_path / "p.ecsv", executor=pool, chunk=1, progress=kill)
     assert not read_results(tmp_path / "p.ecsv").meta["complete"]
     states = []
-    with workers(1) as pool:
+    with open_executor(1) as pool:
         run.run(tmp_path / "p.ecsv", executor=pool, progress=states.append)
     assert states[0].resumed >= 4
     same(read_results(tmp_path / "p.ecsv"), reference)
@@ -104,10 +106,13 @@ def test_workers_end_with_a_killed_parent(tmp_path):
 
 
 def test_workers_are_checked():
-    with pytest.raises(InvalidInput, match="jobs"), workers(0):
+    with pytest.raises(InvalidInput, match="workers"), open_executor(0):
         pass
     pytest.importorskip("distributed")
-    with pytest.raises(WorkersLost, match="no dask scheduler"), workers(dask="tcp://127.0.0.1:9", timeout=1):
+    with (
+        pytest.raises(WorkersLost, match="no dask scheduler"),
+        open_executor(dask="tcp://127.0.0.1:9", timeout=1),
+    ):
         pass
 
 
@@ -184,3 +189,11 @@ def test_dask_with_a_killed_worker_gives_the_same_rows(tmp_path, reference):
             process.kill()
             process.wait()
     same(read_results(tmp_path / "d.ecsv"), reference)
+
+
+def test_old_names_of_the_number_of_workers_are_deprecated():
+    with pytest.warns(DeprecationWarning, match="use open_executor"), executors.workers(jobs=1) as pool:
+        assert pool is None
+    with pytest.warns(DeprecationWarning, match="use workers"):
+        old = classification(["Anteros"], threads=1)
+    same(old, classification(["Anteros"], workers=1))

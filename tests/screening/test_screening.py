@@ -405,6 +405,12 @@ def test_wilson_interval_and_contributors():
     assert wilson(20, 20)[0] == pytest.approx(20 / (20 + z2))
     assert wilson(5, 10)[0] == pytest.approx(1 - wilson(5, 10)[1])
     assert wilson(0, 0) == (0.0, 1.0)
+    # The formula of Wilson (1927) in full, z = 1.959964.
+    for k, n in ((1, 7), (33, 100), (999, 1000), (5, 100_000)):
+        p, z = k / n, 1.959964
+        centre, half = p + z2 / (2 * n), z * np.sqrt(p * (1 - p) / n + z2 / (4 * n * n))
+        wanted = (centre - half) / (1 + z2 / n), (centre + half) / (1 + z2 / n)
+        assert wilson(k, n) == pytest.approx(wanted, rel=1e-7)
     rng = np.random.default_rng(0)
     x, y = rng.normal(size=(2, 300))
     text = contributors({"x": x, "y": y, "fixed": np.ones(300)}, np.exp(3 * x) + 0.01 * y)

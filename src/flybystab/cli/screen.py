@@ -55,7 +55,7 @@ def run(options: argparse.Namespace) -> None:
     import astropy.units as u
 
     from flybystab.io.document import table_document
-    from flybystab.screening.executors import workers
+    from flybystab.screening.executors import open_executor
     from flybystab.screening.priors import Population
     from flybystab.screening.progress import ProgressBar
     from flybystab.screening.results import read_results
@@ -87,7 +87,7 @@ def run(options: argparse.Namespace) -> None:
     )
     bar = ProgressBar()
     try:
-        with workers(options.jobs, options.dask) as executor:
+        with open_executor(options.jobs, options.dask) as executor:
             screening.run(
                 output,
                 samples_output=options.samples_output,

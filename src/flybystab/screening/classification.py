@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -62,6 +63,7 @@ def classification(
     material: Material | None = None,
     dilatancy: float = 1.0,
     population: Population | None = None,
+    workers: int | None = None,
     threads: int | None = None,
 ) -> QTable:
     """Structural stability of a catalogue.
@@ -78,14 +80,19 @@ def classification(
         ``beta/min k`` of the test; 1 is associative flow.
     population : Population, optional
         Distributions of what is missing.
+    workers : int, optional
+        Threads; one per processor by default.
     threads : int, optional
-        As many as cores by default.
+        Deprecated name of `workers`.
 
     Returns
     -------
     QTable
         :data:`COLUMNS`; a body that cannot be computed has its reason in `error`.
     """
+    if threads is not None:
+        warnings.warn("threads is deprecated: use workers", DeprecationWarning, stacklevel=2)
+        workers = threads
     material = material or Material()
     rows: list[dict[str, Any]] = []
     bodies: list[Body] = []
@@ -110,7 +117,7 @@ def classification(
         bare = Material(yield_surface=material.yield_surface, bulk_modulus=material.bulk_modulus)
         them = [b.with_(material=bare) for b in bodies] if cohesionless else bodies
         return stability_many(
-            them, friction_angle=friction, dilatancy=dilatancy, depth=depth, threads=threads
+            them, friction_angle=friction, dilatancy=dilatancy, depth=depth, threads=workers
         )
 
     own = table("barrier")

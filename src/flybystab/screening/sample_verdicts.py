@@ -9,7 +9,7 @@ from typing import Any
 import astropy.units as u
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import rankdata
+from scipy.stats import binomtest, rankdata
 
 from flybystab.body.body import Material
 from flybystab.core.ellipsoid.yield_bound import INTACT, UNDECIDED, quick_margins
@@ -193,17 +193,12 @@ def judge_each(
     )
 
 
-def wilson(successes: int, trials: int, z: float = 1.959964) -> tuple[float, float]:
-    """Wilson score interval of a probability; (0, 1) without trials."""
+def wilson(successes: int, trials: int) -> tuple[float, float]:
+    """Wilson score interval of a probability at 95 % confidence (`scipy.stats.binomtest`); (0, 1) without trials."""
     if trials == 0:
         return 0.0, 1.0
-    p = successes / trials
-    centre = p + z * z / (2 * trials)
-    half = z * np.sqrt(p * (1 - p) / trials + z * z / (4 * trials * trials))
-    scale = 1 + z * z / trials
-    # Without rounding at the ends: no success has the lower limit zero.
-    low = 0.0 if successes == 0 else (centre - half) / scale
-    return low, 1.0 if successes == trials else (centre + half) / scale
+    interval = binomtest(successes, trials).proportion_ci(confidence_level=0.95, method="wilson")
+    return float(interval.low), float(interval.high)
 
 
 def contributors(inputs: dict[str, Array], outcome: Array, most: int = 3) -> str:

@@ -1,0 +1,164 @@
+"""Reading files that a user supplies: size and nesting are limited before anything is parsed.
+
+Every reader of a user's file goes through this module, so that one place decides what is too large and every refusal
+names the limit::
+
+    text = read_text(path, "catalogue file")          # decompresses gzip, at most TEXT_LIMIT bytes
+    record = parse_json(text, "orbit file", path)     # nesting, digits and syntax checked
+    content = parse_toml(text, "scenario file", path)
+    for row in csv_rows(text, "catalogue file", path):
+        ...
+
+The module lies below every package that reads files and imports nothing but the errors.
+"""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import io
+import json
+import re
+import stat
+import tomllib
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from flybystab.errors import InvalidInput
+
+#: Largest text of one file after decompression, bytes. The MPC table of all near-Earth objects has 8 MB.
+TEXT_LIMIT = 512 * 2**20
+#: Largest JSON or TOML document, bytes.
+DOCUMENT_LIMIT = 64 * 2**20
+#: Largest cell of a CSV file, characters.
+FIELD_LIMIT = 128 * 1024
+#: Deepest nesting of arrays and tables in JSON and TOML; also the largest number of dots in a TOML key.
+DEPTH_LIMIT = 100
+#: Largest number of digits in a row: CPython itself refuses integers of more than 4,300.
+DIGIT_LIMIT = 1000
+
+_CHUNK = 2**20
+_DIGITS = re.compile(rf"[0-9_]{{{DIGIT_LIMIT + 1},}}")
+_STRING = re.compile(r'"""[\s\S]*?"""|\'\'\'[\s\S]*?\'\'\'|"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\'|#[^\n]*')
+_JSON_STRING = re.compile(r'"(?:[^"\\]|\\.)*"')
+_KEY = re.compile(rf"(?<![\w-])(?:[\w-]++|~)(?:[ \t]*+\.[ \t]*+(?:[\w-]++|~)){{{DEPTH_LIMIT},}}")
+
+
+def read_bytes(path: str | Path, what: str, limit: int = TEXT_LIMIT) -> bytes:
+    """Content of a file, decompressed if it is gzipped.
+
+    Parameters
+    ----------
+    path : str or Path
+        An ordinary file: a FIFO or device, which may never end, is refused.
+    what : str
+        What the file is, for the message: "catalogue file".
+    limit : int
+        Largest size after decompression, bytes.
+
+    Raises
+    ------
+    InvalidInput
+        The file cannot be read or decompressed, or is larger than `limit`.
+    """
+    file = Path(path)
+    try:
+        if not stat.S_ISREG(file.stat().st_mode):
+            raise InvalidInput(what, path, "an ordinary file")
+        with file.open("rb") as raw:
+            packed = raw.read(2) == b"\x1f\x8b"
+            raw.seek(0)
+            stream: Any = gzip.GzipFile(fileobj=raw) if packed else raw
+            parts, size = [], 0
+            while part := stream.read(_CHUNK):
+                parts.append(part)
+                size += len(part)
+                if size > limit:
+                    raise InvalidInput(what, path, f"a file of at most {_size(limit)}{_packed(packed)}")
+    except InvalidInput:
+        raise
+    except (OSError, EOFError, zlib.error, ValueError) as error:  # ValueError: a null byte in the path
+        reason = getattr(error, "strerror", None) or str(error)
+        raise InvalidInput(what, path, f"a readable file ({reason})") from None
+    return b"".join(parts)
+
+
+def read_text(path: str | Path, what: str, limit: int = TEXT_LIMIT) -> str:
+    """UTF-8 text of a file, with or without a byte-order mark (arguments and errors of :func:`read_bytes`)."""
+    try:
+        return read_bytes(path, what, limit).decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise InvalidInput(what, path, f"a readable file in UTF-8 ({error})") from None
+
+
+def parse_json(text: str, what: str, path: str | Path) -> Any:
+    """Content of a JSON document.
+
+    Raises
+    ------
+    InvalidInput
+        Not JSON, larger than `DOCUMENT_LIMIT`, nested deeper than `DEPTH_LIMIT`, or with an integer of more than
+        `DIGIT_LIMIT` digits.
+    """
+    _check_document(text, what, path, _JSON_STRING)
+    try:
+        return json.loads(text)
+    except ValueError as error:
+        raise InvalidInput(what, path, f"valid JSON ({error})") from None
+
+
+def parse_toml(text: str, what: str, path: str | Path) -> dict[str, Any]:
+    """Content of a TOML document (limits and errors of :func:`parse_json`; keys of at most `DEPTH_LIMIT` dots)."""
+    bare = _check_document(text, what, path, _STRING)
+    if _KEY.search(bare):
+        raise InvalidInput(what, path, f"keys of at most {DEPTH_LIMIT} parts")
+    try:
+        return tomllib.loads(text)
+    except (tomllib.TOMLDecodeError, ValueError, RecursionError) as error:
+        raise InvalidInput(what, path, f"valid TOML ({error})") from None
+
+
+def csv_rows(text: str, what: str, path: str | Path, **dialect: Any) -> Iterator[list[str]]:
+    """Rows of a CSV text.
+
+    Raises
+    ------
+    InvalidInput
+        A cell is longer than `FIELD_LIMIT`, or the quoting is wrong.
+    """
+    # csv.field_size_limit belongs to the whole process; its default equals FIELD_LIMIT and is not changed here.
+    reader = csv.reader(io.StringIO(text, newline=""), **dialect)
+    while True:
+        try:
+            row = next(reader)
+        except StopIteration:
+            return
+        except csv.Error as error:
+            limit = f"cells of at most {FIELD_LIMIT:,} characters" if "limit" in str(error) else "valid CSV"
+            raise InvalidInput(what, path, f"{limit} (line {reader.line_num}: {error})") from None
+        yield row
+
+
+def _check_document(text: str, what: str, path: str | Path, strings: re.Pattern[str]) -> str:
+    """Refuse what is too large, too deep or has too many digits; the text with its strings blanked."""
+    if len(text) > DOCUMENT_LIMIT:
+        raise InvalidInput(what, path, f"a document of at most {_size(DOCUMENT_LIMIT)}")
+    bare = strings.sub("~", text)
+    if _DIGITS.search(bare):
+        raise InvalidInput(what, path, f"numbers of at most {DIGIT_LIMIT:,} digits")
+    depth = 0
+    for bracket in re.findall(r"[\[\]{}]", bare):
+        depth += 1 if bracket in "[{" else -1
+        if depth > DEPTH_LIMIT:
+            raise InvalidInput(what, path, f"arrays and tables nested at most {DEPTH_LIMIT} deep")
+    return bare
+
+
+def _size(limit: int) -> str:
+    return f"{limit >> 20} MB" if limit >= 2**20 else f"{limit:,} bytes"
+
+
+def _packed(packed: bool) -> str:
+    return " after decompression" if packed else ""
