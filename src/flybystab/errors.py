@@ -74,6 +74,14 @@ class NoEncounter(FlybystabError, LookupError):
     """The orbit has no close approach to the planet near the requested time."""
 
 
+class Impact(FlybystabError, ValueError):
+    """The asteroid hits the Sun, a planet or the Moon before the requested time: no state exists there."""
+
+
+class InaccurateOrbit(UserWarning):
+    """The numerical error of a propagated state, measured by a second integration, is large."""
+
+
 class NotConverged(FlybystabError, ArithmeticError):
     """A numerical method gave up; the message says where and with what state."""
 

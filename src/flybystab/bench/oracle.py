@@ -19,6 +19,7 @@ from scipy.optimize import brentq
 from flybystab.constants import AU, DAY
 from flybystab.errors import MissingExtra
 from flybystab.orbit.ephemeris import ephemeris
+from flybystab.orbit.ias15 import set_step_control
 from flybystab.orbit.orbit import Orbit
 
 Array = NDArray[np.float64]
@@ -82,8 +83,7 @@ class Oracle:
         x, v = state[:3] / AU, state[3:] * (DAY / AU)
         sim.add(x=x[0], y=x[1], z=x[2], vx=v[0], vy=v[1], vz=v[2])
         extras.particle_params = np.array(orbit.nongrav.a) * (DAY**2 / AU)
-        sim.ri_ias15.adaptive_mode = 2
-        sim.ri_ias15.epsilon = epsilon
+        set_step_control(sim, epsilon)
         sim.dt = 1.0 if self.days(towards) > t else -1.0
         return sim, extras
 

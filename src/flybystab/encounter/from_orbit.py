@@ -26,7 +26,7 @@ from flybystab.orbit.closest_approach import (
 )
 from flybystab.orbit.ephemeris import BODIES, Ephemeris, Window
 from flybystab.orbit.forces import FORCES, model, shares
-from flybystab.orbit.ias15 import LOG_WIDTH, Flight
+from flybystab.orbit.ias15 import EPSILON, TIGHT, Flight
 from flybystab.orbit.kepler import time_at_distance
 from flybystab.orbit.orbit import Orbit, _ephemeris, later, seconds
 from flybystab.orbit.planets import Planet
@@ -48,13 +48,12 @@ _OWN = 2.0 * HOUR
 
 @dataclass(frozen=True)
 class _Passage:
-    """Closest approach on one integration: time (s), relative state, log of steps, step of it, way from the epoch."""
+    """Closest approach on one integration: time (s), relative state, log from the epoch on, and its step there."""
 
     t: float
     state: Array
     log: Array
     step: int
-    way: Array
     forces: tuple[str, ...]
 
     @property
@@ -65,39 +64,40 @@ class _Passage:
 def _passage(
     orbit: Orbit, window: Window, index: int, forces: tuple[str, ...], reach: float, epsilon: float
 ) -> _Passage | None:
-    """The minimum of distance nearest to the epoch of the window, or None."""
-    flight = orbit.flight(window, forces, epsilon)
-    before = flight.t
-    way = flight.log_to(-reach) if before != -reach else np.empty((0, LOG_WIDTH))
-    log = flight.log_to(reach)
-    hit = nearest_minimum(log, window, index, 0.0)
+    """The minimum of distance within ``reach`` s of the epoch of the window and nearest to it, or None."""
+    start = seconds(orbit.epoch, window.epoch)
+    # Both directions start from the epoch of the orbit, so that a long search does not add the error of a way back.
+    parts: list[Array] = []
+    for direction in (-1.0, 1.0):
+        if (direction * reach - start) * direction <= 0.0:
+            continue
+        flight = orbit.flight(window, forces, epsilon)
+        # From an epoch outside of the interval: a row of the log at its edge.
+        stops = [s for s in (-direction * reach, direction * reach) if (s - start) * direction > 0.0]
+        part = np.concatenate([flight.log_to(s)[(i > 0) :] for i, s in enumerate(stops)])
+        parts.append(part[::-1] if direction < 0.0 else part[len(parts) :])
+    log = np.concatenate(parts)
+    low = int(np.searchsorted(log[:, 0], -reach))
+    hit = nearest_minimum(log[low : int(np.searchsorted(log[:, 0], reach)) + 1], window, index, 0.0)
     if hit is None:
         return None
     t, _, step = hit
+    step += low
     again = Flight(model(window, forces, orbit.nongrav), log[step, 0], log[step, 1:7], epsilon)
     t, state = periapsis_time(_relative_to(again, window, index), t)
-    if before < -reach:
-        log = np.concatenate([way[:-1], log])
-        step += len(way) - 1
-    if before <= -reach:
-        way = log
-    elif before < t:
-        way = log[max(int(np.searchsorted(log[:, 0], before)) - 1, 0) :]
-    else:
-        way = way[::-1]
-    return _Passage(t, state, log, step, way, forces)
+    return _Passage(t, state, log, step, forces)
 
 
-def _path(way: Array, start: float, stop: float) -> tuple[Array, Array]:
+def _path(log: Array, start: float, stop: float) -> tuple[Array, Array]:
     """Times from `start` to `stop` (s, either order) and barycentric states, along a log, dense enough to sum."""
     low, high = min(start, stop), max(start, stop)
-    inside = way[(way[:, 0] > low) & (way[:, 0] < high), 0]
+    inside = log[(log[:, 0] > low) & (log[:, 0] < high), 0]
     t = np.unique(np.concatenate([np.linspace(low, high, 129), inside]))
-    t = t[(t >= way[0, 0]) & (t <= way[-1, 0])]
+    t = t[(t >= log[0, 0]) & (t <= log[-1, 0])]
     states = np.empty((t.size, 6))
     for n, time in enumerate(t):
-        k = min(max(int(np.searchsorted(way[:, 0], time, side="right")) - 1, 0), len(way) - 2)
-        between(way, k, float(time), states[n])
+        k = min(max(int(np.searchsorted(log[:, 0], time, side="right")) - 1, 0), len(log) - 2)
+        between(log, k, float(time), states[n])
     return (t, states) if start <= stop else (t[::-1], states[::-1])
 
 
@@ -132,7 +132,7 @@ def followed(
     if np.linalg.norm(away[:3]) < body.impact_distance:
         raise starts_inside(orbit.name, orbit.epoch, body)
     everything = tuple(n for n in FORCES if n != "non-gravitational" or any(orbit.nongrav.a))
-    first = _passage(orbit, window, index, forces or everything, reach, 1e-9)
+    first = _passage(orbit, window, index, forces or everything, reach, EPSILON)
     if first is not None:
         _check_way(orbit, body, window, first, epoch)
     beside = neighbour(orbit, near if first is None else later(near, first.t), ephemeris)
@@ -144,16 +144,16 @@ def followed(
             f"no encounter with {body.name} within {largest / AU:.4f} au and {reach / DAY:g} d of "
             f"{near.iso} TDB: {closest}{_horizon(orbit, beside, window, forces or everything, largest)}"
         )
-    size = shares(window, *_path(first.way, epoch, first.t), orbit.nongrav)
+    size = shares(window, *_path(first.log, epoch, first.t), orbit.nongrav)
     if forces is None:
         forces = tuple(n for n in everything if size[n] >= accuracy)
-    chosen = _passage(orbit, window, index, forces, reach, 1e-9)
+    chosen = _passage(orbit, window, index, forces, reach, EPSILON)
     if chosen is None:
         raise NoEncounter(
             f"the closest approach to {body.name} vanishes with the forces {', '.join(forces)}"
             + _horizon(orbit, beside, window, everything, largest)
         )
-    tight = _passage(orbit, window, index, forces, reach, 1e-11)
+    tight = _passage(orbit, window, index, forces, reach, TIGHT)
     gaps = [
         (abs(chosen.distance - other.distance), abs(chosen.t - other.t)) if other else (np.inf, np.inf)
         for other in (first, tight)
@@ -174,7 +174,7 @@ def followed(
 def _check_way(orbit: Orbit, body: Planet, window: Window, passage: _Passage, epoch: float) -> None:
     """Raise NoEncounter if the asteroid hits the planet between its epoch and a passage."""
     index = BODIES.index(body.name)
-    found, _ = crossings(passage.way, window.head, window.data, window.gm, index, body.impact_distance, 8)
+    found, _ = crossings(passage.log, window.head, window.data, window.gm, index, body.impact_distance, 8)
     low, high = sorted((epoch, passage.t))
     hits = found[(found[:, 0] > low) & (found[:, 0] < high) & (np.abs(found[:, 0] - passage.t) > _OWN), 0]
     if hits.size:

@@ -109,6 +109,58 @@ def crossings(
 
 
 @kernel
+def steps_into(log: Array, head: Array, data: Array, gm: Array, body: int, floor: float) -> Array:
+    """Steps of a log on which the distance from a body may fall below ``floor`` (m), as row numbers.
+
+    The chord of the relative path less its largest sagitta, ``h^2 |a| / 8``, bounds the distance from below.
+    """
+    out = np.zeros(log.shape[0], dtype=np.int64)
+    count = 0
+    states = body_states(head, data, gm, body, log[:, 0].copy())
+    for k in range(log.shape[0] - 1):
+        h = log[k + 1, 0] - log[k, 0]
+        rr = rd = dd = bend = pull = 0.0
+        for j in range(3):
+            r = log[k, 1 + j] - states[k, j]
+            d = log[k + 1, 1 + j] - states[k + 1, j] - r
+            rr += r * r
+            rd += r * d
+            dd += d * d
+            bend = max(bend, log[k, 7 + j] ** 2, log[k + 1, 7 + j] ** 2)
+            pull += (states[k + 1, 3 + j] - states[k, 3 + j]) ** 2
+        s = min(max(-rd / dd, 0.0), 1.0) if dd > 0.0 else 0.0
+        chord = np.sqrt(max(rr + s * (2.0 * rd + s * dd), 0.0))
+        # Three times what the ends have: the acceleration may be larger between them.
+        if chord < floor + 0.375 * h * h * np.sqrt(3.0 * bend) + 0.375 * abs(h) * np.sqrt(pull):
+            out[count] = k
+            count += 1
+    return out[:count]
+
+
+def first_contact(log: Array, window: Window, floors: Array) -> tuple[float, int] | None:
+    """Time (s) and body of the first fall below ``floors`` (m, one per body) along a log in either direction of time.
+
+    Returns
+    -------
+    tuple or None
+        None where the path stays outside of every body.
+    """
+    best: tuple[float, int] | None = None
+    sign = 1.0 if log[-1, 0] >= log[0, 0] else -1.0
+    tables = (window.head, window.data, window.gm)
+    for body, floor in enumerate(floors):
+        for k in steps_into(log, *tables, body, float(floor)):
+            pair = log[k : k + 2] if sign > 0.0 else log[k : k + 2][::-1]
+            found, _ = crossings(np.ascontiguousarray(pair), *tables, body, float(floor), 16)
+            into = found[found[:, 2] * sign < 0.0, 0]
+            if into.size and (
+                best is None or (into.min() * sign if sign > 0 else -into.max()) < best[0] * sign
+            ):
+                best = (float(into.min() if sign > 0.0 else into.max()), body)
+    return best
+
+
+@kernel
 def _measure(s: Array, level: float) -> float:
     """``r.v`` (m2/s) for a negative level, else ``r - level`` (m)."""
     if level < 0.0:

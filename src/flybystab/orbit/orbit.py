@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -13,12 +14,14 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.constants import DAY
-from flybystab.errors import InvalidInput, UnknownName
+from flybystab.errors import Impact, InaccurateOrbit, InvalidInput, UnknownName
+from flybystab.orbit.closest_approach import first_contact
 from flybystab.orbit.covariance import Covariance
 from flybystab.orbit.elements import GM_SUN, ecliptic_to_icrf, state_from_elements
 from flybystab.orbit.ephemeris import BODIES, Ephemeris, Window, ephemeris
 from flybystab.orbit.forces import FORCES, NonGravitational, model
-from flybystab.orbit.ias15 import Flight
+from flybystab.orbit.ias15 import EPSILON, TIGHT, Flight
+from flybystab.orbit.planets import PLANETS
 from flybystab.units import brief, to_si
 
 Array = NDArray[np.float64]
@@ -26,6 +29,8 @@ Array = NDArray[np.float64]
 _AU_D2 = u.au / u.d**2
 _SPEED = u.m / u.s
 _ZERO = 0.0 * _AU_D2
+#: Difference of two integrations that is worth a warning, m.
+_LARGE_ERROR = 1e3
 
 
 @dataclass(frozen=True, eq=False)
@@ -181,9 +186,11 @@ class Orbit:
             state + window.states(BODIES.index(self.centre), np.array([seconds(self.epoch, window.epoch)]))[0]
         )
 
-    def flight(self, window: Window, forces: tuple[str, ...] | None = None, epsilon: float = 1e-9) -> Flight:
+    def flight(
+        self, window: Window, forces: tuple[str, ...] | None = None, epsilon: float = EPSILON
+    ) -> Flight:
         """The asteroid in rebound at the epoch of the orbit; times are seconds from ``window.epoch``."""
-        chosen = forces if forces is not None else default_forces(self)
+        chosen = forces if forces is not None else default_forces(self, *BODIES)
         return Flight(
             model(window, chosen, self.nongrav),
             seconds(self.epoch, window.epoch),
@@ -196,21 +203,67 @@ class Orbit:
     ) -> tuple[Quantity, Quantity]:
         """Position and velocity at another time, ICRF, relative to `centre`, with all forces.
 
+        The orbit is integrated twice, with tolerances a factor of 100 apart; the tighter result is returned.
+
+        Parameters
+        ----------
+        time : Time
+            Any scale; TDB is used.
+        centre : str
+            ``"sun"``, ``"ssb"``, or a body of the ephemeris.
+        ephemeris : str or Ephemeris, optional
+            The best one installed by default.
+
+        Returns
+        -------
+        position, velocity : Quantity
+            Shape (3,), km and km/s.
+
         Raises
         ------
         OutOfSpan
-            Where the ephemeris ends.
+            The ephemeris does not cover the epoch or the time.
+        Impact
+            The asteroid hits the Sun, a planet or the Moon on the way.
+
+        Warns
+        -----
+        InaccurateOrbit
+            The two integrations differ by more than 1 km at `time`, as after a close passage that amplifies
+            rounding errors. Errors of the elements and of the force model are not included.
         """
+        where = str(centre).lower()
+        if where not in ("ssb", *BODIES):
+            raise UnknownName("centre", str(centre), [], known=f"(known: ssb, {', '.join(BODIES)})")
         eph = _ephemeris(ephemeris)
         t = seconds(_epoch(time), self.epoch)
         window = eph.window(self.epoch, min(t, 0.0), max(t, 0.0))
-        state = self.flight(window).to(t) if t != 0.0 else self.barycentric(window)
-        where = str(centre).lower()
+        state = self.barycentric(window)
+        if t != 0.0:
+            state = self._propagated(window, t)
         if where != "ssb":
-            if where not in BODIES:
-                raise UnknownName("centre", centre, [], known=f"(known: ssb, {', '.join(BODIES)})")
             state = state - window.states(BODIES.index(where), np.array([t]))[0]
         return (state[:3] * u.m).to(u.km), (state[3:] * u.m / u.s).to(u.km / u.s)
+
+    def _propagated(self, window: Window, t: float) -> Array:
+        """Barycentric state (m, m/s), shape (6,), at `t` s from the epoch of the window; errors as :meth:`at`."""
+        flight = self.flight(window, epsilon=TIGHT)
+        log = flight.log_to(t)
+        hit = first_contact(log, window, np.array([PLANETS[name].impact_distance for name in BODIES]))
+        if hit is not None:
+            raise Impact(
+                f"{self.name or 'the orbit'} hits {BODIES[hit[1]]} at {later(window.epoch, hit[0]).iso} TDB, before "
+                f"{later(window.epoch, t).iso}"
+            )
+        error = float(np.linalg.norm(self.flight(window).to(t)[:3] - flight.state[:3]))
+        if error > _LARGE_ERROR:
+            warnings.warn(
+                f"{self.name or 'the orbit'} at {later(window.epoch, t).iso} TDB: two integrations differ by "
+                f"{error / 1e3:.3g} km",
+                InaccurateOrbit,
+                stacklevel=3,
+            )
+        return flight.state
 
     def clones(
         self,
