@@ -109,7 +109,7 @@ def crossings(
 
 
 @kernel
-def steps_into(log: Array, head: Array, data: Array, gm: Array, body: int, floor: float) -> Array:
+def steps_into(log: Array, head: Array, data: Array, gm: Array, body: int, floor: float) -> NDArray[np.int64]:
     """Steps of a log on which the distance from a body may fall below ``floor`` (m), as row numbers.
 
     The chord of the relative path less its largest sagitta, ``h^2 |a| / 8``, bounds the distance from below.
