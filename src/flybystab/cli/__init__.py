@@ -1,8 +1,8 @@
-"""The commands of the shell, one module each.
+"""Shell commands, one module each.
 
 A command is a module with ``HELP`` and ``EXAMPLE`` (text), ``arguments(sub)``, which adds its arguments to an argparse
-parser, and ``run(options)``, which answers it. Heavy modules are imported inside ``run``. A new command is one new
-module and one new entry here.
+parser, and ``run(options)``, which executes it. Slow imports belong inside ``run``. A new command is one new
+module and one new entry in :data:`COMMANDS`.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ from flybystab.cli import (
 
 
 class Command(Protocol):
-    """What the module of a command offers."""
+    """Interface of the module of a command."""
 
     HELP: str
     EXAMPLE: str
@@ -36,10 +36,10 @@ class Command(Protocol):
         """Add the arguments of the command."""
 
     def run(self, options: argparse.Namespace) -> None:
-        """Answer the command."""
+        """Execute the command."""
 
 
-#: By name, in the order of the help text.
+#: Commands by name, in the order of the help text.
 COMMANDS: dict[str, Command] = {
     "flyby": flyby,
     "report": report,

@@ -1,4 +1,4 @@
-"""What can be wrong with a command line on its own, whatever asteroids and files there are: exit status 2."""
+"""Checks of a command line that need neither catalogue nor files; a failure is wrong usage (exit status 2)."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from typing import Any
 from flybystab.cli.common import material_of, tdb
 from flybystab.errors import InvalidInput, UnknownName, WrongUsage
 
-#: Least whole number by argument.
+#: Smallest allowed integer by argument.
 _LEAST = {"samples": 1, "jobs": 1, "attitudes": 1, "clones": 0, "seed": 0}
 
 
 @contextmanager
 def usage() -> Iterator[None]:
-    """Turn what is wrong with a value into wrong usage."""
+    """Raise WrongUsage for an invalid value."""
     try:
         yield
     except (InvalidInput, UnknownName) as error:
@@ -25,7 +25,7 @@ def usage() -> Iterator[None]:
 
 
 def check_arguments(options: argparse.Namespace) -> None:
-    """Refuse numbers out of range, dates that are none, unknown planets and yield surfaces.
+    """Check ranges of numbers, dates, planets and yield surfaces.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""``flybystab bench [WHAT]``: error against time."""
+"""``flybystab bench [WHAT]``: benchmarks of error against computing time."""
 
 from __future__ import annotations
 
@@ -8,18 +8,20 @@ from flybystab._version import __version__
 from flybystab.bench import BENCHES
 from flybystab.cli.common import check_picture, figure_argument, show
 
-HELP = "error against time: " + "; ".join(f"{name} ({about})" for name, about in BENCHES.items())
+HELP = "benchmarks, error against computing time: " + "; ".join(
+    f"{name} ({about})" for name, about in BENCHES.items()
+)
 EXAMPLE = "flybystab bench flyby --output bench.png"
 
 
 def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
-    sub.add_argument("what", nargs="?", default="flyby", choices=list(BENCHES), help="which one (flyby)")
+    sub.add_argument("what", nargs="?", default="flyby", choices=list(BENCHES), help="benchmark (flyby)")
     figure_argument(sub)
 
 
 def run(options: argparse.Namespace) -> None:
-    """Answer the command."""
+    """Execute the command."""
     from importlib import import_module
 
     check_picture(options.output)

@@ -8,19 +8,21 @@ from typing import Any
 from flybystab._version import __version__
 from flybystab.cli.common import show
 
-HELP = "BibTeX of the methods and data, of all or of those behind a result"
+HELP = "BibTeX of the methods and data used, for one result or for the whole package"
 EXAMPLE = "flybystab cite screening.ecsv > flybystab.bib"
 
 
 def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     sub.add_argument(
-        "file", nargs="?", help="a table (.ecsv, .parquet) or JSON document (.json) that a command wrote"
+        "file",
+        nargs="?",
+        help="table (.ecsv, .parquet) or JSON document (.json) of a command",
     )
 
 
 def run(options: argparse.Namespace) -> None:
-    """Answer the command."""
+    """Execute the command."""
     from flybystab.io.citation import BIBTEX, cited
 
     entries = [BIBTEX[key] for key in cited(_result(options.file))]

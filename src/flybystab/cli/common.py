@@ -1,4 +1,4 @@
-"""What several commands share: arguments, dates, asteroids, and the two ways of printing a result."""
+"""Shared by several commands: arguments, dates, asteroids, and printing as text or JSON."""
 
 from __future__ import annotations
 
@@ -12,19 +12,19 @@ from typing import Any
 from flybystab.errors import InvalidInput, NothingComputed, WrongUsage
 from flybystab.plots.formats import FIGURES, FILMS
 
-#: Yield surfaces, the default first (named here as well: importing `Material` takes as long as ``--help``).
+#: Yield surfaces, the default first. Repeated here because importing `Material` would double the time of ``--help``.
 SURFACES = ("mohr-coulomb", "matsuoka-nakai", "drucker-prager", "drucker-prager-extension")
 
 
 def material_arguments(sub: argparse.ArgumentParser) -> None:
-    """Add the material: friction, cohesion, yield surface."""
+    """Add the options of the material: friction angle, cohesion, yield surface."""
     sub.add_argument("--friction", type=float, default=35.0, metavar="DEG", help="friction angle (35 deg)")
     sub.add_argument("--cohesion", type=float, default=0.0, metavar="PA", help="cohesion (0 Pa)")
     surface_argument(sub)
 
 
 def surface_argument(sub: argparse.ArgumentParser) -> None:
-    """Add the yield surface."""
+    """Add the option --surface."""
     default, *others = SURFACES
     sub.add_argument(
         "--surface", default=default, metavar="NAME", help=f"yield surface ({default}; {', '.join(others)})"
@@ -32,29 +32,26 @@ def surface_argument(sub: argparse.ArgumentParser) -> None:
 
 
 def dates_arguments(sub: argparse.ArgumentParser, start: str, stop: str) -> None:
-    """Add the first and the last date."""
-    sub.add_argument("--from", dest="start", default=start, metavar="DATE", help=f"TDB ({start})")
-    sub.add_argument("--to", dest="stop", default=stop, metavar="DATE", help=f"TDB ({stop})")
+    """Add the options --from and --to."""
+    sub.add_argument("--from", dest="start", default=start, metavar="DATE", help=f"first date, TDB ({start})")
+    sub.add_argument("--to", dest="stop", default=stop, metavar="DATE", help=f"last date, TDB ({stop})")
 
 
 def span_arguments(sub: argparse.ArgumentParser, start: str, stop: str) -> None:
-    """Add what a search for encounters needs: dates, planets, largest distance."""
+    """Add the options of a search for encounters: dates, planets, maximum distance."""
     dates_arguments(sub, start, stop)
-    sub.add_argument("--planet", action="append", help="planet to look for; repeat for more (earth)")
-    sub.add_argument("--within", type=float, default=0.05, metavar="AU", help="largest distance (0.05 au)")
-
-
-#: Endings of figures, and of animations.
+    sub.add_argument("--planet", action="append", help="planet; may be repeated (earth)")
+    sub.add_argument("--within", type=float, default=0.05, metavar="AU", help="maximum distance (0.05 au)")
 
 
 def figure_argument(sub: argparse.ArgumentParser, films: bool = False) -> None:
-    """Add the file of a figure, or of an animation."""
+    """Add the option --output for a figure, or for an animation too."""
     film = f" or an animation ({', '.join(FILMS)})" if films else ""
     sub.add_argument("--output", metavar="FILE", help=f"write a figure ({', '.join(FIGURES)}){film}")
 
 
 def show(options: argparse.Namespace, document: Callable[[], Any], lines: Callable[[], list[str]]) -> None:
-    """Print a result: one JSON document with ``--json``, else lines for people."""
+    """Print a result: one JSON document with ``--json``, else text."""
     if options.json:
         print(json.dumps(document(), indent=1, allow_nan=False))
     else:
@@ -62,21 +59,21 @@ def show(options: argparse.Namespace, document: Callable[[], Any], lines: Callab
 
 
 def check_computed(rows: int, failed: int, reasons: Mapping[str, int]) -> None:
-    """Raise NothingComputed if every row of a table failed; `reasons`: how often each, the commonest first."""
+    """Raise NothingComputed if all rows of a table failed; `reasons` counts each reason, the most common first."""
     if rows and failed == rows:
-        reason, n = next(iter(reasons.items()), ("no reason is known", rows))
+        reason, n = next(iter(reasons.items()), ("unknown reason", rows))
         raise NothingComputed(f"none of the rows could be computed ({rows}, of which {n}: {reason})")
 
 
 def _coloured(line: str) -> str:
-    """The verdict in bold, on a terminal that wants colours."""
+    """The line, in bold if it is the verdict and stdout is a terminal that allows colours."""
     if not line.startswith("verdict") or os.environ.get("NO_COLOR") or not sys.stdout.isatty():
         return line
     return f"\033[1m{line}\033[0m"
 
 
 def tdb(text: str, name: str) -> Any:
-    """A date in words as an astropy Time."""
+    """Parse a date, TDB, into an astropy Time; `name` is the argument in the error message."""
     from astropy.time import Time
 
     try:
@@ -86,7 +83,7 @@ def tdb(text: str, name: str) -> Any:
 
 
 def material_of(options: argparse.Namespace) -> Any:
-    """The material asked for."""
+    """Material given by the options."""
     import astropy.units as u
 
     from flybystab.body.body import Material
@@ -99,16 +96,16 @@ def material_of(options: argparse.Namespace) -> Any:
 
 
 def catalogue_argument(sub: argparse.ArgumentParser) -> None:
-    """Add the file that an asteroid is looked up in."""
+    """Add the option --catalogue."""
     sub.add_argument(
         "--catalogue",
         metavar="FILE",
-        help="look the name up in this file (own CSV, JPL SBDB, MPC, NEOCC .ke1), not in the embedded catalogue",
+        help="catalogue file (own CSV, JPL SBDB, MPC, NEOCC .ke1) instead of the embedded catalogue",
     )
 
 
 def asteroid_named(options: argparse.Namespace) -> Any:
-    """The asteroid named, of the embedded catalogue or of the file given."""
+    """The asteroid, from the embedded catalogue or from --catalogue."""
     from pathlib import Path
 
     from flybystab.catalogues.asteroid import Asteroid
@@ -124,12 +121,12 @@ def asteroid_named(options: argparse.Namespace) -> Any:
 
 
 def asteroid_of(options: argparse.Namespace) -> Any:
-    """The asteroid named, with the material asked for."""
+    """The asteroid with the material of the options."""
     return asteroid_named(options).with_material(material_of(options))
 
 
 def check_picture(path: str | None, endings: tuple[str, ...] = FIGURES) -> None:
-    """Find out that a picture (or page) cannot be written before computing it."""
+    """Check before a computation that its figure or page can be written."""
     if path is None:
         return
     from pathlib import Path
@@ -142,7 +139,7 @@ def check_picture(path: str | None, endings: tuple[str, ...] = FIGURES) -> None:
 
 
 def check_table(path: str | None) -> None:
-    """Find out that a table cannot be written before computing it."""
+    """Check before a computation that its table can be written."""
     if path is None:
         return
     from flybystab.screening.results import FORMATS
@@ -154,7 +151,7 @@ def check_table(path: str | None) -> None:
 
 
 def write_picture(result: Any, title: str, path: str) -> None:
-    """Write the panels of a flyby, or its animation, as the ending says."""
+    """Write the panels of a flyby, or its animation, depending on the suffix."""
     if path.lower().endswith(FILMS):
         from flybystab.plots.scene import animation
 

@@ -1,4 +1,4 @@
-"""``flybystab completion SHELL``: completion with the tab key."""
+"""``flybystab completion SHELL``: script for tab completion."""
 
 from __future__ import annotations
 
@@ -8,17 +8,17 @@ from flybystab._version import __version__
 from flybystab.cli.common import show
 from flybystab.cli.tab_completion import SHELLS
 
-HELP = "completion with the tab key"
+HELP = "script for tab completion in bash or zsh"
 EXAMPLE = 'eval "$(flybystab completion bash)"'
 
 
 def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
-    sub.add_argument("shell", choices=SHELLS, help="for which shell")
+    sub.add_argument("shell", choices=SHELLS, help="the shell")
 
 
 def run(options: argparse.Namespace) -> None:
-    """Answer the command."""
+    """Execute the command."""
     from flybystab.cli.main import command_parser
     from flybystab.cli.tab_completion import script
 

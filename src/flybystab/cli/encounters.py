@@ -1,4 +1,4 @@
-"""``flybystab encounters NAME``: close approaches of an asteroid, and how well they are known."""
+"""``flybystab encounters NAME``: close approaches of an asteroid and their predictability."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from typing import Any
 from flybystab.cli.common import check_table, show, span_arguments, tdb
 from flybystab.errors import WrongUsage
 
-HELP = "close approaches of an asteroid"
-#: Most encounters that are printed; of more, the closest.
+HELP = "close approaches of an asteroid or of a catalogue"
+#: Number of encounters printed at most: the closest ones.
 SHOWN = 100
 EXAMPLE = "flybystab encounters Apophis --to 2030-01-01 --clones 1000"
 
@@ -20,26 +20,26 @@ def arguments(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
         "name",
         nargs="?",
-        help="number, name or designation, or a file with one orbit (.ke1, .json) or more (.csv)",
+        help="number, name or designation; or a file of orbits (.ke1, .json, .csv)",
     )
     sub.add_argument(
         "--all",
         action="store_true",
-        help="the embedded catalogue, or the file given (own CSV, JPL SBDB, MPC), without following neighbours",
+        help="the whole embedded catalogue or file (own CSV, JPL SBDB, MPC), without predictability",
     )
     span_arguments(sub, "2020-01-01", "2050-01-01")
     sub.add_argument(
-        "--error", type=float, default=0.1, metavar="KM", help="error of the distances to aim at (0.1 km)"
+        "--error", type=float, default=0.1, metavar="KM", help="target error of the distances (0.1 km)"
     )
     sub.add_argument(
-        "--clones", type=int, default=0, metavar="N", help="orbits drawn from the covariance (0: none)"
+        "--clones", type=int, default=0, metavar="N", help="number of orbits drawn from the covariance (0)"
     )
-    sub.add_argument("--seed", type=int, default=0, help="fixes the clones (0)")
+    sub.add_argument("--seed", type=int, default=0, help="random seed of the clones (0)")
     sub.add_argument("--output", metavar="FILE", help="write the table (.ecsv, .parquet)")
 
 
 def run(options: argparse.Namespace) -> None:
-    """Answer the command."""
+    """Execute the command."""
     import astropy.units as u
 
     from flybystab.catalogues.catalogue import catalogue
@@ -84,14 +84,14 @@ def run(options: argparse.Namespace) -> None:
             if not many
             else f"{options.name or 'embedded catalogue'} ({len(asteroids)} asteroids): {head}",
             *_lines(table, many),
-            *[f"not followed: {one['why']}" for one in table.meta["failed"][:SHOWN]],
+            *[f"not integrated: {one['why']}" for one in table.meta["failed"][:SHOWN]],
             *([f"table      {options.output}"] if options.output else []),
         ],
     )
 
 
 def _asteroids(name: str) -> list[Any]:
-    """The asteroid of that name, or those of that file."""
+    """The asteroid of this name, or the asteroids of this file."""
     from pathlib import Path
 
     from flybystab.catalogues.asteroid import Asteroid
@@ -104,7 +104,7 @@ def _asteroids(name: str) -> list[Any]:
 
 
 def _with_clones(table: Any, asteroids: list[Any], clones: int, seed: int) -> Any:
-    """The table with the columns of the clones, row by row in the same order."""
+    """Add the columns of the clones to the table."""
     import numpy as np
 
     from flybystab.encounter.distribution import add_clones, distributions
@@ -121,9 +121,11 @@ def _with_clones(table: Any, asteroids: list[Any], clones: int, seed: int) -> An
 
 
 def _lines(table: Any, many: bool) -> list[str]:
-    """The table for people: distances, and behind them what is known of them."""
+    """The table as text: distances, then predictability."""
     import astropy.units as u
     import numpy as np
+
+    from flybystab.io.text import grade
 
     if not len(table):
         return []
@@ -132,9 +134,14 @@ def _lines(table: Any, many: bool) -> list[str]:
     if count > SHOWN:
         table = table[np.sort(np.argsort(table["distance"])[:SHOWN])]
     head = f"{'planet':8s} {'time (TDB)':19s} {'distance (km)':>16s} {'(au)':>9s} {'v_inf (km/s)':>12s} "
-    head += f"{'B.T (km)':>13s} {'B.R (km)':>13s}" + (f" {'moves (km)':>11s}  known" if known else "")
+    head += f"{'B.T (km)':>13s} {'B.R (km)':>13s}" + (
+        f" {'sigma (km)':>11s}  predictability" if known else ""
+    )
     if clones:
-        head = head.replace("  known", f" {'sigma (km)':>11s} {'P(impact), 95 %':>24s} {'linear':>9s}  known")
+        head = head.replace(
+            "  predictability",
+            f" {'clones (km)':>11s} {'P(impact), 95 %':>24s} {'linear':>9s}  predictability",
+        )
     out = [(f"{'asteroid':16s} " if many else "") + head]
     for row in table:
         line = f"{row['asteroid'][:16]:16s} " if many else ""
@@ -148,20 +155,20 @@ def _lines(table: Any, many: bool) -> list[str]:
         if clones:
             odds = f"{row['p_impact']:.3g} ({row['p_impact_low']:.2g}-{row['p_impact_high']:.2g})"
             line += f" {row['distance_sigma'].to_value(u.km):11.4g} {odds:>24s} {row['p_impact_linear']:9.2g}"
-        said = [row["predictability"]] if known else []
+        said = [grade(row["predictability"])] if known else []
         said += ["impact"] if row["impact"] else []
         out.append(f"{line}  {', '.join(said)}".rstrip())
     if count > SHOWN:
-        out.append(f"the closest {SHOWN} of {count}; --output FILE keeps all")
+        out.append(f"the closest {SHOWN} of {count}; --output FILE writes all")
     if not known:
         return out
     neighbours = "; ".join(table.meta["neighbours"])
-    out.append(f"moves: how far the asteroid is displaced there by {neighbours}")
+    out.append(f"sigma: displacement at the encounter of an orbit {neighbours}")
     if clones:
         lost = int((table["clones"] - table["clones_found"]).max())
         out.append(
-            f"sigma, P(impact): of {table['clones'].max()} clones"
-            + (f", at most {lost} of them not there at that time" if lost else "")
+            f"clones, P(impact): 1-sigma of the distance and impact probability of {table['clones'].max()} clones"
+            + (f", at most {lost} of them without this encounter" if lost else "")
             + f"; covariance: {'; '.join(table.meta['covariances'])}"
         )
     return out

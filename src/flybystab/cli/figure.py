@@ -1,4 +1,4 @@
-"""``flybystab figure WHAT``: the figures of equilibrium and stability."""
+"""``flybystab figure WHAT``: figures of equilibrium and stability."""
 
 from __future__ import annotations
 
@@ -20,18 +20,18 @@ EXAMPLE = "flybystab figure regions --output regions.png"
 
 def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
-    sub.add_argument("what", choices=["regions", "spin", "barrier", "failure"], help="which figure")
+    sub.add_argument("what", choices=["regions", "spin", "barrier", "failure"], help="the figure")
     sub.add_argument(
         "name",
         nargs="?",
-        help="asteroid of the barrier; a pile of 1400 x 850 x 750 m, 2 g/cm3, 6 h if left out",
+        help="asteroid of the barrier figure (a body of 1400 x 850 x 750 m, 2 g/cm3, 6 h)",
     )
     material_arguments(sub)
     sub.add_argument("--output", metavar="FILE", help=f"file ({', '.join(FIGURES)}; WHAT.png)")
 
 
 def run(options: argparse.Namespace) -> None:
-    """Answer the command."""
+    """Execute the command."""
     import astropy.units as u
 
     from flybystab.body.body import Body
@@ -47,7 +47,7 @@ def run(options: argparse.Namespace) -> None:
     output = options.output or f"{options.what}.png"
     check_picture(output)
     if options.name is not None and options.what != "barrier":
-        raise WrongUsage(f"NAME = {options.name}: expected no asteroid, only the barrier is of one body")
+        raise WrongUsage(f"NAME = {options.name}: expected no asteroid; only the figure barrier takes one")
     material = material_of(options)
     if options.what == "barrier":
         pile = Body([1400, 850, 750] * u.m, 2000 * u.kg / u.m**3, 6 * u.h, material=material)

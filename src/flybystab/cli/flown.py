@@ -1,4 +1,4 @@
-"""One asteroid through one encounter: what ``flyby`` and ``report`` have in common."""
+"""Flyby of one asteroid, shared by the commands ``flyby`` and ``report``."""
 
 from __future__ import annotations
 
@@ -13,34 +13,35 @@ from flybystab.cli.common import (
     tdb,
 )
 
-#: Span searched for the closest encounter when no date is given: inside every supported ephemeris.
+#: Dates searched for the closest encounter if none is given; all supported ephemerides cover them.
 SPAN = ("2000-01-01", "2050-01-01")
 
 
 def passage_arguments(sub: argparse.ArgumentParser) -> None:
-    """Add the asteroid, its encounter, its material, and the sample of attitudes."""
-    sub.add_argument(
-        "name", help="number, name or designation in the embedded catalogue, or in that of --catalogue"
-    )
+    """Add the arguments of asteroid, encounter, material and sampled attitudes."""
+    sub.add_argument("name", help="number, name or designation in the embedded catalogue or in --catalogue")
     catalogue_argument(sub)
     sub.add_argument(
-        "--date", help=f"near the encounter, TDB; the closest one of {SPAN[0]} to {SPAN[1]} if left out"
+        "--date",
+        help=f"date near the encounter, TDB (default: the closest encounter, {SPAN[0]} to {SPAN[1]})",
     )
-    sub.add_argument("--planet", default="earth", help="planet encountered (earth)")
+    sub.add_argument("--planet", default="earth", help="planet (earth)")
     material_arguments(sub)
-    sub.add_argument("--attitudes", type=int, default=64, metavar="N", help="attitudes to sample (64)")
-    sub.add_argument("--seed", type=int, default=0, help="seed of the samples (0)")
+    sub.add_argument(
+        "--attitudes", type=int, default=64, metavar="N", help="number of sampled attitudes (64)"
+    )
+    sub.add_argument("--seed", type=int, default=0, help="random seed (0)")
 
 
 def attitude_words(asteroid: Any) -> str:
-    """At which attitude the first result is: the sample is there because it cannot be known."""
+    """Description of the nominal attitude; the sampled attitudes show how far the result depends on it."""
     if asteroid.pole is None:
-        return "one of many: the pole is not known; spin axis along the orbital angular momentum"
-    return "one of many: the catalogued pole, an arbitrary turn about it"
+        return "nominal: pole unknown, spin axis along the orbital angular momentum"
+    return "nominal: catalogued pole, arbitrary rotation phase"
 
 
 def flown(options: argparse.Namespace) -> tuple[Any, Any, Any]:
-    """Asteroid, result and sample of attitudes of its encounter at the date, or of its closest one."""
+    """Asteroid, flyby at the nominal attitude, and sampled attitudes, for --date or the closest encounter."""
     from flybystab.encounter.attitude import periapsis_axes
     from flybystab.encounter.encounter import Encounter
     from flybystab.errors import NoEncounter
@@ -55,8 +56,8 @@ def flown(options: argparse.Namespace) -> tuple[Any, Any, Any]:
         )
         if len(table) == 0:
             raise NoEncounter(
-                f"{asteroid.label} has no encounter with {options.planet} within 0.05 au from {SPAN[0]} to "
-                f"{SPAN[1]}; give a date with --date"
+                f"{asteroid.label} has no encounter with {options.planet} within 0.05 au between {SPAN[0]} and "
+                f"{SPAN[1]}; choose another one with --date"
             )
         date = table["time"][int(table["distance"].argmin())]
     else:

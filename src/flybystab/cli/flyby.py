@@ -1,4 +1,4 @@
-"""``flybystab flyby NAME``: one asteroid through one encounter."""
+"""``flybystab flyby NAME``: fly an asteroid through one encounter."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from flybystab.cli.common import check_picture, figure_argument, show, write_pic
 from flybystab.cli.flown import attitude_words, flown, passage_arguments
 from flybystab.plots.formats import FIGURES, FILMS
 
-HELP = "one asteroid through one encounter"
+HELP = "fly an asteroid through one encounter"
 EXAMPLE = "flybystab flyby Apophis --output apophis.png"
 
 
@@ -19,7 +19,7 @@ def arguments(sub: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Answer the command."""
+    """Execute the command."""
     from flybystab.io import document, text
 
     check_picture(options.output, FIGURES + FILMS)

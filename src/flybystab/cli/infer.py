@@ -1,4 +1,4 @@
-"""``flybystab infer NAME``: what an asteroid's survival says of its material."""
+"""``flybystab infer NAME``: bounds on the material from the encounters an asteroid has survived."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from flybystab.cli.common import (
     tdb,
 )
 
-HELP = "what an asteroid's survival says of its material"
+HELP = "bounds on friction, cohesion and density from the encounters that an asteroid survived"
 EXAMPLE = "flybystab infer Toutatis --output toutatis.png"
 
 
@@ -25,14 +25,20 @@ def arguments(sub: argparse.ArgumentParser) -> None:
     sub.add_argument("name", help="number, name or designation")
     catalogue_argument(sub)
     span_arguments(sub, "1950-01-01", "2026-01-01")
-    sub.add_argument("--attitudes", type=int, default=32, metavar="N", help="tried in every passage (32)")
-    sub.add_argument("--seed", type=int, default=0, help="fixes the attitudes (0)")
+    sub.add_argument(
+        "--attitudes",
+        type=int,
+        default=32,
+        metavar="N",
+        help="attitudes sampled per encounter (32)",
+    )
+    sub.add_argument("--seed", type=int, default=0, help="random seed of the attitudes (0)")
     surface_argument(sub)
     figure_argument(sub)
 
 
 def run(options: argparse.Namespace) -> None:
-    """Answer the command."""
+    """Execute the command."""
     import astropy.units as u
 
     from flybystab.io.document import table_document
@@ -61,7 +67,7 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _lines(asteroid: Any, table: Any) -> list[str]:
-    """The bounds of shape and spin, what each passage adds, and the table by density and cohesion."""
+    """Bounds from shape and spin, the effect of each encounter, and the table over density and cohesion."""
     import astropy.units as u
     import numpy as np
 
@@ -75,14 +81,14 @@ def _lines(asteroid: Any, table: Any) -> list[str]:
     phi = body.material.friction_angle
     needed = rest.required_friction_angle.to_value(u.deg)
     lines = [
-        f"{asteroid.label}: what it is made of, if it has kept its shape",
+        f"{asteroid.label}: bounds on its material, assuming that it kept its shape",
         f"shape and spin, at {rho:.0f} kg/m3"
         + (" (assumed)" if "density_kg_m3" in asteroid.assumed else "")
         + ": "
         + (
             f"friction >= {needed:.1f} deg without cohesion"
             if np.isfinite(needed)
-            else "no friction is enough without cohesion"
+            else "no friction angle suffices without cohesion"
         ),
         f"at {phi.to_value(u.deg):g} deg: cohesion >= {required_cohesion(body, phi).to_value(u.Pa):.3g} Pa; "
         + _density_bound(density_intervals(body)),
@@ -91,26 +97,26 @@ def _lines(asteroid: Any, table: Any) -> list[str]:
     for p in table.meta["passages"]:
         worst = p["adds_at_worst_attitude_deg"]
         lines.append(
-            f"passage {p['passage']}: "
+            f"encounter {p['passage']}: "
             + (
-                f"adds less than {small:.2g} deg at any attitude"
+                f"raises the required friction angle by less than {small:.2g} deg at any attitude"
                 if worst < small
-                else f"adds {p['adds_at_any_attitude_deg']:.2f} deg whatever the attitude, "
-                f"{worst:.2f} deg at the worst one (largest over the table)"
+                else f"raises the required friction angle by {p['adds_at_any_attitude_deg']:.2f} deg at any attitude, "
+                f"by {worst:.2f} deg at the least favourable one (largest over the table)"
             )
         )
     if not table.meta["passages"]:
-        lines.append("no passage in this time within this distance")
+        lines.append("no encounter in this time span within this distance")
     telling = any(p["adds_at_worst_attitude_deg"] >= small for p in table.meta["passages"])
     cohesions = np.unique(table["cohesion"].to_value(u.Pa))
     for name, title in (
-        ("friction_equilibrium", "by shape and spin"),
-        ("friction_any_attitude", "with the passages, whatever the attitude"),
-        ("friction_every_attitude", "with the passages, enough at every attitude"),
+        ("friction_equilibrium", "from shape and spin"),
+        ("friction_any_attitude", "with encounters, necessary at any attitude"),
+        ("friction_every_attitude", "with encounters, sufficient at every attitude"),
     ):
         if name != "friction_equilibrium" and not telling:
             continue
-        lines.append(f"least friction angle (deg), {title}; columns: cohesion (Pa)")
+        lines.append(f"minimum friction angle (deg), {title}; columns: cohesion (Pa)")
         lines.append(f"{'kg/m3':>8s} " + " ".join(f"{c:8g}" for c in cohesions))
         need = table[name].to_value(u.deg).reshape(-1, len(cohesions))
         for density, row in zip(np.unique(table["density"].value), need, strict=True):
@@ -125,7 +131,7 @@ def _density_bound(intervals: Any) -> str:
     from flybystab.body.body import DENSITY_RANGE
 
     if not len(intervals):
-        return "no density is enough without cohesion"
+        return "no density suffices without cohesion"
     least = intervals[0, 0].to_value(u.kg / u.m**3)
     if least <= 1.001 * DENSITY_RANGE[0]:
         return "any density"

@@ -1,8 +1,8 @@
-"""The command line: ``flybystab COMMAND --help`` says what each one does, with examples.
+"""The command line: ``flybystab COMMAND --help`` describes each command, with an example.
 
-Exit status: 0 done, 1 cannot be computed (why, on stderr), 2 wrong usage: words, or values that are wrong whatever
-asteroids and files there are. With ``--json`` one document goes to
-stdout and nothing else. Heavy modules are imported by the command that needs them.
+Exit status: 0 success, 1 cannot be computed (the reason is on stderr), 2 wrong usage: an unknown argument, or a
+value that is invalid for any asteroid or file. With ``--json`` stdout holds one JSON document and nothing else.
+Slow imports are left to the command that needs them.
 """
 
 from __future__ import annotations
@@ -35,13 +35,13 @@ def main(argv: Sequence[str] | None = None) -> int:
         return 2
     try:
         options = parser.parse_args(arguments)
-    except SystemExit as stop:  # argparse has printed help or the reason
+    except SystemExit as stop:  # argparse has printed the help or the error
         return int(stop.code or 0)
     options.words = arguments
     if options.command is None:
         parser.print_help()
         return 2
-    # Dates beyond the table of leap seconds are read as TDB; UTC would be "dubious" there.
+    # Dates are TDB; erfa warns of "dubious years" beyond the leap-second table, which applies to UTC only.
     warnings.filterwarnings("ignore", message=".*dubious year.*")
     try:
         check_arguments(options)
@@ -54,7 +54,7 @@ def main(argv: Sequence[str] | None = None) -> int:
                 COMMANDS[options.command].run(options)
         sys.stdout.flush()
     except WrongUsage as reason:
-        print(f"flybystab {options.command}: {reason} (--help says more)", file=sys.stderr)
+        print(f"flybystab {options.command}: {reason} (see --help)", file=sys.stderr)
         return 2
     except FlybystabError as reason:
         print(f"flybystab: {reason}", file=sys.stderr)
@@ -84,15 +84,15 @@ class _Parser(argparse.ArgumentParser):
 
 
 class _Help(argparse.RawDescriptionHelpFormatter):
-    """Examples as they are written, and no line broken after the name of a command."""
+    """Keep the examples as written, and names of commands on the line of their description."""
 
     def __init__(self, prog: str) -> None:
         super().__init__(prog, max_help_position=26)
-        self._action_max_length = 16  # argparse forgets that the commands are indented
+        self._action_max_length = 16  # argparse ignores the indent of the commands
 
 
 def command_parser() -> argparse.ArgumentParser:
-    """The parser of every command."""
+    """Argument parser of all commands."""
     parser = _Parser(
         prog="flybystab",
         description="Do rubble-pile asteroids survive their close planetary encounters?",
@@ -111,7 +111,7 @@ def command_parser() -> argparse.ArgumentParser:
             formatter_class=_Help,
         )
         sub.add_argument(
-            "--json", action="store_true", help="print one JSON document, with units in its keys"
+            "--json", action="store_true", help="print one JSON document (units are in its keys)"
         )
         command.arguments(sub)
     return parser

@@ -1,4 +1,4 @@
-"""``flybystab report NAME``: the same as one web page, figures and all."""
+"""``flybystab report NAME``: HTML report of one encounter."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import argparse
 from flybystab.cli.common import check_picture, show
 from flybystab.cli.flown import flown, passage_arguments
 
-HELP = "the same as one web page, figures and all"
+HELP = "HTML report of one encounter"
 EXAMPLE = "flybystab report Apophis --output apophis.html"
 
 
@@ -15,13 +15,17 @@ def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     passage_arguments(sub)
     sub.add_argument(
-        "--samples", type=int, default=200, metavar="N", help="draws of the uncertain inputs (200; 1: none)"
+        "--samples",
+        type=int,
+        default=200,
+        metavar="N",
+        help="samples of the uncertain inputs (200; 1: none)",
     )
-    sub.add_argument("--output", default="report.html", metavar="FILE", help="the page (report.html)")
+    sub.add_argument("--output", default="report.html", metavar="FILE", help="HTML file (report.html)")
 
 
 def run(options: argparse.Namespace) -> None:
-    """Answer the command."""
+    """Execute the command."""
     import shlex
 
     import astropy.units as u

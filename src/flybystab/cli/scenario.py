@@ -1,4 +1,4 @@
-"""``flybystab scenario FILE.toml``: a scripted encounter from a TOML file."""
+"""``flybystab scenario FILE.toml``: fly the body of a TOML file through its encounter."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from flybystab.cli.common import (
 )
 from flybystab.plots.formats import FIGURES, FILMS
 
-HELP = "a scripted encounter from a TOML file"
+HELP = "fly the body of a TOML file through its encounter"
 EXAMPLE = "flybystab scenario examples/disruption_p2.toml"
 
 
@@ -24,7 +24,7 @@ def arguments(sub: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Answer the command."""
+    """Execute the command."""
     from flybystab.flybys.flyby import flyby
     from flybystab.io import document, text
     from flybystab.io.scenario import scenario

@@ -1,4 +1,4 @@
-"""``flybystab screen [FILE or NAME ...]``: a whole catalogue through its encounters."""
+"""``flybystab screen [FILE or NAME ...]``: fly a whole catalogue through its encounters."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from flybystab.cli.common import (
     tdb,
 )
 
-HELP = "a whole catalogue through its encounters"
+HELP = "fly a whole catalogue through its encounters"
 EXAMPLE = "flybystab screen --from 2026-01-01 --to 2036-01-01 --samples 100 --jobs 2"
 
 
@@ -25,31 +25,42 @@ def arguments(sub: argparse.ArgumentParser) -> None:
         "asteroids",
         nargs="*",
         metavar="FILE",
-        help="catalogue files (own CSV, JPL SBDB, MPC, NEOCC .ke1) or names; the embedded catalogue if left out",
+        help="catalogue files (own CSV, JPL SBDB, MPC, NEOCC .ke1) or names (default: the embedded catalogue)",
     )
     span_arguments(sub, "2026-01-01", "2036-01-01")
     material_arguments(sub)
     sub.add_argument(
-        "--samples", type=int, default=1, metavar="N", help="draws of the uncertain inputs (1: none)"
+        "--samples",
+        type=int,
+        default=1,
+        metavar="N",
+        help="samples of the uncertain inputs (1: nominal only)",
     )
-    sub.add_argument("--seed", type=int, default=0, help="fixes every draw (0)")
+    sub.add_argument("--seed", type=int, default=0, help="random seed (0)")
     sub.add_argument(
-        "--population", metavar="FILE", help="distributions to draw from, TOML; what it leaves out is default"
-    )
-    sub.add_argument("--population-default", action="store_true", help="print the default as TOML, and stop")
-    sub.add_argument("--jobs", type=int, default=1, metavar="N", help="processes (1)")
-    sub.add_argument("--dask", metavar="ADDRESS", help="a dask scheduler instead of processes")
-    sub.add_argument(
-        "--output", default="screening.ecsv", metavar="FILE", help="table, .ecsv or .parquet (screening.ecsv)"
+        "--population",
+        metavar="FILE",
+        help="priors of the uncertain inputs, TOML; omitted ones keep their defaults",
     )
     sub.add_argument(
-        "--overwrite", action="store_true", help="replace finished tables (an unfinished run goes on without)"
+        "--population-default", action="store_true", help="print the default priors as TOML and exit"
+    )
+    sub.add_argument("--jobs", type=int, default=1, metavar="N", help="number of processes (1)")
+    sub.add_argument("--dask", metavar="ADDRESS", help="dask scheduler to use instead of processes")
+    sub.add_argument(
+        "--output",
+        default="screening.ecsv",
+        metavar="FILE",
+        help="output table, .ecsv or .parquet (screening.ecsv)",
+    )
+    sub.add_argument(
+        "--overwrite", action="store_true", help="replace finished tables (not needed to resume a run)"
     )
     sub.add_argument("--samples-output", metavar="FILE", help="table of all samples, .ecsv or .parquet")
 
 
 def run(options: argparse.Namespace) -> None:
-    """Answer the command."""
+    """Execute the command."""
     from pathlib import Path
 
     import astropy.units as u
@@ -97,9 +108,7 @@ def run(options: argparse.Namespace) -> None:
             )
     except KeyboardInterrupt:
         bar.end()
-        print(
-            f"flybystab: {output} holds the rows so far; the same command goes on from there", file=sys.stderr
-        )
+        print(f"flybystab: {output} holds the rows so far; the same command resumes the run", file=sys.stderr)
         raise
     found = summary(output)
     show(
@@ -107,7 +116,7 @@ def run(options: argparse.Namespace) -> None:
         lambda: table_document(read_results(output)),
         lambda: [
             found.text(),
-            f"table      {output} (flybystab show {output} --output {output.with_suffix('.png')} draws it)",
+            f"table      {output} (flybystab show {output} --output {output.with_suffix('.png')} plots it)",
         ],
     )
     check_computed(found.rows, found.failed, found.errors)

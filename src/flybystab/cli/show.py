@@ -1,4 +1,4 @@
-"""``flybystab show FILE``: summary of a screening's table."""
+"""``flybystab show FILE``: summary and plot of a screening table."""
 
 from __future__ import annotations
 
@@ -6,18 +6,18 @@ import argparse
 
 from flybystab.cli.common import check_picture, figure_argument, show
 
-HELP = "summary of a screening's table"
+HELP = "summary and plot of a screening table"
 EXAMPLE = "flybystab show screening.ecsv --output screening.png"
 
 
 def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
-    sub.add_argument("file", help="table written by screen")
+    sub.add_argument("file", help="table written by flybystab screen")
     figure_argument(sub)
 
 
 def run(options: argparse.Namespace) -> None:
-    """Answer the command."""
+    """Execute the command."""
     from flybystab.io.document import table_document
     from flybystab.plots.screening import results_figure
     from flybystab.screening.results import read_results

@@ -1,9 +1,10 @@
-"""``flybystab stability NAME`` and ``--all [FILE]``: equilibrium and stability of asteroids on their own."""
+"""``flybystab stability NAME`` and ``--all [FILE]``: equilibrium and stability of isolated asteroids."""
 
 from __future__ import annotations
 
 import argparse
 from collections import Counter
+from typing import Any
 
 from flybystab._version import __version__
 from flybystab.cli.common import (
@@ -17,7 +18,7 @@ from flybystab.cli.common import (
 )
 from flybystab.errors import WrongUsage
 
-HELP = "equilibrium and stability of an asteroid on its own, or of a whole catalogue"
+HELP = "equilibrium and stability of an isolated asteroid, or of a whole catalogue"
 EXAMPLE = "flybystab stability Anteros --friction 30"
 
 
@@ -28,14 +29,14 @@ def arguments(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
         "--all",
         action="store_true",
-        help="classify the embedded catalogue, or the file given (own CSV, JPL SBDB, MPC, NEOCC .ke1)",
+        help="classify the embedded catalogue or a file (own CSV, JPL SBDB, MPC, NEOCC .ke1)",
     )
     material_arguments(sub)
     sub.add_argument("--output", metavar="FILE", help="with --all: write the table (.ecsv, .parquet)")
 
 
 def run(options: argparse.Namespace) -> None:
-    """Answer the command."""
+    """Execute the command."""
     if options.all and options.catalogue:
         raise WrongUsage(
             "--catalogue: expected one NAME with it; --all takes its file as stability --all FILE"
@@ -45,13 +46,13 @@ def run(options: argparse.Namespace) -> None:
     elif options.name is None:
         raise WrongUsage("NAME: expected an asteroid, or --all for the whole catalogue")
     elif options.output:
-        raise WrongUsage("--output: expected --all with it; one asteroid is printed")
+        raise WrongUsage("--output: expected --all with it; without --all the result is printed")
     else:
         _asteroid(options)
 
 
 def _catalogue(options: argparse.Namespace) -> None:
-    """A table of all asteroids."""
+    """Classify all asteroids of a catalogue."""
     from pathlib import Path
 
     import astropy.units as u
@@ -87,9 +88,7 @@ def _catalogue(options: argparse.Namespace) -> None:
             )
         for angle, found in counts(table).items():
             out.append(f"{angle}: " + ", ".join(f"{n} {name}" for name, n in found.items()))
-        held = (
-            " (0 inadmissible, 1 admissible, 2 stable to infinitesimal, 3 to finite pushes at second order)"
-        )
+        held = " (0 inadmissible, 1 admissible, 2 stable to infinitesimal, 3 to finite perturbations at second order)"
         return [*out, "levels" + held, *([f"table      {options.output}"] if options.output else [])]
 
     show(options, lambda: table_document(table), lines)
@@ -98,7 +97,7 @@ def _catalogue(options: argparse.Namespace) -> None:
 
 
 def _asteroid(options: argparse.Namespace) -> None:
-    """One asteroid."""
+    """Print one asteroid."""
     import astropy.units as u
 
     from flybystab.body.equilibrium import spin_limits
@@ -110,11 +109,11 @@ def _asteroid(options: argparse.Namespace) -> None:
     s = stability(asteroid.body)
     e = s.equilibrium
     limits = spin_limits(asteroid.body).to_value(u.rad / u.s)
-    periods = [2.0 * 3.141592653589793 / w / 3600.0 if w > 0 else float("inf") for w in limits]
     show(
         options,
         lambda: plain(
             {
+                "schema": "stability/1",
                 "flybystab": __version__,
                 "asteroid": asteroid.label,
                 "admissible": e.admissible,
@@ -142,7 +141,7 @@ def _asteroid(options: argparse.Namespace) -> None:
             f"small perturbations       {'stable' if s.stable_infinitesimal else 'not stable'}",
             f"critical strain           {s.critical_strain.second:.3g} (second order), "
             f"{s.critical_strain.third:.3g} (third), {s.critical_strain.barrier:.3g} (barrier)",
-            f"holds for spin periods    {min(periods):.3f} to {max(periods):.3f} h about the short axis",
+            f"admissible spin periods   {_period_range(limits)}",
             *(
                 [f"assumed                   {'; '.join(asteroid.assumptions)}"]
                 if asteroid.assumptions
@@ -150,3 +149,16 @@ def _asteroid(options: argparse.Namespace) -> None:
             ),
         ],
     )
+
+
+def _period_range(limits: Any) -> str:
+    """Range of spin periods between the spin limits (rad/s), about the short axis."""
+    import numpy as np
+
+    if not np.all(np.isfinite(limits)):
+        return "none: no spin about the short axis is admissible"
+    slowest, fastest = sorted(float(w) for w in limits)
+    shortest = f"{2.0 * np.pi / fastest / 3600.0:.3f} h" if fastest > 0.0 else "infinite"
+    if slowest == 0.0:
+        return f"{shortest} and longer, also without spin, about the short axis"
+    return f"{shortest} to {2.0 * np.pi / slowest / 3600.0:.3f} h about the short axis"

@@ -1,4 +1,8 @@
-"""Results as plain JSON: one document, the unit in every key, nothing that JSON cannot say."""
+"""Results as JSON documents: units in the keys, numbers or null.
+
+A value that is infinite or undefined is null, and a key with the suffix ``_reason`` beside it says why; no text stands
+in place of a number. Each kind of document has a JSON schema (:mod:`flybystab.io.schema`), named under ``schema``.
+"""
 
 from __future__ import annotations
 
@@ -16,10 +20,15 @@ from flybystab.flybys.result import FlybyResult
 from flybystab.flybys.spin_sample import SpinSample
 
 
-def plain(value: Any) -> Any:
-    """A value without numpy, and without nan and inf: they become null and the text "inf"."""
+def plain(value: Any, name: str = "") -> Any:
+    """Convert to types of JSON; infinities and nan become null, in a dictionary with their reason."""
     if isinstance(value, dict):
-        return {str(k): plain(v) for k, v in value.items()}
+        out: dict[str, Any] = {}
+        for key, entry in value.items():
+            out[str(key)] = plain(entry, str(key))
+            if isinstance(entry, float | np.floating) and not np.isfinite(entry):
+                out[f"{key}_reason"] = _reason(f"{name} {key}", float(entry))
+        return out
     if isinstance(value, list | tuple):
         return [plain(v) for v in value]
     if isinstance(value, np.ndarray):
@@ -27,16 +36,33 @@ def plain(value: Any) -> Any:
     if isinstance(value, np.generic):
         return plain(value.item())
     if isinstance(value, float):
-        return (
-            value if math.isfinite(value) else (None if math.isnan(value) else "inf" if value > 0 else "-inf")
-        )
+        return value if math.isfinite(value) else None
     if isinstance(value, Time):
         return value.tdb.isot
     return value
 
 
+def _reason(key: str, value: float) -> str:
+    """Why a number is infinite or undefined."""
+    if math.isnan(value):
+        return "not defined or not computed"
+    return next((text for part, text in _INFINITE.items() if part in key), "infinite")
+
+
+#: What an infinite value means, by part of its key.
+_INFINITE = {
+    "friction": "no friction angle suffices",
+    "margin": "no friction angle suffices",
+    "cohesion": "no cohesion suffices",
+    "strain": "stable to perturbations of any size",
+    "energy": "stable to perturbations of any size",
+    "displacement": "no encounter on the displaced orbit",
+    "growth": "no encounter on the displaced orbit",
+}
+
+
 def encounter_document(encounter: Encounter) -> dict[str, Any]:
-    """The encounter."""
+    """Document of an encounter."""
     return {
         "planet": encounter.planet.name,
         "time_tdb": encounter.time,
@@ -55,13 +81,14 @@ def encounter_document(encounter: Encounter) -> dict[str, Any]:
 
 
 def flyby_document(result: FlybyResult, sample: SpinSample | None = None, **about: Any) -> dict[str, Any]:
-    """A flyby; `about` is put first (the asteroid, what was assumed)."""
+    """Document of a flyby; `about` holds further entries, such as the asteroid, and comes first."""
     error = result.error
     seconds = [
         None if t is None else t.to_value(u.s)
         for t in (result.onset_time, result.arrest_time, result.end_time)
     ]
     document = {
+        "schema": "flyby/1",
         "flybystab": __version__,
         **about,
         "encounter": encounter_document(result.encounter),
@@ -108,30 +135,34 @@ def sample_document(sample: SpinSample) -> dict[str, Any]:
     verdicts, counts = np.unique(sample.verdict, return_counts=True)
 
     def quantiles(x: Any) -> dict[str, float]:
-        return {f"q{round(100 * p)}": float(v) for p, v in zip(levels, np.quantile(x, levels), strict=True)}
+        # linear interpolation next to an infinite value would give nan
+        method: Any = "linear" if np.isfinite(x).all() else "inverted_cdf"
+        values = np.quantile(x, levels, method=method)
+        return {f"q{round(100 * p)}": float(v) for p, v in zip(levels, values, strict=True)}
 
+    needed = sample.max_required_friction_angle.to_value(u.deg)
     return {
         "n": len(sample),
         "seed": sample.seed,
         "pole": "catalogue" if sample.pole_known else "isotropic",
         "spin_ratio": quantiles(sample.spin_ratio),
         "pole_change_deg": quantiles(sample.pole_change.to_value(u.deg)),
-        "max_required_friction_angle_deg": quantiles(sample.max_required_friction_angle.to_value(u.deg)),
+        "max_required_friction_angle_deg": quantiles(needed),
         "verdicts": dict(zip(verdicts.tolist(), counts.tolist(), strict=True)),
     }
 
 
 def table_document(table: QTable) -> dict[str, Any]:
-    """A table as rows; a column with a unit is named ``name_unit``."""
+    """Document of a table, row by row; a column with a unit is named ``name_unit``, such as ``v_inf_km_s``."""
     rows = []
     for row in table:
         out = {}
         for name in table.colnames:
             value = row[name]
             if isinstance(value, u.Quantity):
-                unit = value.unit.to_string().replace(" / ", "_per_").replace(" ", "").replace("%", "percent")
+                unit = value.unit.to_string().replace(" / ", "_").replace(" ", "").replace("%", "percent")
                 out[f"{name}_{unit}" if unit else name] = value.value
             else:
                 out[f"{name}_tdb" if isinstance(value, Time) else name] = value
         rows.append(out)
-    return plain({"flybystab": __version__, "meta": dict(table.meta), "rows": rows})
+    return plain({"schema": "table/1", "flybystab": __version__, "meta": dict(table.meta), "rows": rows})

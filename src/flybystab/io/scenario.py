@@ -1,4 +1,4 @@
-"""Scripted encounters from TOML files: every quantity is a text with its unit, every key is checked."""
+"""Scenario files (TOML): a body, a material and an encounter. Quantities are text with a unit; all keys are checked."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ KEYS: dict[str, tuple[str, ...]] = {
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """What a scenario file describes, ready for :func:`flybystab.flyby`."""
+    """Content of a scenario file: the arguments of :func:`flybystab.flyby`."""
 
     title: str
     body: Body
@@ -63,9 +63,9 @@ def scenario(path: str | Path) -> Scenario:
     InvalidInput
         The file cannot be read or a value is wrong.
     UnknownName
-        A table or key is not known; near ones are offered.
+        A table or key is unknown; the message lists similar ones.
     UnitMismatch
-        A value has the wrong unit, or none.
+        A value has the wrong unit or no unit.
     """
     path = Path(path)
     try:
@@ -98,7 +98,7 @@ def quantity(value: Any, name: str) -> Quantity:
     text = value.strip()
     scale: Any = 1.0
     head, mark, where = text.rpartition("R_")
-    if mark:  # radii of a planet
+    if mark:  # in radii of a planet
         text, scale = head, planet(where).radius * u.m
     try:
         if "," in text:
@@ -128,7 +128,7 @@ def _need(section: dict[str, Any], table: str, key: str) -> Any:
 
 
 def _typed(section: dict[str, Any], table: str, key: str, kind: type, default: Any) -> Any:
-    """A value that is not a quantity; TOML has its own types, and ``"no"`` is not false."""
+    """A value that is not a quantity, with its TOML type checked: the text ``"no"`` is not false."""
     if key not in section:
         return default
     value = section[key]
@@ -153,7 +153,9 @@ def _body(section: dict[str, Any], material: Material) -> tuple[Asteroid | None,
     if "asteroid" in section:
         extra = sorted(set(section) - {"asteroid", "phase"})
         if extra:
-            raise InvalidInput(f"body.{extra[0]}", section[extra[0]], "no such key beside body.asteroid")
+            raise InvalidInput(
+                f"body.{extra[0]}", section[extra[0]], "no such key together with body.asteroid"
+            )
         asteroid = Asteroid.from_catalogue(section["asteroid"])
         return asteroid, asteroid.body_with(material, phase=_phase(section))
     if "phase" in section:
@@ -174,7 +176,7 @@ def _phase(section: dict[str, Any]) -> float:
     return float(phase)
 
 
-#: Keys of [encounter] that belong to one of its two kinds only.
+#: Keys of [encounter] for a hyperbolic encounter only, and for one on a real orbit only.
 _SCRIPTED = ("periapsis", "v_inf", "j2")
 _REAL = ("asteroid", "date", "ephemeris")
 
@@ -187,10 +189,12 @@ def _encounter(section: dict[str, Any], asteroid: Asteroid | None) -> Encounter:
     if "date" in section:
         for key in _SCRIPTED:
             if key in section:
-                raise InvalidInput(f"encounter.{key}", section[key], "no such key beside encounter.date")
+                raise InvalidInput(
+                    f"encounter.{key}", section[key], "no such key together with encounter.date"
+                )
         orbiting = Asteroid.from_catalogue(section["asteroid"]) if "asteroid" in section else asteroid
         if orbiting is None:
-            raise InvalidInput("encounter.date", section["date"], "an asteroid whose orbit leads there")
+            raise InvalidInput("encounter.date", section["date"], "an asteroid, in [body] or [encounter]")
         try:
             time = Time(str(section["date"]), scale="tdb")
         except ValueError:
@@ -199,7 +203,7 @@ def _encounter(section: dict[str, Any], asteroid: Asteroid | None) -> Encounter:
         return Encounter.from_orbit(orbiting.orbit, where, time, ephemeris=ephemeris, **options)
     for key in _REAL:
         if key in section:
-            raise InvalidInput(f"encounter.{key}", section[key], "encounter.date beside it")
+            raise InvalidInput(f"encounter.{key}", section[key], "encounter.date together with it")
     return Encounter.hyperbolic(
         where,
         periapsis=quantity(_need(section, "encounter", "periapsis"), "encounter.periapsis"),
@@ -214,7 +218,9 @@ def _attitude(
 ) -> np.ndarray:
     if "euler_zxz" in section:
         if "turn" in section:
-            raise InvalidInput("attitude.turn", section["turn"], "no such key beside attitude.euler_zxz")
+            raise InvalidInput(
+                "attitude.turn", section["turn"], "no such key together with attitude.euler_zxz"
+            )
         name = "attitude.euler_zxz"
         angles = to_si(quantity(section["euler_zxz"], name), u.rad, name, shape=(3,))
         return Rotation.from_euler("ZXZ", angles).as_matrix()

@@ -1,4 +1,4 @@
-"""Short readable summaries for the terminal."""
+"""Text summaries for the terminal."""
 
 from __future__ import annotations
 
@@ -11,26 +11,27 @@ from flybystab.flybys.result import FlybyResult
 from flybystab.flybys.spin_sample import SpinSample
 from flybystab.orbit.ephemeris import BELT, BODIES
 
+#: Completes "The body ..." for each verdict.
 MEANING = {
     "INTACT": "never yields",
-    "RESHAPED": "flows, and all of it stays together",
+    "RESHAPED": "yields and is deformed; all of its mass stays bound",
     "MASS LOSS": "loses mass",
-    "DISRUPTED": "loses half of its mass or more",
+    "DISRUPTED": "loses at least half of its mass",
     "IMPACT": "reaches the planet",
-    "BEYOND MODEL": "is drawn out past 6:1, where a homogeneous ellipsoid cannot say what follows",
-    "NOT IN EQUILIBRIUM": "cannot exist as given, even far from any planet",
+    "BEYOND MODEL": "is stretched beyond an axis ratio of 6:1, where the homogeneous ellipsoid ceases to apply",
+    "NOT IN EQUILIBRIUM": "is not in equilibrium, even far from any planet",
 }
 
 
 def angle(value: u.Quantity) -> str:
-    """An angle, or that none is enough."""
+    """An angle as text; an infinite one means that no friction angle suffices."""
     degrees = value.to_value(u.deg)
-    return f"{degrees:.2f} deg" if np.isfinite(degrees) else "none is enough"
+    return f"{degrees:.2f} deg" if np.isfinite(degrees) else "no friction angle suffices"
 
 
 def encounter_lines(e: Encounter) -> list[str]:
-    """The encounter in two or three lines."""
-    when = f"{e.time.tdb.iso[:19]} TDB" if e.time is not None else "scripted"
+    """Planet, time, distance, speed and predictability of an encounter."""
+    when = f"{e.time.tdb.iso[:19]} TDB" if e.time is not None else "hyperbolic orbit without a date"
     radii = e.distance.to_value(u.m) / e.planet.radius
     out = [
         f"encounter  {e.planet.name.capitalize()}, {when}",
@@ -40,25 +41,38 @@ def encounter_lines(e: Encounter) -> list[str]:
     if e.impact:
         out.append(f"           reaches the {e.impact_level}")
     if e.displacement is not None:
-        out.append(f"known      {known(e)}")
+        out.append(f"orbit      {known(e)}")
     return out
 
 
+def grade(predictability: str) -> str:
+    """Predictability of an encounter as text."""
+    return (
+        "unpredictable (1 sigma exceeds the miss distance)"
+        if predictability == "one of many"
+        else str(predictability)
+    )
+
+
 def known(e: Encounter) -> str:
-    """How well an encounter on a real orbit is known."""
+    """Predictability of an encounter on a real orbit, with the displacement that it is derived from."""
     assert e.displacement is not None
-    return f"{e.predictability}: {e.neighbour} moves the asteroid by {e.displacement.to_value(u.km):,.3g} km there"
+    km = f"{e.displacement.to_value(u.km):,.3g} km"
+    sigma, caveat = e.neighbour.startswith("one sigma"), e.neighbour.partition(", ")[2]
+    what = "1-sigma position uncertainty" if sigma else f"displacement of an orbit {e.neighbour},"
+    note = f"; {caveat}" if caveat else ""
+    return f"{grade(str(e.predictability))} ({what} at encounter {km}{note})"
 
 
 def contact(r: FlybyResult) -> str:
-    """What reaches the planet, and when, in words; of an IMPACT."""
+    """Description of the contact with the planet in an IMPACT: kind and time."""
     e = r.encounter
     top = "the top of the atmosphere" if e.planet.atmosphere else "the ground"
     before = -(e.t_start + r.end_time.to_value(u.s))
     if r.contact == "path":
-        return f"on a path into the {e.impact_level}; touches {top} {before:,.1f} s before closest approach"
+        return f"the path enters the {e.impact_level}; contact with {top} {before:,.1f} s before closest approach"
     return (
-        f"its centre would pass {e.height / 1e3:,.3g} km above {top}, but its side touches it, "
+        f"the centre would pass {e.height / 1e3:,.3g} km above {top}, but the body touches it "
         f"{abs(before):,.1f} s {'before' if before >= 0 else 'after'} closest approach"
     )
 
@@ -70,8 +84,8 @@ def flyby_lines(r: FlybyResult) -> list[str]:
     out = [f"verdict    {r.verdict}{letter}: the body {MEANING[str(r.verdict)]}"]
     if r.verdict == "NOT IN EQUILIBRIUM":
         out.append(
-            f"           it would need {angle(r.max_required_friction_angle)} of friction, or at "
-            f"{m.friction_angle.to_value(u.deg):g} deg a cohesion of {r.required_cohesion.to_value(u.Pa):.3g} Pa"
+            f"           friction angle needed: {angle(r.max_required_friction_angle)}; cohesion needed at "
+            f"{m.friction_angle.to_value(u.deg):g} deg: {r.required_cohesion.to_value(u.Pa):.3g} Pa"
         )
         return out
     if r.contact is not None:
@@ -82,13 +96,19 @@ def flyby_lines(r: FlybyResult) -> list[str]:
             f"friction   mobilised {angle(r.max_required_friction_angle)} of {has}, margin {angle(r.margin)}"
         )
     else:
-        out.append(f"friction   {angle(r.max_required_friction_angle)} to stay rigid, the material has {has}")
+        out.append(
+            f"friction   required to stay rigid {angle(r.max_required_friction_angle)}, the material has {has}"
+        )
     if r.onset_time is not None:
         a = r.semi_axes.to_value(u.m)
         lode = "" if r.lode_angle is None else f", Lode angle {r.lode_angle.to_value(u.deg):.1f} deg"
         out.append(f"yield      {r.onset_time.to_value(u.h):.2f} h after the start{lode}")
-        out.append(f"afterwards semi-axes {a[0]:.5g}, {a[1]:.5g}, {a[2]:.5g} m, bound {r.bound_fraction:.1%}")
-    out.append(f"spin       rate x {r.spin_ratio:.3f}, pole moves {r.pole_change.to_value(u.deg):.2f} deg")
+        out.append(
+            f"after      semi-axes {a[0]:.5g}, {a[1]:.5g}, {a[2]:.5g} m, bound mass fraction {r.bound_fraction:.1%}"
+        )
+    out.append(
+        f"spin       rate x {r.spin_ratio:.3f}, axis rotates by {r.pole_change.to_value(u.deg):.2f} deg"
+    )
     if r.robust is not None:
         others = ", ".join(f"{k} {v}" for k, v in r.verdict_by_surface.items())
         word = "does not depend" if r.robust else "depends"
@@ -102,23 +122,23 @@ def flyby_lines(r: FlybyResult) -> list[str]:
 
 
 def sample_lines(s: SpinSample) -> list[str]:
-    """What a sample of attitudes gives."""
+    """Verdicts and ranges over the sampled attitudes."""
     low, mid, high = np.quantile(s.spin_ratio, [0.0, 0.5, 1.0])
     turn = np.quantile(s.pole_change.to_value(u.deg), [0.0, 0.5, 1.0])
     phi = np.quantile(s.max_required_friction_angle.to_value(u.deg), [0.0, 1.0])
     names, counts = np.unique(s.verdict, return_counts=True)
-    pole = "known pole, unknown phases" if s.pole_known else "unknown pole"
+    pole = "catalogued pole, random phases" if s.pole_known else "unknown pole, random phases"
     return [
         f"attitudes  {len(s)} ({pole}): "
         + ", ".join(f"{n} x {k}" for k, n in zip(names, counts, strict=True)),
         f"           spin rate x {low:.2f} to {high:.2f} (median {mid:.2f}), "
-        f"pole moves {turn[0]:.1f} to {turn[2]:.1f} deg (median {turn[1]:.1f})",
+        f"axis rotates by {turn[0]:.1f} to {turn[2]:.1f} deg (median {turn[1]:.1f})",
         f"           friction mobilised {phi[0]:.2f} to {phi[1]:.2f} deg",
     ]
 
 
 def modelled(r: FlybyResult) -> dict[str, str]:
-    """What was modelled, in words, by ``orbit``, ``tide`` and ``body``; the small pullers are counted."""
+    """Description of the model of ``orbit``, ``tide`` and ``body``; small perturbers are counted."""
     groups: dict[str, list[str]] = {}
     for entry in r.modelled:
         head, _, rest = entry.partition(": ")
@@ -136,39 +156,39 @@ def modelled(r: FlybyResult) -> dict[str, str]:
 
 
 def capital(name: str) -> str:
-    """A force or its source with the proper name in capitals: ``earth J2`` is Earth J2."""
+    """A force or its source with a capital: ``earth J2`` is Earth J2."""
     first, space, rest = name.partition(" ")
     return (first.capitalize() if first in (*BODIES, *BELT) else first) + space + rest
 
 
 def left_out(r: FlybyResult, most: int = 4) -> str:
-    """The largest of what was left out, with its share; how many more there are."""
+    """The largest neglected effects with their relative size, and the number of the others."""
     largest = sorted(r.left_out, key=lambda x: -x[1])
     words = []
     for name, share in largest[:most]:
         head, colon, rest = name.rpartition(": ")
         words.append(f"{head}{colon}{capital(rest).removesuffix(' point mass')} ({share:.0e})")
     if len(largest) > most:
-        words.append(f"{len(largest) - most} smaller ones")
+        words.append(f"{len(largest) - most} smaller effects")
     return "; ".join(words)
 
 
 def model_lines(r: FlybyResult, assumed: tuple[str, ...] = ()) -> list[str]:
-    """What was modelled, left out and assumed."""
+    """Effects modelled and neglected, and assumed inputs."""
     rows = [f"{head}: {what}" for head, what in modelled(r).items()]
     out = [("modelled   " if i == 0 else "           ") + row for i, row in enumerate(rows)]
     if r.left_out:
-        out.append("left out   " + left_out(r))
+        out.append("neglected  " + left_out(r))
     if assumed:
         out.append("assumed    " + "; ".join(assumed))
     return out
 
 
 def equilibrium_lines(name: str, e: Equilibrium) -> list[str]:
-    """Equilibrium of a body."""
+    """Equilibrium of an isolated body."""
     m = e.body.material
     out = [
-        f"{name}: {'holds' if e.admissible else 'does not hold'} with "
+        f"{name}: {'in equilibrium' if e.admissible else 'not in equilibrium'} with "
         f"{m.friction_angle.to_value(u.deg):g} deg and {m.cohesion.to_value(u.Pa):g} Pa ({m.yield_surface})",
         f"required friction angle   {angle(e.required_friction_angle)}",
         f"required cohesion         {e.required_cohesion.to_value(u.Pa):.4g} Pa",
