@@ -4,6 +4,7 @@ import contextlib
 import os
 import runpy
 import shutil
+import sys
 import tempfile
 from pathlib import Path
 
@@ -55,3 +56,7 @@ for script, picture in (
         runpy.run_path(str(DOCS.parent / "examples" / script))
         shutil.copy(Path("out") / picture, IMAGES / picture)
     print(os.fspath(IMAGES / picture))
+
+sys.argv = ["shape_slopes.py", str(IMAGES / "shape_slopes.png")]
+runpy.run_path(str(DOCS.parent / "examples" / "shape_slopes.py"))
+print(IMAGES / "shape_slopes.png")
