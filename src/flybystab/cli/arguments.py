@@ -36,7 +36,8 @@ def check_arguments(options: argparse.Namespace) -> None:
         for name, least in _LEAST.items():
             if given.get(name, least) < least:
                 raise InvalidInput(f"--{name}", given[name], f"a whole number, {least} or more")
-        if not 0.0 < given.get("within", 1.0) < math.inf:
+        within = given.get("within")
+        if within is not None and not 0.0 < within < math.inf:
             raise InvalidInput("--within", given["within"], "a distance above 0, in au")
         if not 0.0 < given.get("error", 1.0) < math.inf:
             raise InvalidInput("--error", given["error"], "an error above 0, in km")

@@ -19,13 +19,14 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from flybystab.body.body import Body, Material
+from flybystab.body.equilibrium import equilibrium
 from flybystab.catalogues.asteroid import Asteroid
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
 from flybystab.flybys.flyby_many import flyby_many
 from flybystab.flybys.verdict import Verdict
 from flybystab.orbit.planets import planet
-from flybystab.population.rates import encounter_rates
+from flybystab.population.rates import EncounterRates, encounter_rates
 from flybystab.screening.draws import draws
 from flybystab.screening.priors import Population
 from flybystab.units import to_si, whole
@@ -124,7 +125,7 @@ def disruption_rates(
     Returns
     -------
     DisruptionRates
-        A draw that cannot exist on its own (NOT IN EQUILIBRIUM) is left out: rates are those of the bodies that can.
+        Draws that cannot exist on their own are drawn again: rates are those of the bodies that can.
     """
     size = to_si(diameter, u.m, "diameter", low=0.0, open_low=True)
     limit = to_si(radii, u.dimensionless_unscaled, "radii", low=1.0, high=100.0, open_low=True)
@@ -150,10 +151,10 @@ def disruption_rates(
         rows.append((body.name, str(Verdict.IMPACT), within[0].total.value, 0.0))
         if not within[-1].total.value > 0.0:
             continue
-        drawn = draws(model, number, first + 7919 * k, priors)
+        bodies = _bodies(model, number, first + 7919 * k, priors, matter)
         rng = np.random.default_rng([first, k])
         parts = [
-            _stratum(within[i], within[i - 1], drawn, range(i - 1, number, STRATA), matter, rng, workers)
+            _stratum(within[i], within[i - 1], bodies[i - 1 :: STRATA], rng, workers)
             for i in range(1, STRATA + 1)
             if within[i].total > within[i - 1].total
         ]
@@ -172,23 +173,36 @@ def disruption_rates(
     return DisruptionRates(table, vstack(tables) if tables else empty, orbits, (size * u.m).to(u.km))
 
 
+def _bodies(
+    model: Asteroid, number: int, seed: int, priors: Population | None, material: Material
+) -> list[Body]:
+    """Drawn bodies that can exist on their own."""
+    found: list[Body] = []
+    for attempt in range(20):
+        drawn = draws(model, number, seed + 104729 * attempt, priors)
+        many = [drawn.body(i, material) for i in range(number)]
+        found += [b for b in many if equilibrium(b).admissible]
+        if len(found) >= number:
+            return found[:number]
+    raise InvalidInput(
+        "priors", priors, "distributions of which a twentieth or more can exist: hardly any draw does"
+    )
+
+
 def _stratum(
-    outer: Any,
-    inner: Any,
-    drawn: Any,
-    chosen: range,
-    material: Material,
+    outer: EncounterRates,
+    inner: EncounterRates,
+    bodies: list[Body],
     rng: np.random.Generator,
     workers: int | None,
 ) -> QTable:
     """Sampled encounters between two periapsis distances, their verdicts and weights."""
-    sample = outer.sample(len(chosen), int(rng.integers(2**31)), above=inner.periapsis)
+    sample = outer.sample(len(bodies), int(rng.integers(2**31)), above=inner.periapsis)
     encounters = [
         Encounter.hyperbolic(outer.planet, periapsis=q, v_inf=v)
         for q, v in zip(sample["periapsis"], sample["v_inf"], strict=True)
     ]
-    bodies: list[Body] = [drawn.body(i, material) for i in chosen]
-    turns = list(Rotation.random(len(chosen), random_state=rng).as_matrix())
+    turns = list(Rotation.random(len(bodies), random_state=rng).as_matrix())
     flown = flyby_many(bodies, encounters, turns, workers=workers)
     sample["planet"] = outer.planet.name
     sample["verdict"] = np.asarray(flown.verdict).astype("U20")

@@ -1,0 +1,59 @@
+"""``flybystab rates``: the document says what `encounter_rates` and `disruption_rates` compute."""
+
+import json
+
+import astropy.units as u
+import pytest
+
+import flybystab as fs
+from flybystab.cli.main import main
+
+
+def document(capsys, *words):
+    assert main(["rates", *words, "--json"]) == 0
+    return json.loads(capsys.readouterr().out)
+
+
+def test_rates_of_the_embedded_catalogue(capsys):
+    out = document(capsys, "--planet", "venus", "--within", "0.05")
+    (row,) = out["rows"]
+    rates = fs.encounter_rates(fs.catalogue(), "venus", 0.05 * u.au)
+    assert row["rate_per_yr"] == pytest.approx(rates.total.value, rel=1e-12)
+    assert out["orbits"] == len(fs.catalogue())
+    assert main(["rates", "--planet", "venus", "--within", "0.05"]) == 0
+    assert "one in" in capsys.readouterr().out
+
+
+def test_a_model_population_from_a_table(capsys, tmp_path):
+    path = tmp_path / "model.csv"
+    path.write_text("a,e,i,H\n1.3,0.4,10,18\n3.0,0.1,5,19\n")
+    out = document(capsys, str(path), "--planet", "earth")
+    assert out["orbits"] == 2
+    assert out["rows"][0]["orbits_that_meet"] == 1
+    verdicts = document(capsys, str(path), "--planet", "earth", "--verdicts", "--samples", "8")
+    total = sum(r["rate_per_yr"] for r in verdicts["rows"])
+    near = fs.encounter_rates(_table(), "earth", 5 * _radius()).total
+    assert total == pytest.approx(near.value, rel=1e-9)
+
+
+def _table():
+    from astropy.table import QTable
+
+    return QTable({"a": [1.3, 3.0], "e": [0.4, 0.1], "i": [10.0, 5.0]})
+
+
+def _radius():
+    return fs.encounter_rates(_table(), "earth").planet.radius * u.m
+
+
+def test_no_encounter_is_null(capsys, tmp_path):
+    path = tmp_path / "far.csv"
+    path.write_text("a,e,i\n3.0,0.1,5\n")
+    (row,) = document(capsys, str(path), "--planet", "earth")["rows"]
+    assert row["rate_per_yr"] == 0.0
+    assert row["v_inf_km_s"] is None
+
+
+def test_a_missing_file_is_named(capsys):
+    assert main(["rates", "nowhere.csv"]) == 1
+    assert "nowhere.csv" in capsys.readouterr().err
