@@ -13,6 +13,10 @@ class FlybystabError(Exception):
     """Base of every error that the package raises on purpose."""
 
 
+class FlybystabWarning(UserWarning):
+    """Something was wrong, and the result is right nevertheless: a damaged journal whose loss is computed again."""
+
+
 class InvalidInput(FlybystabError, ValueError):
     """An argument is outside its domain.
 

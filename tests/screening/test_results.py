@@ -7,11 +7,12 @@ import astropy.units as u
 import numpy as np
 import pytest
 
-from flybystab.errors import InvalidInput
+from flybystab.errors import InvalidInput, OutputFailed
 from flybystab.screening import table_files
 from flybystab.screening.journal import Journal
 from flybystab.screening.results import Column, read_results, table_of
 from flybystab.screening.table_files import check_output, write_rows
+from flybystab.screening.tables import write_table
 
 COLUMNS = {
     "name": Column(str, None, "a name"),
@@ -137,3 +138,124 @@ def test_unreadable_results_are_named(tmp_path):
         (tmp_path / name).write_text(content)
         with pytest.raises(InvalidInput, match="result file"):
             read_results(tmp_path / name)
+
+
+@pytest.mark.parametrize("suffix", [".ecsv", ".parquet"])
+def test_a_table_cut_anywhere_is_refused(tmp_path, suffix):
+    if suffix == ".parquet":
+        pytest.importorskip("pyarrow")
+    path = tmp_path / f"x{suffix}"
+    write_rows(rows(3), path, COLUMNS, META)
+    data = path.read_bytes()
+    for cut in {*range(0, len(data), 7), *range(len(data) - 120, len(data))}:
+        path.write_bytes(data[:cut])
+        with pytest.raises(InvalidInput, match="result file"):
+            read_results(path)
+    path.write_bytes(data)
+    assert len(read_results(path)) == 3
+    if suffix == ".ecsv":
+        path.write_bytes(
+            data[: data[:-1].rindex(b"\n") + 1]
+        )  # as a power cut between two rows would leave it
+        with pytest.raises(InvalidInput, match="the 3 rows that its header gives; 2 are there"):
+            read_results(path)
+        write_table(table_of(rows(3), COLUMNS, META), path)
+        data = path.read_bytes()
+        assert read_results(path).meta["rows"] == 3
+        path.write_bytes(data[: data[:-1].rindex(b"\n") + 1])
+        with pytest.raises(InvalidInput, match="2 are there"):
+            read_results(path)
+
+
+def test_text_that_a_spreadsheet_would_run_is_quoted(tmp_path):
+    names = ["=1+1", "+x", "-x", "@x", "# x", 'a"b,c', "plain", ""]
+    path = tmp_path / "x.ecsv"
+    write_rows(({"name": n, "number": -1, "distance": -1.0} for n in names), path, COLUMNS, META)
+    assert list(read_results(path)["name"]) == names
+    cells = [line for line in path.read_text().splitlines() if not line.startswith("# ")][1:]
+    assert all(line.startswith('"') for line in cells[:6])
+    assert cells[6].startswith("plain,-1,-1.0,")
+
+
+def test_a_damaged_bit_of_a_journal_is_noticed(tmp_path):
+    """A flipped bit loses its own record at most, and says so; no record comes back changed."""
+    header = {"run": "abc", "settings": {"seed": 1}}
+    path = tmp_path / "j"
+    journal = Journal(path, header)
+    wanted = {t: [{"name": f"body {t}", "margin": t / 7}] for t in range(4)}
+    for task, content in wanted.items():
+        journal.add(task, {"rows": content})
+    journal.close()
+    data = path.read_bytes()
+    first = data.index(b"\n") + 1
+    for bit in range(0, 8 * len(data), 5):
+        damaged = bytearray(data)
+        damaged[bit // 8] ^= 1 << bit % 8
+        path.write_bytes(damaged)
+        again = Journal(path, header)
+        found = {t["task"]: t["rows"] for t in again.tasks()}
+        assert all(wanted[t] == content for t, content in found.items())
+        if bit // 8 < first - 1:
+            assert (len(found), again.damaged) == (4, [1])
+        elif bit // 8 == len(data) - 1:  # the end of the last line: as if it had not been written in full
+            assert len(found) == 3
+        else:
+            assert len(found) >= 2
+            assert again.damaged
+        again.close()
+
+
+def test_records_that_change_under_a_run_are_noticed(tmp_path):
+    path = tmp_path / "j"
+    journal = Journal(path, {"run": "abc"})
+    journal.add(0, {"rows": [{"x": 1.5}]})
+    path.write_bytes(path.read_bytes().replace(b"1.5", b"2.5"))
+    with pytest.raises(OutputFailed, match="was changed while the run used it"):
+        journal.task(0)
+    journal.close()
+
+
+def test_journals_do_not_follow_links_and_take_ordinary_files_only(tmp_path):
+    target = tmp_path / "mine"
+    target.write_text("")
+    (tmp_path / "j").symlink_to(target)
+    with pytest.raises(InvalidInput, match="symbolic link"):
+        Journal(tmp_path / "j", {"run": "abc"})
+    assert target.read_text() == ""
+    os.mkfifo(tmp_path / "f")
+    with pytest.raises(InvalidInput, match="ordinary file"):
+        Journal(tmp_path / "f", {"run": "abc"})
+
+
+def test_files_of_the_user_survive(tmp_path):
+    """Files with the names of temporary ones, links and files that appear meanwhile are left alone."""
+    kept = {name: tmp_path / name for name in ("x.ecsv.probe", "x.ecsv.part", "x.ecsv.1.part", "target")}
+    for name, path in kept.items():
+        path.write_text(name)
+    out = tmp_path / "x.ecsv"
+    out.symlink_to(kept["target"])
+    check_output(out)
+    write_rows(rows(3), out, COLUMNS, META)
+    assert len(read_results(out)) == 3
+    assert not out.is_symlink()
+    assert {name: path.read_text() for name, path in kept.items()} == {name: name for name in kept}
+
+    def meanwhile():
+        yield from rows(1)
+        new.write_text("mine")
+
+    for new in (tmp_path / "new.ecsv", out):
+        with pytest.raises(OutputFailed, match="by another program"):
+            write_rows(meanwhile(), new, COLUMNS, META)
+        assert new.read_text() == "mine"
+    assert sorted(f.name for f in tmp_path.iterdir()) == sorted([*kept, "x.ecsv", "new.ecsv"])
+
+
+def test_outputs_that_are_no_ordinary_files_or_have_long_names_are_refused(tmp_path):
+    os.mkfifo(tmp_path / "f.ecsv")
+    with pytest.raises(InvalidInput, match="ordinary file"):
+        check_output(tmp_path / "f.ecsv")
+    with pytest.raises(InvalidInput, match="shorter by 2 bytes"):
+        check_output(tmp_path / ("x" * 244 + ".ecsv"))
+    with pytest.raises(InvalidInput, match="null"):
+        check_output("a\0.ecsv")

@@ -18,7 +18,7 @@ from flybystab.constants import AU, R_EARTH
 from flybystab.core.ellipsoid.yield_bound import tide_size
 from flybystab.encounter.encounter import Encounter
 from flybystab.encounter.reach import usual_start
-from flybystab.errors import InvalidInput, OutOfSpan, OutputFailed, UnknownName
+from flybystab.errors import FlybystabWarning, InvalidInput, OutOfSpan, OutputFailed, UnknownName
 from flybystab.flybys.flyby import flyby
 from flybystab.orbit.planets import planet
 from flybystab.screening import table_files
@@ -267,7 +267,8 @@ def test_a_run_stopped_inside_an_asteroid_goes_on_with_its_parts(tmp_path, monke
     with pytest.raises(KeyboardInterrupt):
         run.run(out, samples_output=samples[1], progress=stop)
     journal = tmp_path / "out.ecsv.journal"
-    kept = [len(json.loads(line)["verdict"]) for line in journal.read_bytes().splitlines()[1:]]
+    records = map(json.loads, journal.read_bytes().splitlines()[1:])
+    kept = [len(record["verdict"]) for record in records if "verdict" in record]
     assert sum(kept) > 60
     assert read_results(out).meta["complete"] is False
     journal.write_bytes(
@@ -434,3 +435,62 @@ def test_one_name_is_an_asteroid_and_not_a_file():
         screen("Apopis", "2029-04-01", "2029-05-01")
     with pytest.raises(InvalidInput, match="readable CSV"):
         screen("Apophis.csv", "2029-04-01", "2029-05-01")
+
+
+def test_a_damaged_journal_gives_the_same_table_and_a_warning(tmp_path):
+    run = screening(samples=2)
+    whole, out = tmp_path / "whole.ecsv", tmp_path / "out.ecsv"
+    run.run(whole)
+
+    def interrupt(state):
+        if state.done == 4:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run.run(out, progress=interrupt)
+    journal = tmp_path / "out.ecsv.journal"
+    data = bytearray(journal.read_bytes())
+    second = [k for k, byte in enumerate(data) if byte == 10][2]  # header, temporary file, first asteroid
+    data[second + 400] ^= 4
+    journal.write_bytes(data)
+    states = []
+    with pytest.warns(
+        FlybystabWarning, match=r"damaged in 1 of its lines \(4\).* 3 of 6 asteroids are intact"
+    ):
+        run.run(out, progress=states.append)
+    assert states[0].resumed == 3
+    assert out.read_bytes() == whole.read_bytes()
+
+
+def test_two_tables_need_two_files(tmp_path):
+    run = Screening(
+        screening(1).asteroids,
+        settings(*SPAN, samples=2, keep_samples=True),
+        lambda a, s: pytest.fail("computed"),
+    )
+    (tmp_path / "link").symlink_to(tmp_path)
+    for other in (tmp_path / "x.ecsv", tmp_path / "link" / "x.ecsv"):
+        with pytest.raises(InvalidInput, match="other than the output"):
+            run.run(tmp_path / "x.ecsv", samples_output=other)
+    assert [f.name for f in tmp_path.iterdir()] == ["link"]
+
+
+def test_a_table_of_another_run_is_not_replaced_by_a_continued_one(tmp_path):
+    out = tmp_path / "x.ecsv"
+    run = screening(3)
+
+    def interrupt(state):
+        if state.done:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run.run(out, progress=interrupt)
+    out.unlink()
+    screening(2, seed=5).run(tmp_path / "other.ecsv")
+    (tmp_path / "other.ecsv").rename(out)
+    before = out.read_bytes()
+    with pytest.raises(InvalidInput, match="not there yet"):
+        run.run(out)
+    assert out.read_bytes() == before
+    run.run(out, overwrite=True)
+    assert len(read_results(out)) == 9

@@ -1,105 +1,115 @@
-"""The journal of a screening: finished tasks on disk, whatever ends the run.
+"""The journal of a screening: results of finished asteroids, and of parts of long ones, on disk.
 
-Every finished task is one line next to the output, and so is every finished part of one that takes long. A killed run
-leaves at worst half a last line, which the next run drops; it then goes on with what is missing. Tables are made from
-it in the order of the tasks.
+The journal stands next to the output while a run lasts. Each record is one line of JSON with a checksum, written as
+soon as its result is there and forced to the disk at least every `SYNC_INTERVAL` seconds, and before the run reports
+success. A run that is killed, by a power cut too, is continued from its journal; the last line may then be incomplete
+and is dropped. A record whose checksum does not agree is reported, and its result is computed again.
 """
 
 from __future__ import annotations
 
+import errno
 import json
 import os
+import time as clock
 from array import array
 from collections.abc import Iterator, Mapping
+from hashlib import blake2b
 from pathlib import Path
 from typing import Any, BinaryIO
 
-from flybystab.errors import InvalidInput
+from flybystab.errors import InvalidInput, OutputFailed
+
+#: Longest time between two fsync calls while records are written, s: what a power cut can lose.
+SYNC_INTERVAL = 1.0
+
+_MARK = b', "checksum": "'
 
 
 class Journal:
-    """Finished tasks and parts of tasks, one JSON line each, behind a first line that says which run they belong to.
+    """Records of finished tasks and of parts of tasks behind a header that identifies the run.
 
     Parameters
     ----------
     path : Path
-        Created if it is not there.
+        Created if it does not exist.
     header : mapping
-        What the run computes; a journal with another header is refused.
+        What the run computes; the journal of another run is refused.
 
     Attributes
     ----------
     count : int
-        Finished tasks; ``task in journal`` says whether one of them is finished.
+        Finished tasks; ``task in journal`` tells whether one of them is finished.
+    damaged : list of int
+        Numbers of the lines that were damaged when the journal was opened.
+    resumed : bool
+        The journal existed.
 
     Raises
     ------
     InvalidInput
-        The file is the journal of another run, or not a journal, or another process writes to it.
+        The file is the journal of another run, or not a journal, or in use by another process.
     """
 
     def __init__(self, path: Path, header: Mapping[str, Any]) -> None:
         self.path = path
         self.count = 0
-        # Offset of each task's line, -1 where there is none: 8 bytes a task.
+        self.damaged: list[int] = []
+        self.unfinished_files: list[tuple[str, int]] = []
+        # Offset of each task's record, -1 without one: 8 bytes per task.
         self._offsets = array("q")
-        # Of tasks that are not finished: the offsets of their parts.
+        # Offsets of the parts of tasks that are not finished.
         self._parts: dict[int, list[int]] = {}
-        wanted = json.dumps(header, sort_keys=True)
-        # Unbuffered: what is written is in the hands of the system, and a full disk is noticed at once.
-        self._file = path.open("ab", buffering=0)
-        self._lock()
+        text = json.dumps(header, sort_keys=True).encode()
+        # Checksums depend on the header: a record of another run never passes as one of this run.
+        self._key = blake2b(text, digest_size=32).digest()
+        self._file = _open_locked(path)
+        self._synced = clock.monotonic()
         try:
-            if path.stat().st_size:
-                self._recover(wanted)
+            self.resumed = os.fstat(self._file.fileno()).st_size > 0
+            if self.resumed:
+                self._recover(text + b"\n")
             else:
-                self._file.write(wanted.encode() + b"\n")
+                self._file.write(text + b"\n")
+                self.sync()
+                sync_folder(path.parent)
         except BaseException:
             self._file.close()
             raise
 
-    def _lock(self) -> None:
-        """Refuse a second process on the same journal."""
-        try:
-            import fcntl
-        except ImportError:  # not on this system
-            return
-        try:
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            self._file.close()
-            raise InvalidInput("journal", str(self.path), "no other run that writes to it now") from None
-        except OSError:  # a file system without locks
-            pass
-
-    def _recover(self, wanted: str) -> None:
-        with self.path.open("r+b") as stream:
-            first, line = stream.readline(), wanted.encode() + b"\n"
-            if first != line:
-                if not line.startswith(first):
-                    raise InvalidInput(
-                        "journal",
-                        str(self.path),
-                        "this run's journal; another run is unfinished there"
-                        f"{_difference(first, line)}. Start that one again to finish it, or remove the file",
-                    )
-                stream.seek(0)  # killed while it wrote its first line
-                stream.write(line)
-                stream.truncate()
-                return
-            end = stream.tell()
+    def _recover(self, header: bytes) -> None:
+        """Index the records that are intact."""
+        with self.path.open("rb") as stream:
+            first = stream.readline()
+            end, number = stream.tell(), 1
             for line in stream:
-                try:
-                    found = json.loads(line) if line.endswith(b"\n") else {}
-                    task, part = int(found["task"]), "first" in found
-                except (ValueError, KeyError, TypeError):
-                    break
-                if part:
-                    self._parts.setdefault(task, []).append(end)
+                number += 1
+                if not line.endswith(b"\n"):
+                    break  # the run ended while it wrote this line
+                if (found := self._decoded(line)) is None:
+                    self.damaged.append(number)
+                elif "unfinished_file" in found:
+                    self.unfinished_files.append((found["unfinished_file"], found["inode"]))
+                elif "first" in found:
+                    self._parts.setdefault(found["task"], []).append(end)
                 else:
-                    self._note(task, end)
+                    self._note(found["task"], end)
                 end += len(line)
-            stream.truncate(end)
+        intact = number - 1 - len(self.damaged) > 0 and end > len(first)
+        if first != header and not header.startswith(first):
+            if not (intact and (self.count or self._parts or self.unfinished_files)):
+                raise InvalidInput(
+                    "journal",
+                    str(self.path),
+                    f"the journal of this run; another run is unfinished there{_difference(first, header)}. "
+                    "Start that one again to finish it, or remove the file",
+                )
+            self.damaged.insert(0, 1)  # the header is damaged, but its records are those of this run
+        elif first != header:  # the run ended while it wrote its header
+            os.ftruncate(self._file.fileno(), 0)
+            self._file.write(header)
+            return
+        os.ftruncate(self._file.fileno(), end)
 
     def __contains__(self, task: object) -> bool:
         return isinstance(task, int) and 0 <= task < len(self._offsets) and self._offsets[task] >= 0
@@ -114,60 +124,151 @@ class Journal:
         self.count += 1
 
     def add(self, task: int, content: Mapping[str, Any]) -> None:
-        """Write down a finished task; a task that is there already is not repeated."""
+        """Record a finished task, unless it is recorded already."""
         if task in self:
             return
         self._note(task, self._append({"task": task, **content}))
 
     def add_part(self, task: int, passage: int, first: int, content: Mapping[str, Any]) -> None:
-        """Write down a part of a task: samples from `first` on of one of its passages."""
+        """Record a part of a task: the samples from `first` on of one of its encounters."""
         offset = self._append({"task": task, "passage": passage, "first": first, **content})
         self._parts.setdefault(task, []).append(offset)
 
+    def add_file(self, path: Path) -> None:
+        """Record that this run writes the file `path`, to be removed if the run does not reach its end."""
+        self._append({"unfinished_file": path.name, "inode": path.stat().st_ino, "folder": str(path.parent)})
+
     def _append(self, content: Mapping[str, Any]) -> int:
-        """Write one line; where it begins."""
-        line = memoryview(json.dumps(content).encode() + b"\n")
+        """Write one record; returns its offset."""
+        body = json.dumps(content).encode()[:-1]
+        line = memoryview(body + _MARK + self._checksum(body) + b'"}\n')
         offset = self._file.seek(0, os.SEEK_END)
         while line:
             line = line[self._file.write(line) :]
+        if clock.monotonic() - self._synced > SYNC_INTERVAL:
+            self.sync()
         return offset
+
+    def _checksum(self, body: bytes) -> bytes:
+        return blake2b(body, digest_size=8, key=self._key).hexdigest().encode()
+
+    def _decoded(self, line: bytes) -> dict[str, Any] | None:
+        """Content of a record; None if it is damaged."""
+        body, mark, rest = line.rpartition(_MARK)
+        if not mark or rest != self._checksum(body) + b'"}\n':
+            return None
+        return dict(json.loads(line))
+
+    def sync(self) -> None:
+        """Force what was written to the disk."""
+        sync_file(self._file.fileno())
+        self._synced = clock.monotonic()
 
     def parts(self, task: int) -> list[dict[str, Any]]:
         """The parts of a task that is not finished."""
         with self.path.open("rb") as stream:
-            return [self._line(stream, offset) for offset in self._parts.get(task, ())]
+            return [self._record(stream, offset) for offset in self._parts.get(task, ())]
 
-    @staticmethod
-    def _line(stream: BinaryIO, offset: int) -> dict[str, Any]:
+    def _record(self, stream: BinaryIO, offset: int) -> dict[str, Any]:
         stream.seek(offset)
-        return dict(json.loads(stream.readline()))
+        found = self._decoded(stream.readline())
+        if found is None:
+            raise OutputFailed(
+                f"{self.path} was changed while the run used it (byte {offset}): run the same command again; "
+                "what is damaged is computed again"
+            )
+        return found
 
     def tasks(self) -> Iterator[dict[str, Any]]:
         """The finished tasks in their order, read one by one."""
         with self.path.open("rb") as stream:
             for offset in self._offsets:
                 if offset >= 0:
-                    yield self._line(stream, offset)
+                    yield self._record(stream, offset)
 
     def task(self, task: int) -> dict[str, Any]:
         """A finished task."""
         with self.path.open("rb") as stream:
-            return self._line(stream, self._offsets[task])
+            return self._record(stream, self._offsets[task])
 
     def close(self, *, remove: bool = False) -> None:
-        """Close the file, and remove it if everything it holds is safe elsewhere."""
-        self._file.close()
+        """Close the file; `remove` it when the tables that were made from it are on the disk."""
         if remove:
+            # Before the lock is released: no other run can take it up meanwhile.
             self.path.unlink(missing_ok=True)
+            sync_folder(self.path.parent)
+        else:
+            self.sync()
+        self._file.close()
+
+
+def _open_locked(path: Path) -> Any:
+    """The file opened for appending and locked, without following a symbolic link."""
+    while True:
+        try:
+            flags = os.O_RDWR | os.O_CREAT | os.O_APPEND | getattr(os, "O_NOFOLLOW", 0)
+            # A FIFO without a reader would block.
+            number = os.open(path, flags | getattr(os, "O_NONBLOCK", 0), 0o666)
+        except OSError as error:
+            reason = "not a symbolic link" if error.errno == errno.ELOOP else error.strerror
+            raise InvalidInput("journal", str(path), f"a file that can be written ({reason})") from None
+        if not path.is_file():
+            os.close(number)
+            raise InvalidInput("journal", str(path), "an ordinary file")
+        # Unbuffered: a full disk is noticed with the record that does not fit.
+        file = os.fdopen(number, "ab", buffering=0)
+        _lock(file, path)
+        try:
+            if os.stat(path).st_ino == os.fstat(number).st_ino:
+                return file
+        except FileNotFoundError:
+            pass
+        file.close()  # another run has just finished and removed it
+
+
+def _lock(file: Any, path: Path) -> None:
+    """Refuse a second process on the same journal."""
+    try:
+        import fcntl
+    except ImportError:  # not on this system
+        return
+    try:
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        file.close()
+        raise InvalidInput("journal", str(path), "no other run that writes to it now") from None
+    except OSError:  # a file system without locks
+        pass
+
+
+def sync_file(number: int) -> None:
+    """Force a file to the disk, where the file system can."""
+    try:
+        os.fsync(number)
+    except OSError as error:
+        if error.errno not in (errno.EINVAL, errno.ENOTSUP, errno.EROFS):
+            raise
+
+
+def sync_folder(path: Path) -> None:
+    """Force the entries of a folder to the disk, where the system can."""
+    try:
+        number = os.open(path, os.O_RDONLY)
+    except OSError:  # Windows, or a folder that may be written but not read
+        return
+    try:
+        sync_file(number)
+    finally:
+        os.close(number)
 
 
 def _difference(theirs: bytes, ours: bytes) -> str:
-    """In what another run's header differs, for a reader."""
+    """The settings in which the header of another run differs."""
     try:
         a, b = (json.loads(text).get("settings", {}) for text in (theirs, ours))
+        keys = [k for k in b if a.get(k) != b[k]]
     except (ValueError, AttributeError):
         return ""
-    keys = [k for k in b if a.get(k) != b[k]]
     if not a or not keys:
         return ""
     return ", with " + ", ".join(f"{k} = {a.get(k)} instead of {b[k]}" for k in keys[:3])

@@ -1,8 +1,9 @@
-"""The tables of a run: they follow its journal, and are made from it again where the run does not reach its end."""
+"""The tables of a run: they grow with its journal, and are made from it again when the run is interrupted."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -10,37 +11,48 @@ from flybystab.screening.journal import Journal
 from flybystab.screening.results import Column
 from flybystab.screening.table_files import TableFile, write_rows
 
-#: What tasks hold, and where it goes: kind of rows -> file and columns.
+#: Key of the rows in a record of the journal -> file and columns of their table.
 Tables = Mapping[str, tuple[Path, Mapping[str, Column]]]
 
 
 class Outputs:
-    """Tables that grow while tasks end, in the order of the tasks whatever the order in which they end.
+    """Tables that grow in the order of the tasks, whatever the order in which the tasks end.
 
-    A task's rows are appended as soon as all tasks before it are done; those that ended early wait in the journal, on
-    disk. What is not finished is no table: after a kill the journal has every row.
+    The rows of a task are appended as soon as all tasks before it are finished; those of tasks that end early stay in
+    the journal, on disk. An unfinished table has a temporary name: after a kill the journal holds every row.
 
     Parameters
     ----------
     journal : Journal
     tables : mapping of str to (Path, columns)
     meta : mapping
-        Provenance of a whole table.
+        Provenance of a complete table.
+    replace : bool
+        Tables of these names that exist now may be replaced.
     """
 
-    def __init__(self, journal: Journal, tables: Tables, meta: Mapping[str, Any]) -> None:
-        self._journal, self._tables = journal, tables
+    def __init__(
+        self, journal: Journal, tables: Tables, meta: Mapping[str, Any], *, replace: bool = True
+    ) -> None:
+        self._journal, self._tables, self._replace = journal, tables, replace
         self._next = 0
         self._files: dict[str, TableFile] = {}
+        folders = {path.parent for path, _ in tables.values()}
+        for name, inode in journal.unfinished_files:  # of a run that was killed
+            for file in (folder / name for folder in folders):
+                with suppress(OSError):
+                    if file.lstat().st_ino == inode:
+                        file.unlink()
         try:
             for kind, (path, columns) in tables.items():
-                self._files[kind] = TableFile(path, columns, meta)
+                self._files[kind] = TableFile(path, columns, meta, replace=replace)
+                journal.add_file(self._files[kind].part)
         except BaseException:
             self.discard()
             raise
 
     def follow(self, task: int = -1, content: Mapping[str, Any] | None = None) -> None:
-        """Append what can be appended; `content` is that of `task`, which need not be read again."""
+        """Append the rows of all tasks that are next; `content` is that of `task`, which need not be read again."""
         while self._next in self._journal:
             found = content if content and task == self._next else self._journal.task(self._next)
             for kind, file in self._files.items():
@@ -49,21 +61,22 @@ class Outputs:
             self._next += 1
 
     def finish(self) -> None:
-        """Give the tables their names, when every task is done."""
+        """Give the tables their names when every task is finished."""
         self.follow()
         for file in self._files.values():
             file.finish()
 
     def discard(self) -> None:
-        """Drop the tables as far as they are."""
+        """Remove the unfinished tables."""
         for file in self._files.values():
             file.discard()
 
     def so_far(self, meta: Mapping[str, Any]) -> None:
-        """Valid tables of the tasks that are done, instead of the ones that were growing.
+        """Write valid tables of the finished tasks.
 
-        An interrupt may have come in the middle of a row: they are made from the journal.
+        They are made from the journal, since an interrupt may have come in the middle of a row.
         """
         self.discard()
         for kind, (path, columns) in self._tables.items():
-            write_rows((r for t in self._journal.tasks() for r in t[kind]), path, columns, meta)
+            rows = (r for t in self._journal.tasks() for r in t[kind])
+            write_rows(rows, path, columns, meta, replace=self._replace)

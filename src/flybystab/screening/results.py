@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
@@ -10,10 +11,14 @@ from typing import Any, NamedTuple
 import astropy.units as u
 import numpy as np
 from astropy.table import MaskedColumn, QTable
+from astropy.table.meta import get_header_from_yaml
 
-from flybystab.errors import InvalidInput, MissingExtra
+from flybystab.errors import FlybystabError, InvalidInput, MissingExtra
+from flybystab.files import read_bytes
 
 FORMATS = (".ecsv", ".parquet")
+#: Largest ECSV file that is read, bytes: the reader needs several times as much memory.
+RESULT_LIMIT = 4 * 2**30
 
 
 class Column(NamedTuple):
@@ -79,7 +84,7 @@ def read_results(path: str | Path) -> QTable:
     Raises
     ------
     InvalidInput
-        The file cannot be read.
+        The file cannot be read, or has fewer rows than its header says.
     """
     file = Path(path)
     if file.suffix not in FORMATS:
@@ -87,18 +92,46 @@ def read_results(path: str | Path) -> QTable:
     try:
         if file.suffix == ".parquet":
             return _read_parquet(file)
-        table = QTable.read(file, format="ascii.ecsv")
+        content = read_bytes(file, "result file", RESULT_LIMIT)
+        table = QTable.read(content.decode(), format="ascii.ecsv")
+        _check_complete(table, content, path)
         for name in table.colnames:  # an empty text counts as missing in ECSV
             if isinstance(table[name], MaskedColumn) and table[name].dtype.kind == "U":
                 about = table[name].info.description
                 table[name] = table[name].filled("")
                 table[name].info.description = about
         return table
-    except MissingExtra:
+    except FlybystabError:
         raise
     except Exception as error:
         reason = str(error).splitlines()[0] if str(error) else type(error).__name__
         raise InvalidInput("result file", str(path), f"a readable result file ({reason})") from None
+
+
+def _check_complete(table: QTable, content: bytes, path: str | Path) -> None:
+    """Refuse a table that was cut off: its header gives the number of rows, and its last line has an end."""
+    rows = table.meta.get("rows")
+    if isinstance(rows, int) and (rows != len(table) or not content.endswith(b"\n")):
+        raise InvalidInput(
+            "result file",
+            str(path),
+            f"the {rows:,} rows that its header gives; {len(table):,} are there: the file was cut off",
+        )
+
+
+def read_meta(path: Path) -> dict[str, Any]:
+    """Provenance of a result file, without its rows; empty if it has none."""
+    try:
+        if path.suffix == ".parquet":
+            meta = pyarrow().parquet.read_schema(path).metadata or {}
+            return dict(json.loads(meta.get(b"flybystab", b"{}")))
+        with path.open(encoding="utf-8") as stream:
+            header = list(itertools.takewhile(lambda line: line.startswith("# "), stream))
+        return dict(get_header_from_yaml(line[2:].rstrip("\n") for line in header[1:]).get("meta", {}))
+    except MissingExtra:
+        raise
+    except Exception:
+        return {}
 
 
 def _read_parquet(path: Path) -> QTable:

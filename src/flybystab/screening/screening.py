@@ -13,11 +13,13 @@ from __future__ import annotations
 
 import hashlib
 import json
+import os
 import time as clock
+import warnings
 from collections import Counter
 from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import Executor
-from contextlib import AbstractContextManager, contextmanager
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +31,7 @@ from astropy.units import Quantity
 from flybystab._version import __version__
 from flybystab.body.body import Material
 from flybystab.catalogues.catalogue import Asteroid
-from flybystab.errors import InvalidInput, OutputFailed
+from flybystab.errors import FlybystabWarning, InvalidInput, OutputFailed
 from flybystab.orbit.ephemeris import ephemeris
 from flybystab.screening.columns import COLUMNS, SAMPLE_COLUMNS
 from flybystab.screening.encounters import Finder, passages
@@ -38,7 +40,7 @@ from flybystab.screening.outputs import Outputs
 from flybystab.screening.priors import Population
 from flybystab.screening.progress import Progress
 from flybystab.screening.result_rows import Row
-from flybystab.screening.results import Column, table_of
+from flybystab.screening.results import Column, read_meta, table_of
 from flybystab.screening.sample_verdicts import Judged
 from flybystab.screening.scheduling import Here, Parts, scheduled, window_of
 from flybystab.screening.selection import listed
@@ -168,7 +170,8 @@ class Screening:
         WorkersLost
             Processes of the executor died; the rows so far are in the file and the same call goes on.
         OutputFailed
-            The disk is full, or gone, in the middle; the rows so far are in the journal and the same call goes on.
+            The disk is full, or gone, in the middle, or another program made a file of the output's name; the rows so
+            far are in the journal and the same call goes on.
         KeyboardInterrupt
             After the rows so far have been written into a valid file; the same call goes on later.
         """
@@ -177,17 +180,27 @@ class Screening:
         if samples_output is not None:
             if not self.settings.keep_samples:
                 raise InvalidInput("samples_output", str(samples_output), "keep_samples in the settings")
-            tables["samples"] = check_output(samples_output), SAMPLE_COLUMNS
+            second = check_output(samples_output)
+            if second.resolve() == out.resolve() or (
+                second.exists() and out.exists() and second.samefile(out)
+            ):
+                raise InvalidInput("samples_output", str(samples_output), "a file other than the output")
+            tables["samples"] = second, SAMPLE_COLUMNS
         journal_file = out.with_name(out.name + ".journal")
-        if not overwrite and not journal_file.exists():
-            for path, _ in tables.values():
-                if path.exists():
+        unfinished = os.path.lexists(journal_file)
+        taken = [path for path, _ in tables.values() if os.path.lexists(path)]
+        if not overwrite:
+            for path in taken:
+                # A run that is taken up again may replace its own table, and no other one.
+                if not unfinished or read_meta(path).get("settings") != self.meta()["settings"]:
                     raise InvalidInput(
                         "output",
                         str(path),
                         "a file that is not there yet; --overwrite (overwrite=True) replaces it",
                     )
         journal = Journal(journal_file, self.fingerprint())
+        if journal.damaged:
+            warnings.warn(_damage(journal, len(self.asteroids)), FlybystabWarning, stacklevel=2)
         began = clock.monotonic()
         resumed = journal.count
         counts: Counter[str] = Counter()
@@ -220,7 +233,7 @@ class Screening:
         outputs: Outputs | None = None
         try:
             with writing():
-                outputs = Outputs(journal, tables, self.meta())
+                outputs = Outputs(journal, tables, self.meta(), replace=overwrite or bool(taken))
                 outputs.follow()
             tell()
             kept = _Kept(journal, writing)
@@ -238,10 +251,20 @@ class Screening:
                     with writing():
                         outputs.so_far(self.meta(complete=False))
             finally:
-                journal.close()
+                with suppress(OSError):  # a full disk is reported already
+                    journal.close()
             raise
         journal.close(remove=True)
         return state()
+
+
+def _damage(journal: Journal, asteroids: int) -> str:
+    """Describe what a damaged journal has lost."""
+    lines = ", ".join(map(str, journal.damaged[:10])) + (", ..." if len(journal.damaged) > 10 else "")
+    return (
+        f"{journal.path} is damaged in {len(journal.damaged)} of its lines ({lines}); their results are lost. "
+        f"{journal.count} of {asteroids} asteroids are intact, the others are computed again"
+    )
 
 
 class _Kept:

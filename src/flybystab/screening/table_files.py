@@ -1,28 +1,37 @@
 """Tables as files, ECSV or Parquet, written row by row: memory does not grow with the number of rows.
 
-A table grows under a temporary name (``.part``), in Parquet by row groups, and takes its own name when it is finished:
-what has that name can be read.
+A table grows in a temporary file (``NAME.part``), in Parquet by row groups. When it is complete it is forced to the
+disk and takes its own name, so that a file of that name is whole. The header of an ECSV file gives the number of rows,
+and :func:`flybystab.screening.results.read_results` refuses a file with fewer.
 """
 
 from __future__ import annotations
 
-import csv
 import io
 import json
 import os
 import shutil
+import stat
+import tempfile
 from collections.abc import Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, Protocol
+from typing import Any, BinaryIO, Protocol
 
-from flybystab.errors import InvalidInput
+from flybystab.errors import InvalidInput, OutputFailed
+from flybystab.screening.journal import sync_file, sync_folder
 from flybystab.screening.results import FORMATS, Column, cell, empty_table, pyarrow
 
 #: Rows of one Parquet row group.
 ROW_GROUP = 10_000
-#: Bytes that must be free where the output goes.
+#: Least free space where the output goes, bytes.
 LEAST_SPACE = 64 * 2**20
+#: Placeholder of the number of rows in the header of an ECSV file, which is written before the rows are known.
+_ROWS = 999_999_999_999
+#: Longest ending of a file beside the output.
+_LONGEST = ".journal"
+#: Text that starts with one of these is quoted: spreadsheets read it as a formula, ECSV readers as a comment (#).
+_QUOTED_START = ("=", "+", "-", "@", "#", " ", "\t")
 
 
 def check_output(path: str | Path) -> Path:
@@ -31,20 +40,28 @@ def check_output(path: str | Path) -> Path:
     Raises
     ------
     InvalidInput
-        Wrong ending, no such directory, not writable, or hardly any space left: said before hours are spent.
+        Wrong ending, no such directory, not an ordinary file, name too long, not writable, or less than
+        `LEAST_SPACE` free. Nothing that is there is touched.
     MissingExtra
         A Parquet file without pyarrow.
     """
     out = Path(path)
+    if "\0" in str(path):
+        raise InvalidInput("output", repr(str(path)), "a file name without null characters")
     if out.suffix not in FORMATS:
         raise InvalidInput("output", str(path), f"a file name that ends in {' or '.join(FORMATS)}")
-    if out.is_dir():
-        raise InvalidInput("output", str(path), "a file, not a directory")
-    probe = out.with_name(out.name + ".probe")
     try:
-        with probe.open("ab"):
+        longest = os.pathconf(out.parent, "PC_NAME_MAX") if hasattr(os, "pathconf") else 255
+        if (size := len(os.fsencode(out.name + _LONGEST))) > longest:
+            raise InvalidInput(
+                "output", out.name, f"a name shorter by {size - longest} bytes: {_LONGEST} is added to it"
+            )
+        if out.is_dir():
+            raise InvalidInput("output", str(path), "a file, not a directory")
+        if out.exists() and not stat.S_ISREG(out.stat().st_mode):
+            raise InvalidInput("output", str(path), "an ordinary file")
+        with tempfile.NamedTemporaryFile(dir=out.parent, prefix=".flybystab-"):
             pass
-        probe.unlink()
         space = shutil.disk_usage(out.parent).free
     except OSError as error:
         raise InvalidInput("output", str(path), f"a file that can be written ({error.strerror})") from None
@@ -70,22 +87,37 @@ class _Format(Protocol):
 
 
 class _Ecsv:
-    def __init__(self, path: Path, columns: Mapping[str, Column], meta: Mapping[str, Any]) -> None:
-        header = io.StringIO()
-        empty_table(columns, meta).write(header, format="ascii.ecsv", delimiter=",")
-        self._stream = path.open("w", newline="", encoding="utf-8")
-        self._stream.write(header.getvalue())
-        self._writer = csv.writer(self._stream, lineterminator="\n")
+    def __init__(self, stream: BinaryIO, columns: Mapping[str, Column], meta: Mapping[str, Any]) -> None:
+        text = io.StringIO()
+        empty_table(columns, {**meta, "rows": _ROWS}).write(text, format="ascii.ecsv", delimiter=",")
+        header = text.getvalue().encode()
+        self._place = header.index(b"rows: %d" % _ROWS) + len(b"rows: ")
+        self._stream = stream
+        self._stream.write(header)
+        self._count = 0
 
     def write(self, cells: list[Any]) -> None:
-        self._writer.writerow(cells)
+        self._stream.write((",".join(map(_text, cells)) + "\n").encode())
+        self._count += 1
 
     def close(self, *, finish: bool) -> None:
-        self._stream.close()
+        if finish:
+            self._stream.flush()
+            self._stream.seek(self._place)
+            self._stream.write(f"{self._count:<{len(str(_ROWS))}d}".encode())
+
+
+def _text(value: Any) -> str:
+    """A cell of an ECSV file."""
+    if not isinstance(value, str):
+        return str(value)
+    if value.startswith(_QUOTED_START) or any(c in value for c in ',"\r\n'):
+        return '"' + value.replace('"', '""') + '"'
+    return value
 
 
 class _Parquet:
-    def __init__(self, path: Path, columns: Mapping[str, Column], meta: Mapping[str, Any]) -> None:
+    def __init__(self, stream: BinaryIO, columns: Mapping[str, Column], meta: Mapping[str, Any]) -> None:
         self._pa = pa = pyarrow()
         types = {float: pa.float64(), int: pa.int64(), bool: pa.bool_(), str: pa.string()}
         units = {name: "" if c.unit is None else c.unit.to_string("vounit") for name, c in columns.items()}
@@ -96,7 +128,7 @@ class _Parquet:
             ],
             metadata={"flybystab": json.dumps(dict(meta))},
         )
-        self._stream = path.open("wb")
+        self._stream = stream
         self._writer = pa.parquet.ParquetWriter(self._stream, self._schema, compression="zstd")
         self._group: list[list[Any]] = [[] for _ in columns]
         self._groups = 0
@@ -123,37 +155,49 @@ class _Parquet:
                 self._writer.close()
         finally:
             with suppress(OSError, ValueError, self._pa.ArrowException):
-                self._writer.close()  # lest it tries again when it is collected
-            self._stream.close()
+                self._writer.close()  # otherwise it would be closed again by the garbage collector
 
 
 class TableFile:
-    """A table in the making; as a context manager it is finished at the end, and discarded on an exception.
+    """A table that is being written; as a context manager it is finished at the end, and discarded on an exception.
 
     Parameters
     ----------
     path : Path
-        Its name when it is finished, ``.ecsv`` or ``.parquet``; a file of that name is replaced then.
+        Its name when it is complete, ``.ecsv`` or ``.parquet``.
     columns : mapping of str to Column
     meta : mapping
         Provenance.
+    replace : bool
+        Replace a file of that name. A file that appears, or changes, while the table is written is never replaced.
 
     Attributes
     ----------
     count : int
         Rows so far.
+    part : Path
+        The file that grows: ``NAME.part``, or ``NAME.1.part`` and so on where that name is taken.
     """
 
-    def __init__(self, path: Path, columns: Mapping[str, Column], meta: Mapping[str, Any]) -> None:
+    def __init__(
+        self,
+        path: Path,
+        columns: Mapping[str, Column],
+        meta: Mapping[str, Any],
+        *,
+        replace: bool = True,
+    ) -> None:
         self.path = path
         self.count = 0
         self._kinds = [(name, c.kind) for name, c in columns.items()]
-        self._part = path.with_name(path.name + ".part")
+        self._replaced = _identity(path) if replace else None
+        self.part, self._stream = _new_file(path)
+        self._inode = os.fstat(self._stream.fileno()).st_ino
         made: type[_Ecsv] | type[_Parquet] = _Parquet if path.suffix == ".parquet" else _Ecsv
         try:
-            self._file: _Format = made(self._part, columns, meta)
+            self._file: _Format = made(self._stream, columns, meta)
         except BaseException:
-            self._part.unlink(missing_ok=True)
+            self._remove()
             raise
 
     def write(self, row: Mapping[str, Any]) -> None:
@@ -162,18 +206,34 @@ class TableFile:
         self.count += 1
 
     def finish(self) -> None:
-        """Close the file and give it its name."""
+        """Force the table to the disk and give it its name.
+
+        Raises
+        ------
+        OutputFailed
+            Another program has made or changed a file of that name meanwhile; it is kept.
+        """
         try:
             self._file.close(finish=True)
-            os.replace(self._part, self.path)
+            self._stream.flush()
+            sync_file(self._stream.fileno())
+            self._stream.close()
+            move_into_place(self.part, self.path, self._replaced)
         finally:
-            self._part.unlink(missing_ok=True)
+            self._remove()
 
     def discard(self) -> None:
         """Remove what was written."""
-        with suppress(OSError):  # what is left in a buffer may have no room, and is not wanted
+        with suppress(OSError, ValueError):  # a buffer may find no space; the stream may be closed
             self._file.close(finish=False)
-        self._part.unlink(missing_ok=True)
+        self._remove()
+
+    def _remove(self) -> None:
+        with suppress(OSError):
+            self._stream.close()
+        with suppress(OSError):
+            if self.part.lstat().st_ino == self._inode:
+                self.part.unlink()
 
     def __enter__(self) -> TableFile:
         return self
@@ -185,11 +245,72 @@ class TableFile:
             self.discard()
 
 
+def _new_file(path: Path) -> tuple[Path, BinaryIO]:
+    """A temporary file beside `path` that did not exist before."""
+    for k in range(1000):
+        part = path.with_name(f"{path.name}{f'.{k}' if k else ''}.part")
+        with suppress(FileExistsError):
+            return part, part.open("xb")
+    raise OutputFailed(f"{path}.part to {path}.999.part exist: remove those that are not needed")
+
+
+def _identity(path: Path) -> tuple[int, ...] | None:
+    """Tells whether a file is still the same one; None without a file."""
+    try:
+        found = path.lstat()
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino, found.st_size, found.st_mtime_ns
+
+
+def move_into_place(part: Path, path: Path, replaced: tuple[int, ...] | None) -> None:
+    """Rename a complete file, unless a file other than `replaced` has its name by now.
+
+    Raises
+    ------
+    OutputFailed
+    """
+    taken = f"{path} was made or changed by another program while this table was computed, and is kept"
+    if replaced is None:
+        try:
+            os.link(part, path)  # fails if the name is taken, unlike a rename
+        except FileExistsError:
+            raise OutputFailed(taken) from None
+        except OSError:  # a file system without hard links
+            if os.path.lexists(path):
+                raise OutputFailed(taken) from None
+            os.replace(part, path)
+    elif _identity(path) not in (replaced, None):
+        raise OutputFailed(taken)
+    else:
+        os.replace(part, path)
+    sync_folder(path.parent)
+
+
 def write_rows(
-    rows: Iterable[Mapping[str, Any]], path: Path, columns: Mapping[str, Column], meta: Mapping[str, Any]
+    rows: Iterable[Mapping[str, Any]],
+    path: Path,
+    columns: Mapping[str, Column],
+    meta: Mapping[str, Any],
+    *,
+    replace: bool = True,
 ) -> int:
     """Write rows as they come into an ECSV or Parquet file; returns their number."""
-    with TableFile(path, columns, meta) as file:
+    with TableFile(path, columns, meta, replace=replace) as file:
         for row in rows:
             file.write(row)
     return file.count
+
+
+def write_whole(text: str, path: Path) -> None:
+    """Write a text file through a temporary one: it is complete, or not there."""
+    replaced = _identity(path)
+    part, stream = _new_file(path)
+    try:
+        with stream:
+            stream.write(text.encode())
+            stream.flush()
+            sync_file(stream.fileno())
+        move_into_place(part, path, replaced)
+    finally:
+        part.unlink(missing_ok=True)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 
 import astropy.units as u
@@ -11,7 +12,7 @@ from astropy.time import Time
 from astropy.units import Quantity
 
 from flybystab.screening.results import Column
-from flybystab.screening.table_files import check_output, write_rows
+from flybystab.screening.table_files import check_output, write_rows, write_whole
 
 
 def write_table(table: QTable, path: str | Path) -> None:
@@ -29,7 +30,11 @@ def write_table(table: QTable, path: str | Path) -> None:
     """
     out = check_output(path)
     if out.suffix == ".ecsv":
-        table.write(out, format="ascii.ecsv", overwrite=True)
+        counted = table.copy(copy_data=False)
+        counted.meta = {**table.meta, "rows": len(table)}
+        text = io.StringIO()
+        counted.write(text, format="ascii.ecsv")
+        write_whole(text.getvalue(), out)
         return
     columns: dict[str, Column] = {}
     values: dict[str, np.ndarray] = {}
