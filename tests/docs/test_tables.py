@@ -15,7 +15,7 @@ PAGES = {
 NUMBER = r"\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?"
 #: Sentences with figures out of a table: page, table, and the words around each figure (N stands for one).
 QUOTED = [
-    ("README.md", "sky", "JPL's N close approaches of early 2020 come out to N km (median; N km at"),
+    ("README.md", "sky", "JPL's N close approaches of early 2020 to N km (median; N km at"),
     ("README.md", "completeness", "takes N s on two cores"),
     ("CHANGELOG.md", "margin", "On N encounters it is wrong in N % (N too safe, N too careful)"),
     ("screening.md", "throughput", "are split over both workers, N times one"),

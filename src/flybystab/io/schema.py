@@ -1,0 +1,35 @@
+"""JSON schemas of the documents that commands print with ``--json`` (draft 2020-12), one file each in ``schema/``."""
+
+from __future__ import annotations
+
+import json
+from importlib import resources
+from typing import Any
+
+from flybystab.errors import UnknownName
+
+#: Kinds of document.
+NAMES = ("flyby", "table", "stability")
+
+
+def schema(name: str) -> dict[str, Any]:
+    """JSON schema of a kind of document.
+
+    Parameters
+    ----------
+    name : str
+        One of :data:`NAMES`, or the entry ``schema`` of a document, such as ``"flyby/1"``.
+
+    Raises
+    ------
+    UnknownName
+        There is no such schema in this version.
+    """
+    kind, _, version = name.partition("/")
+    if kind not in NAMES:
+        raise UnknownName("schema", name, [], f"(known: {', '.join(NAMES)})")
+    text = resources.files("flybystab.io").joinpath("schema", f"{kind}.json").read_text(encoding="utf-8")
+    found: dict[str, Any] = json.loads(text)
+    if version and found["properties"]["schema"]["const"] != name:
+        raise UnknownName("schema", name, [found["properties"]["schema"]["const"]], "")
+    return found
