@@ -160,9 +160,9 @@ def impacts() -> list[str]:
             out.append(f"{name:9s} {rock.row['condition_code']:>2s}  no impact")
             continue
         when = later(passage.time, passage.impact_time).utc
-        place = GCRS(CartesianRepresentation(passage.position(passage.impact_time)[0] * u.m), obstime=when)
+        place = GCRS(CartesianRepresentation(passage.position(passage.impact_time * u.s)), obstime=when)
         at = place.transform_to(ITRS(obstime=when)).earth_location.to_geodetic()
-        speed = np.linalg.norm(passage.velocity(passage.impact_time)[0]) / 1e3
+        speed = np.linalg.norm(passage.velocity(passage.impact_time * u.s).value) / 1e3
         known = f"{passage.displacement.to_value(u.km):15.3g}  {passage.predictability}"
         code = rock.row["condition_code"]
         out.append(

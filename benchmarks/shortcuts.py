@@ -79,7 +79,7 @@ def distant() -> None:
 
             span = arguments[7].copy()
             t = np.linspace(e.t_start, e.t_stop, 20001)
-            size = 2.0 * e.planet.gm / e.radius(t) ** 3
+            size = 2.0 * e.planet.gm / e.distances(t) ** 3
             added = np.cumsum(size) * (t[1] - t[0])
             allowed = tolerance * np.linalg.norm(body.omega)
             first = t[np.searchsorted(added, allowed)]

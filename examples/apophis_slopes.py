@@ -32,7 +32,7 @@ for density in (1.29, 2.2):
         rise = np.average((change.greatest - change.before).to_value(u.deg), weights=change.area.value)
         rises.append(float(rise))
     largest[density] = np.array(changes)
-    tide = 1.5 * encounter.planet.gm / encounter.radius(0.0)[0] ** 3
+    tide = 1.5 * encounter.planet.gm / encounter.radius(0 * u.s).value ** 3
     sphere = float(np.rad2deg(tide / (4 / 3 * np.pi * G * density * 1e3)))
     print(
         f"{density} g/cm3: largest change {min(changes):.2f} to {max(changes):.2f} deg "

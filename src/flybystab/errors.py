@@ -39,6 +39,13 @@ class UnitMismatch(InvalidInput):
     """A quantity has the wrong physical dimension, or a bare number was given where a unit is needed."""
 
 
+class UnsettledBody(InvalidInput):
+    """The body was flowing, dispersed, partly unbound or on the ground at the end of its last encounter.
+
+    No rigid ellipsoid represents it. ``body.with_(state="rigid")`` assumes that it has come to rest in its shape.
+    """
+
+
 class UnknownName(FlybystabError, KeyError):
     """A name (asteroid, planet, yield surface, TOML key) is not known; near matches are offered.
 

@@ -6,7 +6,7 @@ import pytest
 from scenes import PILE, earth, material
 from scipy.spatial.transform import Rotation
 
-from flybystab.body.body import Body, Material
+from flybystab.body.body import YIELD_SURFACES, Body, Material
 from flybystab.constants import R_EARTH, G
 from flybystab.encounter.attitude import periapsis_axes
 from flybystab.encounter.encounter import Encounter
@@ -116,7 +116,9 @@ def test_surfaces_and_robustness():
     assert r.verdict_by_surface["drucker-prager"] == "RESHAPED"
     assert r.verdict_by_surface["mohr-coulomb"] == "BEYOND MODEL"
     assert flyby(PILE, earth(3.0), surfaces=surfaces).robust is True
-    assert flyby(PILE, earth(3.0)).robust is None
+    # a body that stays rigid is tried on every surface without being asked, one that yields is not
+    assert set(flyby(PILE, earth(3.0)).verdict_by_surface) == set(YIELD_SURFACES)
+    assert flyby(PILE, earth(2.0)).robust is None
 
 
 def test_damage_orders_as_published():

@@ -33,7 +33,7 @@ def test_course_turns_with_its_spin_and_carries_the_tide_along():
     np.testing.assert_allclose(turn, 0.5 * (c.spin[i] + c.spin[i + 1]).value * dt[i], rtol=1e-3, atol=1e-9)
     # the tide at closest approach points to the planet: its greatest principal value is 2 GM/q^3
     j = int(np.argmin(np.abs(c.time.value)))
-    position = c.encounter.position(c.time[j].value)[0]
+    position = c.encounter.position(c.time[j]).value
     n = r[j].T @ position / np.linalg.norm(position)
     stretch = n @ tensor(c.tide[j].value) @ n
     assert stretch == pytest.approx(2 * c.encounter.planet.gm / np.linalg.norm(position) ** 3, rel=2e-3)

@@ -43,7 +43,7 @@ def flown(body: Body, encounter: Encounter, attitude: NDArray[np.float64]) -> Ca
     vectors = CubicSpline(run.history["time"], Rotation.from_quat(q, scalar_first=True).as_matrix())
 
     def gap(t: float) -> float:
-        r = encounter.position(t)[0]
+        r = encounter.positions(t)[0]
         n = r / np.linalg.norm(r)
         return float(np.linalg.norm(r) - MOON - np.linalg.norm(body.axes * (vectors(t).T @ n)))
 
@@ -105,7 +105,7 @@ def test_a_flowing_body_touches_with_its_shape_of_then():
     r = flyby(PILE, passing, turn, max_axis_ratio=20)
     assert r.verdict == "IMPACT"
     assert r.onset_time is not None
-    position = passing.position(r.history.time_from_periapsis[-1].value)[0]
+    position = passing.position(r.history.time_from_periapsis[-1]).value
     radius = np.linalg.norm(position)
     n = position / radius
     reach = np.sqrt(n @ r.history.shape[-1].value @ n)

@@ -122,7 +122,7 @@ def test_periapsis_axes_of_an_impact_are_those_of_the_orbit_without_a_surface():
     for q in (0.95 * R_EARTH, 1.05 * R_EARTH):
         epoch = Time(2462240.5, format="jd", scale="tdb")
         start = Encounter.hyperbolic("earth", q * u.m, 6 * u.km / u.s, start_distance=60 * R_EARTH * u.m)
-        r, v = start.position(start.t_start)[0], start.velocity(start.t_start)[0]
+        r, v = (f(start.t_start * u.s).value for f in (start.position, start.velocity))
         orbit = Orbit.from_state(epoch, r * u.m, v * u.m / u.s, centre="earth")
         e = Encounter.from_orbit(orbit, "earth", epoch, start_distance=20 * R_EARTH * u.m)
         assert e.impact == (q < R_EARTH)

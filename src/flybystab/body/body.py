@@ -12,7 +12,7 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.constants import G
-from flybystab.errors import InvalidInput, UnitMismatch, UnknownName
+from flybystab.errors import InvalidInput, UnitMismatch, UnknownName, UnsettledBody
 from flybystab.units import brief, frozen, to_si
 
 if TYPE_CHECKING:
@@ -20,6 +20,8 @@ if TYPE_CHECKING:
 
 #: Yield surfaces, in the order of their integer codes in :mod:`flybystab.core.material.yield_surface`.
 YIELD_SURFACES = ("drucker-prager", "drucker-prager-extension", "mohr-coulomb", "matsuoka-nakai")
+#: States of a body: one whole body at rest, and those in which an encounter may leave it.
+STATES = ("rigid", "flowing", "dispersed", "fluid", "partly unbound", "on the ground")
 #: The default yield surface: of the four the one that simulations of grains confirm best. The cone through triaxial
 #: compression overestimates the strength of a stretched body.
 DEFAULT_SURFACE = "mohr-coulomb"
@@ -96,9 +98,16 @@ class Material:
 
 
 def check_body(body: Any) -> None:
-    """Raise InvalidInput for what is no body."""
+    """Raise InvalidInput for anything but a body."""
     if not isinstance(body, Body):
         raise InvalidInput("body", body, "a flybystab.Body (of an asteroid: asteroid.body)")
+
+
+def check_settled(body: Any) -> None:
+    """Raise InvalidInput for anything but a body, UnsettledBody for one that its last encounter left unsettled."""
+    check_body(body)
+    if body.state != "rigid":
+        raise UnsettledBody("body", body, f"one whole body at rest; this one is {body.state}")
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,6 +128,9 @@ class Body:
         35 degrees of friction and no cohesion by default.
     dispersed : bool, optional
         Whether an encounter has drawn the body apart: its density may then be below that of any asteroid.
+    state : str, optional
+        ``"rigid"``: one whole body at rest in its shape. After an encounter also ``"flowing"``, ``"dispersed"``,
+        ``"partly unbound"`` or ``"on the ground"``: no flyby accepts such a body.
 
     Attributes
     ----------
@@ -136,6 +148,7 @@ class Body:
     spin: Quantity | None = None
     material: Material = field(default_factory=Material)
     dispersed: bool = field(default=False, repr=False, kw_only=True)
+    state: str = field(default="rigid", repr=False, kw_only=True)
 
     axes: NDArray[np.float64] = field(init=False, repr=False, compare=False)
     rho: float = field(init=False, repr=False, compare=False)
@@ -170,6 +183,8 @@ class Body:
             raise InvalidInput(
                 "density", self.density, f"{least:g} to {most:g} kg / m3 (1 g / cm3 is 1000 kg / m3)"
             )
+        if self.state not in STATES:
+            raise InvalidInput("state", self.state, f"one of {', '.join(STATES)}")
         for name in ("semi_axes", "density", "spin_period", "spin"):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, frozen(getattr(self, name)))

@@ -87,6 +87,11 @@ class SlopeChange:
         passing = (self.before.value <= limit) & (self.greatest.value > limit)
         return _share(passing, self.area.value)
 
+    @property
+    def share_lifted(self) -> float:
+        """Share of the area whose slope passes 90 deg at some instant: material is lifted off."""
+        return _share(self.greatest.value > 90.0, self.area.value)
+
 
 def surface_points(body: Body, count: int = 4000) -> tuple[Array, Array]:
     """Points (n, 3), m, over the ellipsoid and the areas (n,), m2, of their patches.

@@ -124,17 +124,46 @@ class Encounter:
     predictability: Predictability | None = None
     ephemeris: str | None = None
 
-    def position(self, t: Array | float) -> Array:
-        """Asteroid from the planet's centre, m, shape (n, 3), in `frame`, ``t`` s from closest approach."""
+    def position(self, t: Quantity) -> Quantity:
+        """Asteroid from the planet's centre.
+
+        Parameters
+        ----------
+        t : Quantity, any shape
+            Time from closest approach.
+
+        Returns
+        -------
+        Quantity, shape of `t` + (3,)
+            In `frame`, m.
+
+        Raises
+        ------
+        UnitMismatch
+            For a bare number or a unit that is not one of time.
+        """
+        return self._states(t)[..., :3] * u.m
+
+    def velocity(self, t: Quantity) -> Quantity:
+        """Velocity relative to the planet, m/s; as :meth:`position`."""
+        return self._states(t)[..., 3:] * u.m / u.s
+
+    def radius(self, t: Quantity) -> Quantity:
+        """Distance from the planet's centre, m, in the shape of `t` (see :meth:`position`)."""
+        return np.linalg.norm(self._states(t)[..., :3], axis=-1) * u.m
+
+    def _states(self, t: Quantity) -> Array:
+        """Position and velocity, SI, shape of `t` + (6,)."""
+        times = to_si(t, u.s, "t", shape=None)
+        return self.track.states(np.ravel(times)).reshape(*np.shape(times), 6)
+
+    def positions(self, t: Array) -> Array:
+        """As :meth:`position` on floats: m, shape (n, 3), at `t` s from closest approach, shape (n,)."""
         return self.track.states(np.atleast_1d(np.asarray(t, dtype=float)))[:, :3]
 
-    def velocity(self, t: Array | float) -> Array:
-        """Velocity relative to the planet, m/s, shape (n, 3), in `frame`, ``t`` s from closest approach."""
-        return self.track.states(np.atleast_1d(np.asarray(t, dtype=float)))[:, 3:]
-
-    def radius(self, t: Array | float) -> Array:
-        """Distance from the planet's centre, m, shape (n,), at ``t`` s from closest approach."""
-        return np.sqrt(np.sum(self.position(t) ** 2, axis=1))
+    def distances(self, t: Array) -> Array:
+        """As :meth:`radius` on floats: m, shape (n,), at `t` s from closest approach, shape (n,)."""
+        return np.sqrt(np.sum(self.positions(t) ** 2, axis=1))
 
     @property
     def height(self) -> float:
@@ -149,7 +178,7 @@ class Encounter:
         tide = self.tide
         end = tide.tau * float(np.sinh(tide.start + tide.width * len(tide.coefficients)))
         stop = self.t_stop if self.impact else end
-        way, _ = tide_panels(self.position, self.t_start, stop, tide.tau, width=min(tide.width, 0.5))
+        way, _ = tide_panels(self.positions, self.t_start, stop, tide.tau, width=min(tide.width, 0.5))
         return Ground(
             way.tau, way.start, way.width, self.planet.impact_distance, self.height, 1.0, way.coefficients
         )

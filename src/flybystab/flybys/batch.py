@@ -17,7 +17,7 @@ from flybystab.core.dynamics.workspace import N_EVENT, N_HISTORY
 from flybystab.encounter.encounter import Encounter
 from flybystab.encounter.reach import TAIL
 from flybystab.errors import InvalidInput
-from flybystab.flybys.verdict import VERDICTS, Verdict
+from flybystab.flybys.verdict import Verdict, verdict_of
 from flybystab.units import to_si
 
 Array = NDArray[np.float64]
@@ -58,7 +58,9 @@ class Judged(NamedTuple):
     pole_change: float  # rad
     lacking: float  # cohesion, Pa
     time: float  # s, clock of the tide
+    regime: str  # at the end
     shape: Array
+    velocity_gradient: Array
     events: list[tuple[str, float, float]]
     history: dict[str, Array] | None
     failure: str
@@ -72,17 +74,21 @@ def judged(
     max_axis_ratio: float,
     keep: int,
     needs: bool,
+    inputs: tuple[Any, ...] | None = None,
 ) -> Judged:
-    """Carry a body through an encounter and judge it; `rotation` takes body axes to the encounter's frame."""
+    """Follow a body through an encounter and classify the outcome.
+
+    `rotation` takes body axes to the frame of the encounter; `inputs` is `one_row` of the three, if it is at hand.
+    """
     out = np.empty((1, judgement.N_ANSWER))
-    shape, _, rows, events, count = room = buffers(keep)
+    shape, gradient, rows, events, count = room = buffers(keep)
     judge_rows(
-        *one_row(body, encounter, rotation), tolerance,
+        *(one_row(body, encounter, rotation) if inputs is None else inputs), tolerance,
         float(max_axis_ratio), MAX_STEPS, needs, *room, out,
     )  # fmt: skip
     out = out[0]
     return Judged(
-        VERDICTS.get(int(out[judgement.VERDICT]), Verdict.INTACT),
+        verdict_of(int(out[judgement.VERDICT]), float(out[judgement.BOUND])) or Verdict.INTACT,
         float(out[judgement.BOUND]),
         out[judgement.AXES : judgement.AXES + 3],
         out[judgement.SPIN : judgement.SPIN + 3],
@@ -92,7 +98,9 @@ def judged(
         float(out[judgement.POLE_CHANGE]),
         float(out[judgement.LACKING]),
         float(out[judgement.TIME]),
+        REGIMES[int(out[judgement.REGIME])],
         shape,
+        gradient,
         event_log(events, count),
         unpacked_history(rows[: count[0]], body.axes, body.rho) if keep > 1 else None,
         failure_of(out, encounter, tolerance),

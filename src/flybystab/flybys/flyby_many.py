@@ -11,11 +11,11 @@ import astropy.units as u
 import numpy as np
 from numpy.typing import NDArray
 
-from flybystab.body.body import Body
+from flybystab.body.body import Body, check_settled
 from flybystab.core.dynamics import verdict_row as judgement
-from flybystab.encounter.attitude import attitude_matrices, periapsis_axes
+from flybystab.encounter.attitude import attitude_matrices
 from flybystab.encounter.encounter import Encounter
-from flybystab.errors import InvalidInput
+from flybystab.errors import InvalidInput, UnsettledBody
 from flybystab.flybys.batch import (
     MAX_STEPS,
     TOLERANCE,
@@ -26,8 +26,8 @@ from flybystab.flybys.batch import (
     judge_rows,
     step_tolerance,
 )
-from flybystab.flybys.result import FlybyTable
-from flybystab.flybys.verdict import VERDICTS, Verdict
+from flybystab.flybys.table import FlybyTable
+from flybystab.flybys.verdict import Verdict, verdict_of
 from flybystab.units import whole
 
 T = TypeVar("T")
@@ -73,8 +73,13 @@ def flyby_many(
     threads = (os.cpu_count() or 1) if workers is None else whole(workers, "workers", 1)
     rotations, failures = attitude_matrices(attitudes, n)
     if n:
-        frames = {id(e): periapsis_axes(e).T for e in encounters}
+        frames = {id(e): e.periapsis_axes.T for e in encounters}
         rotations = np.stack([frames[id(e)] for e in encounters]) @ rotations
+    for i in (k for k, b in enumerate(bodies) if b.state != "rigid" and not failures[k]):
+        try:
+            check_settled(bodies[i])
+        except UnsettledBody as reason:
+            failures[i] = str(reason)
     rows = np.flatnonzero(failures == "")
     phi = np.array([b.material.phi for b in bodies], dtype=float)
     out = np.full((n, judgement.N_ANSWER), np.nan)
@@ -91,9 +96,8 @@ def flyby_many(
         parts = min(len(rows), 16 * threads)
         with ThreadPoolExecutor(threads) as pool:
             list(pool.map(part, [rows[k::parts].copy() for k in range(parts)]))
-    names = np.full(n, "FAILED", dtype="U20")
-    for number, name in VERDICTS.items():
-        names[out[:, judgement.VERDICT] == number] = str(name)
+    found = [verdict_of(int(row[judgement.VERDICT]), row[judgement.BOUND]) for row in out]
+    names = np.array(["FAILED" if v is None else str(v) for v in found], dtype="U20")
     for lost in map(int, np.flatnonzero(names == "FAILED")):
         if not failures[lost]:
             failures[lost] = failure_of(out[lost], encounters[lost], tolerance)

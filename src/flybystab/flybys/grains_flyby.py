@@ -11,7 +11,7 @@ import os
 import time as clock
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import astropy.units as u
@@ -31,6 +31,7 @@ from flybystab.core.numerics.threads import in_order
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
 from flybystab.flybys.batch import ground_near, span_of
+from flybystab.flybys.remnant import final_attitude
 from flybystab.flybys.result import FlybyResult
 from flybystab.flybys.verdict import Verdict, classed, letter_of
 from flybystab.units import brief
@@ -575,8 +576,7 @@ def handed_on(
         return result
     outcome = grains_flyby(body, encounter, rotation, grains=asked.grains, seeds=asked.seeds)
     run, verdict = outcome.median, outcome.verdict
-    return replace(
-        result,
+    return result.with_(
         verdict=verdict,
         verdict_class=letter_of(verdict, outcome.bound_fraction),
         bound_fraction=outcome.bound_fraction,
@@ -586,11 +586,21 @@ def handed_on(
         end_time=run.end_time - encounter.t_start * u.s,
         spin_ratio=run.spin_ratio,
         pole_change=run.pole_change,
+        attitude=_attitude(body, run),
         body=_remnant(body, run),
         modelled=outcome.modelled,
         rung="grains",
         grains=outcome,
     )
+
+
+def _attitude(body: Body, run: GrainsRun) -> Array:
+    """Principal axes of the largest clump, as :attr:`FlybyResult.attitude`."""
+    vectors = run.axes_directions
+    if not np.isfinite(vectors).all():
+        return vectors
+    shape = vectors @ np.diag(run.semi_axes.to_value(u.m) ** 2) @ vectors.T
+    return final_attitude(shape, run.spin_vector.to_value(u.rad / u.s), float(body.omega[2]))
 
 
 def _remnant(body: Body, run: GrainsRun) -> Body:
@@ -600,7 +610,7 @@ def _remnant(body: Body, run: GrainsRun) -> Body:
     return Body(
         semi_axes=run.semi_axes,
         density=rho * u.kg / u.m**3,
-        spin=run.axes_directions.T @ run.spin_vector,
+        spin=_attitude(body, run).T @ run.spin_vector,
         material=body.material,
         dispersed=not DENSITY_RANGE[0] <= rho <= DENSITY_RANGE[1],
     )

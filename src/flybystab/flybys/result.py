@@ -1,9 +1,11 @@
-"""What a flyby gives: the result, its measured error, its history, and the table of many."""
+"""Result of the encounter of one body."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from collections.abc import Mapping
+from dataclasses import FrozenInstanceError
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
 
 import astropy.units as u
 import numpy as np
@@ -12,102 +14,29 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.body.body import Body
+from flybystab.body.surface_slope import SlopeChange
 from flybystab.encounter.encounter import Encounter
-from flybystab.flybys.verdict import Verdict
-from flybystab.units import brief, counted
+from flybystab.flybys.batch import Judged
+from flybystab.flybys.history import FlybyError, History, history_of, measured_error
+from flybystab.flybys.inputs import FlybyInputs, modelled
+from flybystab.flybys.remnant import body_after, final_attitude
+from flybystab.flybys.robustness import Robustness, surface_verdicts
+from flybystab.flybys.surface_change import slopes_on_the_way
+from flybystab.flybys.verdict import Verdict, letter_of
+from flybystab.flybys.verdict_margins import VerdictMargins, verdict_margins
+from flybystab.units import brief
 
 if TYPE_CHECKING:
     from flybystab.flybys.grains_flyby import GrainsOutcome
 
 Array = NDArray[np.float64]
 
-
-@dataclass(frozen=True, eq=False)
-class History:
-    """The body and its orbit against time; every array has the same first dimension.
-
-    Attributes
-    ----------
-    time : Quantity (n,)
-        Since the start of the encounter.
-    time_from_periapsis : Quantity (n,)
-        Since closest approach.
-    distance : Quantity (n,)
-        Between the centres of asteroid and planet.
-    regime : ndarray of str (n,)
-        "rigid", "flowing" or "dispersed".
-    semi_axes : Quantity (n, 3)
-        Sorted, longest first.
-    spin : Quantity (n, 3)
-        Angular velocity in the frame of the encounter.
-    required_friction_angle : Quantity (n,)
-        Friction angle that the stress mobilises, with the body's cohesion; inf where none would do.
-    pressure : Quantity (n,)
-        Volume-averaged pressure, compression positive.
-    shape, velocity_gradient : Quantity (n, 3, 3)
-        ``S = 5 I/m`` and ``L`` in the frame of the encounter.
-    """
-
-    time: Quantity
-    time_from_periapsis: Quantity
-    distance: Quantity
-    regime: NDArray[np.str_]
-    semi_axes: Quantity
-    spin: Quantity
-    required_friction_angle: Quantity
-    pressure: Quantity
-    shape: Quantity
-    velocity_gradient: Quantity
-
-    def __len__(self) -> int:
-        return len(self.time)
-
-    def __repr__(self) -> str:
-        rows = len(self)
-        if not rows:
-            return "<History, no rows>"
-        return (
-            f"<History {rows} rows over {brief(self.time[-1] - self.time[0], u.h)}, "
-            f"{', '.join(dict.fromkeys(map(str, self.regime)))}>"
-        )
+#: Composing it anew costs ten times as much.
+RAD_S = u.rad / u.s
 
 
-@dataclass(frozen=True)
-class FlybyError:
-    """Measured error of a result: its difference from a run with a 30 times larger step tolerance, or a 30 times
-    smaller one where that one does not converge.
-
-    Attributes
-    ----------
-    semi_axes, spin, bound_fraction : float
-        Largest relative difference of the semi-axes, of the spin vector, absolute of the bound share.
-    required_friction_angle, event_times : Quantity
-        Absolute differences; nan if the two runs have different events.
-    verdict_agrees : bool
-        Whether both runs give the same verdict.
-    tide : float
-        Relative error of the stored tide, from the encounter.
-    """
-
-    semi_axes: float
-    spin: float
-    bound_fraction: float
-    required_friction_angle: Quantity
-    event_times: Quantity
-    verdict_agrees: bool
-    tide: float
-
-    def __repr__(self) -> str:
-        other = "" if self.verdict_agrees else ", the verdict differs"
-        return (
-            f"<FlybyError semi-axes {self.semi_axes:.1e}, spin {self.spin:.1e} (relative), friction angle "
-            f"{self.required_friction_angle.value:.1e} deg{other}>"
-        )
-
-
-@dataclass(frozen=True, eq=False)
 class FlybyResult:
-    """What an encounter did to a body.
+    """Outcome of an encounter. Quantities, history, body and margins are computed when they are first asked for.
 
     Attributes
     ----------
@@ -116,78 +45,197 @@ class FlybyResult:
     verdict_class : str or None
         "M", "B" or "S" of Richardson et al. (1998) for bodies that lost mass.
     bound_fraction : float
-        Share of the mass still bound (an upper bound, see :func:`flybystab.flybys.verdict.bound_fraction`).
-    semi_axes : Quantity (3,)
-        At the end, longest first.
-    spin : Quantity
-        Spin rate at the end.
-    spin_vector : Quantity (3,)
-        Angular velocity at the end, frame of the encounter.
-    onset_time, arrest_time : Quantity or None
-        First yield and last arrest since the start of the encounter; None if there was none.
-    end_time : Quantity
-        End of the run, since the start of the encounter; on an IMPACT the first touch.
-    max_required_friction_angle : Quantity
-        Largest friction angle that the body mobilises if it stays rigid throughout; inf if none would do.
-    margin : Quantity
-        Friction angle minus that: positive for a body that never yields.
-    required_cohesion : Quantity
-        NOT IN EQUILIBRIUM: the cohesion that would hold the body at its friction angle. Zero otherwise.
-    lode_angle : Quantity or None
-        Lode angle of the stress at first yield (-30 deg: extension, +30 deg: compression).
-    spin_ratio : float
-        Effective spin rate ``2 E/H`` after the encounter over that before it.
-    pole_change : Quantity
-        Angle between the angular momenta before and after; nan for a body without spin.
-    error : FlybyError or None
-        Measured error; None if it was not asked for.
-    verdict_by_surface : dict of str to Verdict
-        Verdicts with the other yield surfaces that were asked for, and with this one.
-    robust : bool or None
-        Whether the verdicts of the surfaces agree; None if only one was run.
-    events : tuple of (str, Quantity)
-        Every switch of regime, since the start of the encounter.
-    body : Body
-        The body afterwards.
-    history : History or None
-    modelled, left_out : tuple
-        What the encounter and the body model contain, and what they leave out with its share.
-    encounter : Encounter
+        Bound mass fraction in the potential of the whole body, an upper bound
+        (:func:`flybystab.flybys.verdict.bound_fraction`).
+    inputs : FlybyInputs
+        Body, encounter and settings of the run.
     rung : str
-        What gave the verdict: "rigid body", "ellipsoid" or "grains". Of grains, `semi_axes`, spin, `body` and
-        `bound_fraction` are those of the pile with the median bound share; onset, margin and history stay those of the
-        ellipsoid.
+        Model that gave the verdict: "rigid body", "ellipsoid" or "grains". Of grains, `semi_axes`, spin, `body`,
+        `attitude` and `bound_fraction` are those of the pile with the median bound mass fraction; onset, margins and
+        history stay those of the ellipsoid.
     grains : GrainsOutcome or None
-        The distribution over piles of grains.
+        Distribution over piles of grains.
     """
 
     verdict: Verdict
     verdict_class: str | None
     bound_fraction: float
-    semi_axes: Quantity
-    spin: Quantity
-    spin_vector: Quantity
-    onset_time: Quantity | None
-    arrest_time: Quantity | None
-    end_time: Quantity
-    max_required_friction_angle: Quantity
-    max_required_friction_time: Quantity
-    margin: Quantity
-    required_cohesion: Quantity
-    lode_angle: Quantity | None
-    spin_ratio: float
-    pole_change: Quantity
-    error: FlybyError | None
-    verdict_by_surface: dict[str, Verdict]
-    robust: bool | None
-    events: tuple[tuple[str, Quantity], ...]
-    body: Body
-    history: History | None = field(repr=False)
-    modelled: tuple[str, ...] = field(repr=False)
-    left_out: tuple[tuple[str, float], ...] = field(repr=False)
-    encounter: Encounter = field(repr=False)
-    rung: str = "ellipsoid"
-    grains: GrainsOutcome | None = field(default=None, repr=False)
+    inputs: FlybyInputs
+    rung: str
+    grains: GrainsOutcome | None
+    _run: Judged
+    _comparison: Judged | None
+    _by_surface: dict[str, Verdict]
+
+    def __init__(
+        self,
+        inputs: FlybyInputs,
+        run: Judged,
+        comparison: Judged | None = None,
+        by_surface: Mapping[str, Verdict] | None = None,
+    ) -> None:
+        found = self.__dict__
+        found.update(inputs=inputs, _run=run, _comparison=comparison, _by_surface=dict(by_surface or {}))
+        found.update(verdict=run.verdict, bound_fraction=run.bound, grains=None)
+        found["verdict_class"] = letter_of(run.verdict, run.bound)
+        found["rung"] = "rigid body" if self._onset is None else "ellipsoid"
+
+    def __setattr__(self, name: str, value: Any) -> None:
+        raise FrozenInstanceError(f"cannot assign to field {name!r}")
+
+    def with_(self, **changes: Any) -> FlybyResult:
+        """A copy with some attributes replaced."""
+        copy = object.__new__(FlybyResult)
+        copy.__dict__.update(self.__dict__)
+        copy.__dict__.update(changes)
+        return copy
+
+    @property
+    def _onset(self) -> tuple[float, float] | None:
+        """Time (s, clock of the tide) and Lode angle (rad) of the first yield."""
+        return next(((t, angle) for name, t, angle in self._run.events if name == "onset"), None)
+
+    def _since_start(self, time: float) -> Quantity:
+        return (time - self.inputs.encounter.t_start) * u.s
+
+    @property
+    def encounter(self) -> Encounter:
+        """The encounter."""
+        return self.inputs.encounter
+
+    @cached_property
+    def semi_axes(self) -> Quantity:
+        """Semi-axes at the end, longest first, shape (3,), m."""
+        return self._run.axes * u.m
+
+    @cached_property
+    def spin(self) -> Quantity:
+        """Spin rate at the end, rad/s."""
+        return float(np.linalg.norm(self._run.spin)) * RAD_S
+
+    @cached_property
+    def spin_vector(self) -> Quantity:
+        """Angular velocity at the end, shape (3,), frame of the encounter, rad/s."""
+        return self._run.spin * RAD_S
+
+    @cached_property
+    def attitude(self) -> Array:
+        """Rotation matrix at the end, body axes of `body` -> frame of the encounter (ICRF for a real one), (3, 3).
+
+        Right-handed principal axes, longest first. The spin has the same sign along ``a3`` as at the start (positive
+        if it had none there), so that a prograde body stays one. The next encounter takes ``result.body`` with
+        ``periapsis_axes(next) @ result.attitude`` if both are in ICRF, after the free rotation in between.
+        """
+        return final_attitude(self._run.shape, self._run.spin, float(self.inputs.body.omega[2]))
+
+    @cached_property
+    def body(self) -> Body:
+        """The body afterwards, along its own axes. Its ``state`` says whether it is one whole body at rest."""
+        return body_after(self.inputs.body, self._run, self.attitude, self._onset is not None)
+
+    @cached_property
+    def onset_time(self) -> Quantity | None:
+        """First yield since the start of the encounter, s; None if the body never yields."""
+        return None if self._onset is None else self._since_start(self._onset[0])
+
+    @cached_property
+    def arrest_time(self) -> Quantity | None:
+        """Last arrest of the flow since the start of the encounter, s; None if there was none."""
+        times = [t for name, t, _ in self._run.events if name in ("arrest", "jam")]
+        return self._since_start(times[-1]) if times else None
+
+    @cached_property
+    def end_time(self) -> Quantity:
+        """End of the run since the start of the encounter, s; of an IMPACT the first contact."""
+        return self._since_start(self._run.time)
+
+    @cached_property
+    def max_required_friction_angle(self) -> Quantity:
+        """Largest friction angle that the body mobilises if it stays rigid throughout, deg; inf if none suffices."""
+        return np.rad2deg(self._run.friction) * u.deg
+
+    @cached_property
+    def max_required_friction_time(self) -> Quantity:
+        """When it does, since the start of the encounter, s."""
+        return self._since_start(self._run.friction_time)
+
+    @cached_property
+    def margin(self) -> Quantity:
+        """Friction angle of the material less the largest required one, deg: positive if the body never yields."""
+        return np.rad2deg(self.inputs.body.material.phi - self._run.friction) * u.deg
+
+    @cached_property
+    def required_cohesion(self) -> Quantity:
+        """NOT IN EQUILIBRIUM: the cohesion that holds the body at its friction angle, Pa. Zero otherwise."""
+        return self._run.lacking * u.Pa
+
+    @cached_property
+    def lode_angle(self) -> Quantity | None:
+        """Lode angle of the stress at first yield, deg (-30: extension, +30: compression)."""
+        return None if self._onset is None else np.rad2deg(self._onset[1]) * u.deg
+
+    @cached_property
+    def spin_ratio(self) -> float:
+        """Effective spin rate ``2 E/H`` after the encounter over that before it."""
+        return self._run.spin_ratio
+
+    @cached_property
+    def pole_change(self) -> Quantity:
+        """Angle between the angular momenta before and after, deg; nan for a body without spin."""
+        return np.rad2deg(self._run.pole_change) * u.deg
+
+    @cached_property
+    def events(self) -> tuple[tuple[str, Quantity], ...]:
+        """Every change of regime: its name and the time since the start of the encounter, s."""
+        return tuple((name, self._since_start(t)) for name, t, _ in self._run.events)
+
+    @cached_property
+    def error(self) -> FlybyError | None:
+        """Measured error; None if no second run was made."""
+        if self._comparison is None:
+            return None
+        return measured_error(self._run, self._comparison, self.inputs.encounter.tide_error)
+
+    @cached_property
+    def verdict_by_surface(self) -> dict[str, Verdict]:
+        """Verdict on each yield surface: of a rigid body all four, of one that yields its own and those asked for."""
+        return self._by_surface or surface_verdicts(self.inputs, self._run)
+
+    @property
+    def robust(self) -> bool | None:
+        """Whether the verdicts of the yield surfaces agree; None if only one was run."""
+        verdicts = self.verdict_by_surface
+        return None if len(verdicts) == 1 else len(set(verdicts.values())) == 1
+
+    @cached_property
+    def robustness(self) -> Robustness | None:
+        """Verdicts over the spin phase and the friction angle; None unless asked for."""
+        return None
+
+    @cached_property
+    def margins(self) -> VerdictMargins:
+        """Distances of the verdict from its edges: friction, axis ratio, bound mass fraction; and the strain."""
+        return verdict_margins(self.inputs, self._run)
+
+    @cached_property
+    def history(self) -> History | None:
+        """The body and its orbit against time; None if it was not kept."""
+        return None if self._run.history is None else history_of(self._run.history, self.inputs)
+
+    @cached_property
+    def surface(self) -> SlopeChange:
+        """Slopes of the surface on the rigid course: ``surface.share_passing(angle)``, ``surface.share_lifted``."""
+        return slopes_on_the_way(self.inputs)
+
+    @cached_property
+    def modelled(self) -> tuple[str, ...]:
+        """What the encounter and the body model contain."""
+        return (*self.inputs.encounter.forces, *modelled(self.inputs.body))
+
+    @property
+    def left_out(self) -> tuple[tuple[str, float], ...]:
+        """What the encounter leaves out, with its estimated share."""
+        return self.inputs.encounter.left_out
 
     @property
     def fragments(self) -> QTable | None:
@@ -205,7 +253,7 @@ class FlybyResult:
 
         ``"path"``: the closest approach lies below the top of the atmosphere (the surface, if there is none);
         ``"body"``: the centre would pass above it, but the body is large enough there, towards the planet, to touch it.
-        The run ends with the first touch: `end_time`.
+        The run ends with the first contact: `end_time`.
         """
         if self.verdict != Verdict.IMPACT:
             return None
@@ -214,7 +262,7 @@ class FlybyResult:
     def __repr__(self) -> str:
         letter = f" ({self.verdict_class})" if self.verdict_class else ""
         phi = self.max_required_friction_angle
-        own = brief(self.body.material.friction_angle)
+        own = brief(self.inputs.body.material.friction_angle)
         need = f"mobilises {brief(phi)} of {own}" if np.isfinite(phi) else "no friction keeps it rigid"
         robust = {None: "", True: ", robust", False: ", depends on the yield surface"}[self.robust]
         return (
@@ -222,29 +270,3 @@ class FlybyResult:
             f"bound {self.bound_fraction:.4g}, then {brief(self.semi_axes, u.m)}, "
             f"spin rate x {self.spin_ratio:.4g}>"
         )
-
-
-@dataclass(frozen=True, eq=False)
-class FlybyTable:
-    """Results of many encounters as arrays; attributes as in :class:`FlybyResult`, first dimension n.
-
-    A row that could not be computed has the verdict "FAILED", its reason in `failure` and nan elsewhere; `contact` is
-    empty where nothing reaches the ground.
-    """
-
-    verdict: NDArray[np.str_]
-    bound_fraction: Array
-    semi_axes: Quantity
-    spin: Quantity
-    max_required_friction_angle: Quantity
-    margin: Quantity
-    spin_ratio: Array
-    pole_change: Quantity
-    contact: NDArray[np.str_]
-    failure: NDArray[np.str_]
-
-    def __len__(self) -> int:
-        return len(self.verdict)
-
-    def __repr__(self) -> str:
-        return f"<FlybyTable {len(self)} rows: {counted(self.verdict)}>"

@@ -13,7 +13,7 @@ import numpy as np
 from astropy.units import Quantity
 from numpy.typing import NDArray
 
-from flybystab.body.body import Body, check_body
+from flybystab.body.body import Body, check_settled
 from flybystab.core.dynamics.run import passage
 from flybystab.core.dynamics.state import rotated_to_body, rotation_matrix
 from flybystab.core.ellipsoid.tide import TidePanels, tide_at
@@ -81,7 +81,7 @@ def rigid_course(
         Relative error allowed in each integration step. The rows are a quarter of a step apart: a smaller one
         gives more of them (1e-10: about 12 per dynamical time near the planet).
     """
-    check_body(body)
+    check_settled(body)
     if not isinstance(encounter, Encounter):
         raise InvalidInput("encounter", encounter, "a flybystab.Encounter")
     rotation = periapsis_axes(encounter).T @ attitude_matrix(attitude)
@@ -116,7 +116,7 @@ def rigid_course(
         body=body,
         encounter=encounter,
         time=time * u.s,
-        distance=(encounter.radius(time) * u.m).to(u.km),
+        distance=(encounter.distances(time) * u.m).to(u.km),
         attitude=turned,
         spin=spin * u.rad / u.s,
         tide=tide / u.s**2,

@@ -13,6 +13,7 @@ from flybystab.body.shape_slope import shape_slope_change
 from flybystab.body.surface_slope import SlopeChange, slope_change
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
+from flybystab.flybys.inputs import FlybyInputs
 from flybystab.flybys.rigid_course import rigid_course
 
 
@@ -47,3 +48,9 @@ def surface_change(
     if shape is not None:
         return shape_slope_change(shape, body, course.spin, tide)
     return slope_change(body, course.spin, tide, count=count)
+
+
+def slopes_on_the_way(inputs: FlybyInputs) -> SlopeChange:
+    """`surface_change` of a flyby that has been run."""
+    attitude = inputs.encounter.periapsis_axes @ inputs.rotation
+    return surface_change(inputs.body, inputs.encounter, attitude)

@@ -1,13 +1,14 @@
-"""What became of the body: verdicts and the gravitationally bound share (theory, section 7)."""
+"""Verdicts, their thresholds, and the bound mass fraction (theory, section 7)."""
 
 from __future__ import annotations
 
 from enum import StrEnum
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from flybystab.core.dynamics import verdict_row as judgement
+from flybystab.core import verdict_codes as codes
 from flybystab.core.ellipsoid.bound_mass import bound_share
 
 Array = NDArray[np.float64]
@@ -32,16 +33,42 @@ class Verdict(StrEnum):
     NOT_IN_EQUILIBRIUM = "NOT IN EQUILIBRIUM"
 
 
-#: Verdicts by their codes in :mod:`flybystab.core.dynamics.verdict_row`; what could not be computed is none of them.
+class MassClass(NamedTuple):
+    """Outcome of a body that has flowed and ended inside the model."""
+
+    verdict: Verdict
+    letter: str | None  #: class of Richardson et al. (1998)
+    least: float  #: bound mass fraction above which a body belongs to this class or a lighter one
+
+
+#: Classes of bodies that have flowed, the lightest loss first. Edges belong to the heavier class. One entry is all that
+#: a further class takes: these are the only thresholds of verdicts.
+CLASSES = [
+    MassClass(
+        Verdict.RESHAPED, None, 1.0 - 1e-6
+    ),  # the rounding of the quadrature of the bound mass fraction
+    MassClass(Verdict.MASS_LOSS, "M", 0.9),
+    MassClass(Verdict.MASS_LOSS, "B", 0.5),
+    MassClass(Verdict.DISRUPTED, "S", -np.inf),
+]
+
+#: Verdicts by their codes in the kernels, but for `FLOWED`, which :data:`CLASSES` divides.
 VERDICTS = {
-    judgement.INTACT: Verdict.INTACT,
-    judgement.RESHAPED: Verdict.RESHAPED,
-    judgement.MASS_LOSS: Verdict.MASS_LOSS,
-    judgement.DISRUPTED: Verdict.DISRUPTED,
-    judgement.IMPACT: Verdict.IMPACT,
-    judgement.BEYOND_MODEL: Verdict.BEYOND_MODEL,
-    judgement.NOT_IN_EQUILIBRIUM: Verdict.NOT_IN_EQUILIBRIUM,
+    codes.INTACT: Verdict.INTACT,
+    codes.IMPACT: Verdict.IMPACT,
+    codes.BEYOND_MODEL: Verdict.BEYOND_MODEL,
+    codes.NOT_IN_EQUILIBRIUM: Verdict.NOT_IN_EQUILIBRIUM,
 }
+
+
+def verdict_of(code: int, bound: float) -> Verdict | None:
+    """Verdict of a code of the kernels and a bound mass fraction; None for a run that failed."""
+    return class_of(bound).verdict if code == codes.FLOWED else VERDICTS.get(code)
+
+
+def class_of(bound: float) -> MassClass:
+    """Class of a body that has flowed."""
+    return next(c for c in CLASSES if bound > c.least)
 
 
 def bound_fraction(shape: Array, velocity_gradient: Array, density: float) -> float:
@@ -72,12 +99,11 @@ def bound_fraction(shape: Array, velocity_gradient: Array, density: float) -> fl
 
 def classed(bound: float) -> tuple[Verdict, str | None]:
     """Verdict and Richardson class of a body that has flowed; class edges belong to the heavier class."""
-    verdict = VERDICTS[judgement.class_of(bound)]
-    return verdict, letter_of(verdict, bound)
+    found = class_of(bound)
+    return found.verdict, found.letter
 
 
 def letter_of(verdict: Verdict, bound: float) -> str | None:
     """Class of Richardson et al. (1998) of a verdict: M, B or S; None for bodies that lost nothing."""
-    if verdict == Verdict.MASS_LOSS:
-        return "M" if bound > 0.9 else "B"
-    return "S" if verdict == Verdict.DISRUPTED else None
+    found = class_of(bound)
+    return found.letter if found.verdict == verdict else None

@@ -56,16 +56,16 @@ def scene_plot(
     t = history.time_from_periapsis.to_value(u.s)
     q = encounter.distance.to_value(u.m)
     if times is None:
-        inside = t[encounter.radius(t) < 3.5 * max(q, encounter.planet.radius)]
+        inside = t[encounter.distances(t) < 3.5 * max(q, encounter.planet.radius)]
         low, high = (inside[0], inside[-1]) if inside.size > 1 else (t[0], t[-1])
         fine = np.linspace(low, high, 2001)
-        way = np.linalg.norm(np.diff(encounter.position(fine), axis=0), axis=1).cumsum()
+        way = np.linalg.norm(np.diff(encounter.positions(fine), axis=0), axis=1).cumsum()
         chosen = np.interp(np.linspace(0.0, way[-1], 7), np.concatenate([[0.0], way]), fine)
     else:
         chosen = np.atleast_1d(times.to_value(u.s))
     chosen = np.clip(chosen, t[0], t[-1])
-    path = encounter.position(np.linspace(chosen.min(), chosen.max(), 400)) @ turn.T / 1e6
-    places = encounter.position(chosen) @ turn.T / 1e6
+    path = encounter.positions(np.linspace(chosen.min(), chosen.max(), 400)) @ turn.T / 1e6
+    places = encounter.positions(chosen) @ turn.T / 1e6
     rows = np.searchsorted(t, chosen).clip(0, len(t) - 1)
     longest = float(history.semi_axes[rows, 0].max().to_value(u.m)) / 1e6
     if magnification is None:
@@ -166,7 +166,7 @@ def animation(
     moments = scale * np.sinh(np.linspace(np.arcsinh(t[0] / scale), np.arcsinh(t[-1] / scale), frames))
     rows = np.searchsorted(t, moments).clip(0, len(t) - 1)
     inside = np.clip(moments, encounter.t_start, encounter.t_stop)
-    places = encounter.position(inside) @ turn.T / 1e3
+    places = encounter.positions(inside) @ turn.T / 1e3
     reach = float(history.semi_axes[:, 0].to_value(u.km).max())
 
     figure = Figure(figsize=(8.0, 4.2), layout="constrained", dpi=80)

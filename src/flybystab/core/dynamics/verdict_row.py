@@ -19,22 +19,10 @@ from flybystab.core.ellipsoid.bound_mass import (
 )
 from flybystab.core.ellipsoid.rigid_stress import demand, overload, rigid_stress
 from flybystab.core.ellipsoid.tide import TidePanels
-from flybystab.core.numerics.jit import code, inlined, kernel
+from flybystab.core.numerics.jit import inlined, kernel
+from flybystab.core.verdict_codes import BEYOND_MODEL, FAILED, FLOWED, IMPACT, INTACT, NOT_IN_EQUILIBRIUM
 
 Array = NDArray[np.float64]
-
-# Verdicts, in the order of their gravity; `flybystab.flybys.verdict.VERDICTS` names them.
-FAILED = code(0)
-INTACT = code(1)
-RESHAPED = code(2)
-MASS_LOSS = code(3)
-DISRUPTED = code(4)
-IMPACT = code(5)
-BEYOND_MODEL = code(6)
-NOT_IN_EQUILIBRIUM = code(7)
-
-#: Mass that a RESHAPED body may lose: the rounding of the quadrature of `bound_share`.
-ALL_BOUND = 1.0 - 1e-6
 
 # Columns of a body's material.
 PHI = 0  # rad
@@ -68,14 +56,6 @@ REASON = 14
 REGIME = 15
 STEPS = 16
 N_ANSWER = 17
-
-
-@kernel
-def class_of(bound: float) -> int:
-    """Verdict on a body that has flowed; the edges belong to the heavier class."""
-    if bound >= ALL_BOUND:
-        return RESHAPED
-    return MASS_LOSS if bound > 0.5 else DISRUPTED
 
 
 @inlined
@@ -171,11 +151,11 @@ def judge(
         )  # fmt: skip
         out[FRICTION], out[FRICTION_TIME] = mark[0], mark[1]
         reason = STUCK if second == STUCK else reason
-    out[VERDICT] = _verdict(reason, holds, out[REASON] == TOUCH or ground.least < 0.0, yielded, bound)
+    out[VERDICT] = _verdict(reason, holds, out[REASON] == TOUCH or ground.least < 0.0, yielded)
 
 
 @kernel
-def _verdict(reason: int, holds: bool, hits: bool, yielded: bool, bound: float) -> int:
+def _verdict(reason: int, holds: bool, hits: bool, yielded: bool) -> int:
     if reason == STUCK:
         return FAILED
     if not holds:
@@ -184,7 +164,7 @@ def _verdict(reason: int, holds: bool, hits: bool, yielded: bool, bound: float) 
         return IMPACT
     if reason == BEYOND:
         return BEYOND_MODEL
-    return class_of(bound) if yielded else INTACT
+    return FLOWED if yielded else INTACT
 
 
 @kernel

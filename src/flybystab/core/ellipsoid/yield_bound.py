@@ -34,11 +34,12 @@ from flybystab.core.ellipsoid.rigid_stress import invariants, overload, rigid_st
 from flybystab.core.ellipsoid.tide import TidePanels, tide_at
 from flybystab.core.material.yield_surface import least_slope, required_friction, slope_over_sine
 from flybystab.core.numerics.jit import kernel
+from flybystab.core.verdict_codes import FAILED, INTACT, NOT_IN_EQUILIBRIUM
 
 Array = NDArray[np.float64]
 
 #: Verdicts of the quick test.
-UNDECIDED, INTACT, NOT_IN_EQUILIBRIUM = 0, 1, 2
+UNDECIDED = FAILED
 _LARGEST = 0.5 * np.pi * (1.0 - 1e-6)
 
 
