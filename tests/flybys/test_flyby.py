@@ -279,7 +279,7 @@ def test_a_number_without_dimension_is_a_tolerance():
 
 def test_a_stalled_looser_run_costs_no_answer(monkeypatch):
     """The error is then measured by a tighter run."""
-    import flybystab.flybys.flyby as flybys
+    import flybystab.flybys.inputs as flybys
 
     asked = []
     real = flybys.judged

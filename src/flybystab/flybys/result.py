@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import FrozenInstanceError
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
@@ -35,6 +35,7 @@ Array = NDArray[np.float64]
 RAD_S = u.rad / u.s
 
 
+@dataclass(frozen=True, eq=False, init=False, repr=False)
 class FlybyResult:
     """Outcome of an encounter. Quantities, history, body and margins are computed when they are first asked for.
 
@@ -66,29 +67,29 @@ class FlybyResult:
     _run: Judged
     _comparison: Judged | None
     _by_surface: dict[str, Verdict]
+    _changed: dict[str, Any]
 
     def __init__(
         self,
         inputs: FlybyInputs,
-        run: Judged,
-        comparison: Judged | None = None,
-        by_surface: Mapping[str, Verdict] | None = None,
+        _run: Judged,
+        _comparison: Judged | None = None,
+        _by_surface: Mapping[str, Verdict] | None = None,
+        _changed: Mapping[str, Any] | None = None,
+        **changes: Any,
     ) -> None:
         found = self.__dict__
-        found.update(inputs=inputs, _run=run, _comparison=comparison, _by_surface=dict(by_surface or {}))
-        found.update(verdict=run.verdict, bound_fraction=run.bound, grains=None)
-        found["verdict_class"] = letter_of(run.verdict, run.bound)
+        changed = {**(_changed or {}), **changes}
+        found.update(inputs=inputs, _run=_run, _comparison=_comparison, _changed=changed)
+        found.update(_by_surface=dict(_by_surface or {}), grains=None)
+        found.update(verdict=_run.verdict, bound_fraction=_run.bound)
+        found["verdict_class"] = letter_of(_run.verdict, _run.bound)
         found["rung"] = "rigid body" if self._onset is None else "ellipsoid"
-
-    def __setattr__(self, name: str, value: Any) -> None:
-        raise FrozenInstanceError(f"cannot assign to field {name!r}")
+        found.update(changed)
 
     def with_(self, **changes: Any) -> FlybyResult:
         """A copy with some attributes replaced."""
-        copy = object.__new__(FlybyResult)
-        copy.__dict__.update(self.__dict__)
-        copy.__dict__.update(changes)
-        return copy
+        return replace(self, **changes)
 
     @property
     def _onset(self) -> tuple[float, float] | None:
