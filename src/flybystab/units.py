@@ -59,11 +59,15 @@ def to_si(
             raise InvalidInput(name, value, "a number") from None
     if np.any(getattr(value, "mask", False)):
         raise InvalidInput(name, value, "values that are there: some are masked (missing)")
+    if np.iscomplexobj(value.value):
+        raise InvalidInput(name, value, "real numbers")
     try:
         # A copy: what the caller does to the array afterwards is not ours.
         array = np.array(value.to_value(unit), dtype=float)
     except u.UnitConversionError:
         raise UnitMismatch(name, value, f"a unit that converts to {unit}") from None
+    except (TypeError, ValueError):
+        raise InvalidInput(name, value, "numbers") from None
     if shape is not None and array.shape != shape:
         raise InvalidInput(name, value, "a scalar" if shape == () else f"an array of shape {shape}")
     if not np.all(np.isfinite(array)):

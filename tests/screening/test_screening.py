@@ -24,7 +24,7 @@ from flybystab.orbit.planets import planet
 from flybystab.screening import table_files
 from flybystab.screening.columns import COLUMNS, VERDICTS, share_of
 from flybystab.screening.draws import Attitudes, draws
-from flybystab.screening.encounters import Passage
+from flybystab.screening.encounters import Passage, passages
 from flybystab.screening.priors import Population
 from flybystab.screening.progress import ProgressBar
 from flybystab.screening.results import read_results
@@ -494,3 +494,72 @@ def test_a_table_of_another_run_is_not_replaced_by_a_continued_one(tmp_path):
     assert out.read_bytes() == before
     run.run(out, overwrite=True)
     assert len(read_results(out)) == 9
+
+
+BAD = {
+    "sigma of text": {"density_sigma_kg_m3": "abc"},
+    "negative sigma": {"density_sigma_kg_m3": "-1"},
+    "sigma of an element": {"sigma_a_au": "abc"},
+    "nan": {"e": "nan"},
+    "Unix time": {"epoch_jd_tdb": "1700000000"},
+    "a": {"a_au": "1e200"},
+    "H": {"H_mag": "-1e308", "semi_axis_a_m": "", "semi_axis_b_m": "", "semi_axis_c_m": "", "diameter_m": ""},
+    "A3": {"A3_au_d2": "1000"},
+    "i": {"i_deg": "190"},
+    "empty": dict.fromkeys(("a_au", "e", "i_deg", "node_deg", "peri_deg", "M_deg", "epoch_jd_tdb"), ""),
+    "inside the Sun": {"a_au": "0.004", "e": "0.1"},
+}
+
+
+def test_one_bad_row_never_ends_a_run(tmp_path):
+    """Each fails with its reason, the others are computed, and a continued run does not compute it again."""
+    base = dict(Asteroid.from_catalogue("Apophis").row)
+    rows = [base | change | {"name": name, "designation": name, "number": ""} for name, change in BAD.items()]
+    run = Screening([Asteroid(base), *map(Asteroid, rows)], settings("2029-04-01", "2029-05-01", samples=2))
+    out = tmp_path / "x.ecsv"
+
+    def interrupt(state):
+        if state.done == len(rows):
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run.run(out, progress=interrupt)
+    called = []
+    again = Screening(run.asteroids, run.settings, lambda a, s: called.append(a.name) or passages(a, s))
+    again.run(out)
+    assert called == list(BAD)[-1:]
+    table = read_results(out)
+    assert table["verdict"][0] == "INTACT"
+    assert list(table["asteroid"][1:]) == list(BAD)
+    assert all(len(e) > 20 for e in table["error"][1:])
+    assert "epoch_jd_tdb = 1700000000" in table["error"][list(BAD).index("Unix time") + 1]
+
+
+def test_an_unexpected_error_and_a_time_limit_are_rows(tmp_path):
+    def finder(asteroid, settings):
+        if asteroid.name == "Anteros":
+            raise ZeroDivisionError("no reason")
+        while asteroid.name == "Toutatis":
+            pass
+        return three(asteroid, settings)
+
+    run = screening(4, finder, time_limit=0.2)
+    run.run(tmp_path / "x.ecsv")
+    table = read_results(tmp_path / "x.ecsv")
+    errors = {row["asteroid"]: row["error"] for row in table}
+    assert errors["Anteros"] == "ZeroDivisionError: no reason"
+    assert errors["Toutatis"] == "NotConverged: Toutatis: not finished after the time limit of 0.2 s"
+    assert errors["Apophis"] == errors["1950 DA"] == ""
+    with pytest.raises(InvalidInput, match="time_limit"):
+        screening(1, time_limit=0.0)
+    with pytest.raises(InvalidInput, match="tolerance"):
+        screening(1, tolerance=np.inf)
+
+
+def test_an_orbit_of_endless_steps_is_given_up(monkeypatch):
+    """Inside the Sun at perihelion: the number of steps is limited, and the row says so."""
+    row = dict(Asteroid.from_catalogue("Apophis").row) | {"a_au": "0.0098", "e": "0.5", "M_deg": "180"}
+    table = screen(
+        [Asteroid(row | {"A2_au_d2": "", "A1_au_d2": "", "A3_au_d2": ""})], "2026-01-01", "2100-01-01"
+    )
+    assert "steps taken at" in table["error"][0] or "sun" in table["error"][0]

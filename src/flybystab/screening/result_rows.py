@@ -28,8 +28,8 @@ Row = dict[str, Any]
 SHARP = float(np.radians(0.01))
 
 
-def failed_row(asteroid: Asteroid, settings: Settings, error: FlybystabError) -> Row:
-    """Row of an asteroid that could not be followed."""
+def failed_row(asteroid: Asteroid, settings: Settings, error: Exception) -> Row:
+    """Row of an asteroid that could not be computed."""
     return _head(asteroid, settings) | {"error": f"{type(error).__name__}: {error}"}
 
 

@@ -137,9 +137,14 @@ def scheduled(
                 call = calls.pop(future)
                 try:
                     answer = future.result()
-                except (BrokenExecutor, CancelledError) as error:
+                except Exception as error:
+                    if not _lost(error):
+                        raise
                     names = ", ".join(asteroids[i].name for i in _positions(call))
-                    raise WorkersLost(f"workers died or went away ({error}); in work: {names}") from None
+                    raise WorkersLost(
+                        f"workers died or were lost ({type(error).__name__}: {error}); in work: {names}. Finished "
+                        "asteroids are kept: the same call continues the run"
+                    ) from None
                 if isinstance(call, _Piece):
                     call.passage.take(call.first, answer)
                     asteroid = call.asteroid
@@ -174,6 +179,12 @@ def _pieces(asteroid: _Asteroid, left: Sequence[tuple[int, Begun]]) -> Iterator[
     for number, passage in left:
         for first, part in list(passage.parts()):
             yield _Piece(asteroid, number, passage, first), part
+
+
+def _lost(error: Exception) -> bool:
+    """Whether an error says that workers are gone: of concurrent.futures, or of dask (KilledWorker, comm errors)."""
+    kinds = {kind.__module__.partition(".")[0] for kind in type(error).__mro__}
+    return isinstance(error, BrokenExecutor | CancelledError) or "distributed" in kinds
 
 
 def _positions(call: list[int] | _Piece) -> list[int]:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from numbers import Real
 from typing import Any
 
 import astropy.units as u
@@ -19,6 +20,9 @@ from flybystab.orbit.ephemeris import ephemeris
 from flybystab.orbit.planets import planet
 from flybystab.screening.priors import Population
 from flybystab.units import to_si, whole
+
+#: Time that one asteroid may take before its row fails, s: ten thousand times the median.
+TIME_LIMIT = 600.0
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,8 @@ class Settings:
         Step tolerance of the dynamics.
     keep_samples : bool
         Return the samples, too.
+    time_limit : float
+        Longest time to find the encounters of one asteroid and begin with its samples, s.
     """
 
     start: float
@@ -52,6 +58,7 @@ class Settings:
     population: Population
     tolerance: float = 1e-7
     keep_samples: bool = False
+    time_limit: float = TIME_LIMIT
 
     def stated(self) -> dict[str, Any]:
         """Everything that fixes the rows, as plain data."""
@@ -86,8 +93,12 @@ def settings(
     *,
     tolerance: float = 1e-7,
     keep_samples: bool = False,
+    time_limit: float = TIME_LIMIT,
 ) -> Settings:
-    """Checked settings of a screening (arguments of :func:`flybystab.screen`)."""
+    """Checked settings of a screening (arguments of :func:`flybystab.screen`, attributes of :class:`Settings`)."""
+    for name, value, most in (("tolerance", tolerance, 0.1), ("time_limit", time_limit, np.inf)):
+        if isinstance(value, bool) or not isinstance(value, Real) or not 0.0 < value <= most:
+            raise InvalidInput(name, value, f"a number above 0, at most {most:g}")
     dates = []
     for name, date in (("start", start), ("stop", stop)):
         try:
@@ -115,4 +126,5 @@ def settings(
         population=population or Population(),
         tolerance=tolerance,
         keep_samples=keep_samples,
+        time_limit=float(time_limit),
     )

@@ -21,6 +21,7 @@ from flybystab.screening.encounters import Finder, Passage
 from flybystab.screening.result_rows import Row, body_row, failed_row, sample_rows, sampled_row
 from flybystab.screening.sample_verdicts import Judged, judge, judge_each
 from flybystab.screening.settings import Settings
+from flybystab.screening.time_limits import time_limit
 
 #: ``rows`` of encounters, and ``samples`` where they are kept.
 Rows = dict[str, list[Row]]
@@ -173,12 +174,16 @@ def begun(passage: Passage, settings: Settings, block: int) -> Rows | Begun:
 
 
 def begin(asteroid: Asteroid, settings: Settings, finder: Finder, block: int) -> list[Rows | Begun]:
-    """An asteroid's passages, each as its rows or as what is left of it. What fails is a row that says why."""
+    """An asteroid's passages, each as its rows or as what is left of it.
+
+    An asteroid that fails, for whatever reason, or that exceeds the time limit of the settings, gets one row with the
+    reason: it does not end the run, and a continued run does not compute it again.
+    """
     try:
-        found = finder(asteroid, settings)
-    except FlybystabError as error:
+        with time_limit(settings.time_limit, asteroid.name):
+            return [begun(passage, settings, block) for passage in finder(asteroid, settings)]
+    except Exception as error:
         return [{"rows": [failed_row(asteroid, settings, error)], "samples": []}]
-    return [begun(passage, settings, block) for passage in found]
 
 
 def joined(work: Sequence[Rows | Begun], settings: Settings) -> Rows:

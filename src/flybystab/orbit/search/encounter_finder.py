@@ -7,8 +7,9 @@ threads share the work.
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from functools import lru_cache
+from numbers import Real
 from typing import Any
 
 import astropy.units as u
@@ -30,7 +31,7 @@ from flybystab.orbit.predictability import neighbour, neighbour_epoch
 from flybystab.orbit.search.acceleration import Field, field
 from flybystab.orbit.search.force_selection import N_SHARES, NAMES, reduced
 from flybystab.orbit.search.minima import WIDTH
-from flybystab.orbit.search.track import INSIDE, STALLED, search
+from flybystab.orbit.search.track import EXHAUSTED, INSIDE, MAX_STEPS, STALLED, search
 from flybystab.orbit.target_plane import target_plane
 from flybystab.units import to_si
 
@@ -121,6 +122,8 @@ def find_encounters(
             raise InvalidInput(name, value, "one astropy Time")
     if not start < stop:
         raise InvalidInput("stop", stop.iso, f"a time after start, {start.iso}")
+    if not isinstance(planets, Iterable):
+        raise InvalidInput("planets", planets, "a name or a sequence of names")
     names = [planets] if isinstance(planets, str) else list(planets)
     if not names:
         raise InvalidInput("planets", planets, "at least one")
@@ -131,6 +134,8 @@ def find_encounters(
     reach = np.broadcast_to(
         to_si(within, u.m, "within", shape=None, low=0.0, open_low=True), (len(found),)
     ).astype(float)
+    if tolerance is not None and not (isinstance(tolerance, Real) and 1e-16 <= tolerance <= 1e-4):
+        raise InvalidInput("tolerance", tolerance, "a number in [1e-16, 1e-4]")
     accuracy = to_si(error, u.m, "error", low=0.0)
     eph = _ephemeris(ephemeris)
     middle = later(start, 0.5 * seconds(stop, start))
@@ -181,12 +186,16 @@ def find_encounters(
             i, n, status, reached = search(
                 *tables, t_start, t_stop, limits, floors, steps, least, always, shares[part], i, out
             )
-            if status in (INSIDE, STALLED):
+            if status in (INSIDE, STALLED, EXHAUSTED):
                 name, orbit = rows[part][i]
                 why = (
                     starts_inside(name, orbit.epoch, PLANETS[BODIES[int(reached)]])
                     if status == INSIDE
-                    else NotConverged(f"{name}: the step size collapsed at {later(middle, reached).iso} TDB")
+                    else NotConverged(
+                        f"{name}: "
+                        + ("the step size collapsed" if status == STALLED else f"{MAX_STEPS:,} steps taken")
+                        + f" at {later(middle, reached).iso} TDB"
+                    )
                 )
                 if len(rows) == 1:
                     raise why

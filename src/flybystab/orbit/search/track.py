@@ -22,7 +22,9 @@ from flybystab.orbit.search.minima import BENDING, FINE, chord_distance, crash, 
 Array = NDArray[np.float64]
 
 #: How a search ends: ``out`` too small, step size collapsed, start below the surface or atmosphere of a body.
-FULL, STALLED, INSIDE = 1, 2, 3
+FULL, STALLED, INSIDE, EXHAUSTED = 1, 2, 3, 4
+#: Most steps from the epoch to the end of the span; an asteroid of the inner main belt takes about 60 a year.
+MAX_STEPS = 3_000_000
 
 
 @kernel
@@ -65,7 +67,7 @@ def track_encounters(
     int
         Number of rows.
     int
-        0 done; 1 `out` was too small; 2 the step size collapsed; 3 the start is inside a body.
+        0 done; 1 `out` was too small; 2 the step size collapsed; 3 the start is inside a body; 4 `MAX_STEPS`.
     float
         Time reached, s; for 3 the number of the body.
     """
@@ -87,7 +89,11 @@ def track_encounters(
             body
         ] ** 2:
             return n, INSIDE, float(body)
+    count = 0
     while (t_end - t) * sign > 0.0:
+        count += 1
+        if count > MAX_STEPS:
+            return n, EXHAUSTED, t
         stop = t_quiet if (t_quiet - t) * sign > 0.0 else t_end
         t_new, h = advance(field, law, t, y, h, stop, tolerance, k, new, places)
         if t_new != t_new:
