@@ -556,10 +556,10 @@ def test_an_unexpected_error_and_a_time_limit_are_rows(tmp_path):
         screening(1, tolerance=np.inf)
 
 
-def test_an_orbit_of_endless_steps_is_given_up(monkeypatch):
-    """Inside the Sun at perihelion: the number of steps is limited, and the row says so."""
+def test_an_orbit_of_endless_steps_is_given_up():
+    """A period of nine hours, close to the Sun: the number of steps is limited, and the row says so."""
     row = dict(Asteroid.from_catalogue("Apophis").row) | {"a_au": "0.0098", "e": "0.5", "M_deg": "180"}
     table = screen(
         [Asteroid(row | {"A2_au_d2": "", "A1_au_d2": "", "A3_au_d2": ""})], "2026-01-01", "2100-01-01"
     )
-    assert "steps taken at" in table["error"][0] or "sun" in table["error"][0]
+    assert "1,000,000 steps taken at" in table["error"][0]

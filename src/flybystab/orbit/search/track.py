@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 #: How a search ends: ``out`` too small, step size collapsed, start below the surface or atmosphere of a body.
 FULL, STALLED, INSIDE, EXHAUSTED = 1, 2, 3, 4
 #: Most steps from the epoch to the end of the span; an asteroid of the inner main belt takes about 60 a year.
-MAX_STEPS = 3_000_000
+MAX_STEPS = 1_000_000
 
 
 @kernel
