@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import astropy.units as u
 import numpy as np
@@ -23,6 +23,9 @@ from flybystab.orbit.forces import FORCES, NonGravitational, model
 from flybystab.orbit.ias15 import EPSILON, TIGHT, Flight
 from flybystab.orbit.planets import PLANETS
 from flybystab.units import brief, to_si
+
+if TYPE_CHECKING:
+    from flybystab.orbit.vector_function import OrbitVector
 
 Array = NDArray[np.float64]
 
@@ -264,6 +267,26 @@ class Orbit:
                 stacklevel=3,
             )
         return flight.state
+
+    def to_skyfield(self, centre: str = "sun", ephemeris: str | Ephemeris | None = None) -> OrbitVector:
+        """The path as a vector function of skyfield, with all forces.
+
+        Parameters
+        ----------
+        centre : {"sun", "ssb"}
+            Origin of the vectors, ICRF.
+        ephemeris : str or Ephemeris, optional
+            Of the forces, and for light time: open the same with
+            :func:`flybystab.orbit.vector_function.ephemeris_file`.
+
+        Returns
+        -------
+        skyfield.vectorlib.VectorFunction
+            Add it to the Sun of an ephemeris file to observe it: ``file["sun"] + orbit.to_skyfield()``.
+        """
+        from flybystab.orbit.vector_function import OrbitVector
+
+        return OrbitVector(self, str(centre).lower(), _ephemeris(ephemeris))
 
     def clones(
         self,
