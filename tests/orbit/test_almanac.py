@@ -9,19 +9,19 @@ from reference import need_ephemeris
 
 from flybystab.constants import AU, DAY
 from flybystab.core.numerics.jit import kernel
-from flybystab.orbit.almanac import Places, almanac, find_places, gather
-from flybystab.orbit.ephemeris import BELT, BELT_GM, BODIES
+from flybystab.orbit.almanac import almanac, find_places, gather
+from flybystab.orbit.ephemeris import BELT, BELT_GM, BODIES, N_ALL, N_BODIES
 from flybystab.orbit.forces import FORCES, NonGravitational, acceleration, model
 from flybystab.orbit.search.acceleration import empty_places, field, rate
 
 
 @kernel
 def places_at(book, t, out):
-    places = Places(np.empty(16), np.empty(24), np.empty(48), np.empty(48))
+    places = empty_places()
     find_places(book, t, True, places)
-    gather(places, out[:10])
+    gather(places, out[:N_BODIES])
     for j in range(3):
-        out[10:, j] = places.belt[16 * j : 16 * (j + 1)]
+        out[N_BODIES:, j] = places.belt[16 * j : 16 * (j + 1)]
 
 
 @kernel
@@ -40,26 +40,26 @@ def test_places_are_those_of_the_ephemeris(name, start, days):
     window = window_of(name, start, days)
     book = almanac(window, True)
     times = np.concatenate([[window.start, window.stop], np.linspace(window.start, window.stop, 97)[1:-1]])
-    out = np.empty((26, 3))
+    out = np.empty((N_ALL, 3))
     for t in times:
         places_at(book, t, out)
-        for b in range(26):
+        for b in range(N_ALL):
             truth = window.states(b, np.array([t]))[0, :3]
             # the asteroids' table has kinks of its own of up to 60,000 km
-            assert np.abs(out[b] - truth).max() < (0.05 if b < 10 else 1e8)
+            assert np.abs(out[b] - truth).max() < (0.05 if b < N_BODIES else 1e8)
 
 
 def test_the_ends_of_the_file_are_covered():
     eph = need_ephemeris("de421")
     for start in (eph.start_jd + 1e-6, eph.stop_jd - 3.0):
         window = window_of("de421", start, 2.9)
-        out = np.empty((26, 3))
+        out = np.empty((N_ALL, 3))
         places_at(almanac(window, True), window.stop, out)
-        for b in range(10):
+        for b in range(N_BODIES):
             assert np.abs(out[b] - window.states(b, np.array([window.stop]))[0, :3]).max() < 0.05
 
 
-@pytest.mark.parametrize("names", [FORCES[:10], FORCES[10:26], FORCES[:27], FORCES])
+@pytest.mark.parametrize("names", [FORCES[:N_BODIES], FORCES[N_BODIES:N_ALL], FORCES[: N_ALL + 1], FORCES])
 def test_field_is_the_acceleration_of_the_other_code(names):
     """Two codes: one body after the other, exact series; all at once, from the almanac."""
     window = window_of("de421", 2459000.5, 100.0)

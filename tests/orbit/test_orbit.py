@@ -13,7 +13,7 @@ from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput, NoEncounter, UnitMismatch, UnknownName
 from flybystab.orbit.ephemeris import BODIES, ephemeris
 from flybystab.orbit.forces import FORCES, NonGravitational, acceleration, model
-from flybystab.orbit.orbit import GM_SUN, Orbit, later, seconds
+from flybystab.orbit.orbit import GM_SUN, Orbit, default_forces, later, seconds
 from flybystab.orbit.planets import PLANETS, planet
 from flybystab.orbit.relativity import of_source
 from flybystab.orbit.search.acceleration import empty_places, field, rate
@@ -248,12 +248,12 @@ def test_bad_elements_are_named():
 def einstein_infeld_hoffmann(window, t, x, v):
     """The 1PN acceleration term by term with every body as a source (Moyer 2003, eq. 4-26, beta = gamma = 1)."""
     gm = window.gm
-    states = np.array([window.states(b, np.array([t]))[0] for b in range(10)])
+    states = np.array([window.states(b, np.array([t]))[0] for b in range(len(BODIES))])
     places, speeds = states[:, :3], states[:, 3:]
     here = np.sum(gm / np.linalg.norm(places - x, axis=1))
     out = np.zeros(3)
-    for j in range(10):
-        others = np.arange(10) != j
+    for j in range(len(BODIES)):
+        others = np.arange(len(BODIES)) != j
         away = places[others] - places[j]
         far = np.linalg.norm(away, axis=1)
         a = np.sum((gm[others] / far**3)[:, None] * away, axis=0)
@@ -343,7 +343,30 @@ def test_apophis_after_2029_is_where_jpl_has_it(shared):
         orbits.append(Orbit.from_state(when, r * u.au, v * u.au / u.d, "sun", "ICRF", *push))
     before, after = orbits
     place, _ = before.at(after.epoch, ephemeris="de440")
-    assert np.linalg.norm((place - after.position).to_value(u.km)) < 1.0
+    # A metre before the passage is 5 km a year later. Pluto moves Apophis by 1.3 m until then; that leaving it out
+    # comes closer here is a cancellation: J3 and J4 of the Earth, which are not modelled, are 2 km of the rest, and
+    # the state of Didymos (below) needs Pluto.
+    assert np.linalg.norm((place - after.position).to_value(u.km)) < 7.0
+    end = seconds(after.epoch, before.epoch)
+    window = ephemeris("de440").window(before.epoch, 0.0, end)
+    others = tuple(name for name in default_forces(before) if name != "pluto point mass")
+    place = before.flight(window, others).to(end) - window.states(0, np.array([end]))[0]
+    assert np.linalg.norm(place[:3] / 1e3 - after.position.to_value(u.km)) < 1.0
+
+
+def test_didymos_is_where_jpl_has_it_after_eight_years(shared):
+    """Barycentric states of JPL, 3,000 d apart: 5 m off; without Pluto, which pulls the Sun of DE440, 385 m."""
+    need_ephemeris("de440")
+    with open(shared / "states_reference.csv") as file:
+        rows = {row["id"]: row for row in csv.DictReader(file)}
+    first, last = rows["grss_didymos_t0"], rows["grss_didymos_t1"]
+    r, v = ([float(first[p + c]) for c in "xyz"] for p in ("", "v"))
+    push = [float(first[f"A{k}_au_d2"]) * u.au / u.d**2 for k in (1, 2, 3)]
+    epochs = [Time(float(row["epoch_jd_tdb"]), format="jd", scale="tdb") for row in (first, last)]
+    orbit = Orbit.from_state(epochs[0], r * u.au, v * u.au / u.d, "ssb", "ICRF", *push)
+    place, velocity = orbit.at(epochs[1], "ssb", "de440")
+    assert np.linalg.norm(place.to_value(u.m) - [float(last[c]) for c in "xyz"]) < 20.0
+    assert np.linalg.norm(velocity.to_value(u.m / u.s) - [float(last["v" + c]) for c in "xyz"]) < 1e-5
 
 
 def test_a_start_inside_a_planet_is_refused():

@@ -17,22 +17,27 @@ import numpy as np
 from numpy.polynomial import chebyshev
 from numpy.typing import NDArray
 
-from flybystab.constants import DAY
+from flybystab.constants import AU, DAY
 from flybystab.core.numerics.jit import pasted_kernel
-from flybystab.orbit.ephemeris import BELT, BODIES, Window
+from flybystab.orbit.ephemeris import BELT, BODIES, EARTH, MOON, N_BODIES, SUN, Window
+from flybystab.orbit.planets import PLANETS
 
 Array = NDArray[np.float64]
 
 #: Bodies of the two planetary grids, in the order of their slots.
-FAST = ("earth", "moon", "mercury", "venus")
-SLOW = ("sun", "mars", "jupiter", "saturn", "uranus", "neptune")
-N_FAST, N_SLOW, N_BELT = 4, 8, 16
+FAST = tuple(name for name in BODIES if 0.0 < PLANETS[name].orbit_radius < 1.2 * AU)
+SLOW = tuple(name for name in BODIES if name not in FAST)
+#: Slots of the grids: whole vectors of four.
+N_FAST, N_SLOW, N_BELT = (-(-len(names) // 4) * 4 for names in (FAST, SLOW, BELT))
 #: Of each of ``BODIES``: its grid (0 fast, 1 slow) and its slot there.
 GRID = np.array([0 if name in FAST else 1 for name in BODIES])
 SLOT = np.array([(FAST if name in FAST else SLOW).index(name) for name in BODIES])
 #: The planets whose part of relativity counts, beside the Sun's (:mod:`flybystab.orbit.relativity`).
-HEAVY = ("earth", "venus", "jupiter", "saturn")
-N_HEAVY = 4
+HEAVY = tuple(name for name in BODIES if PLANETS[name].relativity and name != "sun")
+N_HEAVY = len(HEAVY)
+#: Columns of the grids; those of ``HEAVY`` end with acceleration and potential of the Sun.
+C_FAST, C_SLOW, C_BELT, C_HEAVY = 3 * N_FAST + 4, 3 * N_SLOW, 3 * N_BELT, -(-(11 * N_HEAVY + 4) // 4) * 4
+_SUN_VELOCITY = 3 * N_FAST
 _NOWHERE = 1e15
 
 
@@ -43,15 +48,15 @@ class Almanac(NamedTuple):
     ----------
     when : ndarray, shape (4, 3)
         Per grid: start (s), pieces per second, pieces.
-    fast : ndarray, shape (pieces, 13, 16)
-        Places (m) of ``FAST``; the last columns are the Sun's velocity (m/s) and nothing.
-    slow : ndarray, shape (pieces, 8, 24)
-        Places of ``SLOW``; the last two slots are empty.
-    belt : ndarray, shape (pieces, 5, 48)
+    fast : ndarray, shape (pieces, 13, columns)
+        Places (m) of ``FAST``; then the Sun's velocity (m/s) and an empty column.
+    slow : ndarray, shape (pieces, 8, columns)
+        Places of ``SLOW``; slots without a body are far away.
+    belt : ndarray, shape (pieces, 5, columns)
         Places of the massive asteroids; no pieces without them.
-    heavy : ndarray, shape (pieces, 5, 48)
-        Of ``HEAVY``: places (m; columns 0 to 11), velocities (m/s; 12 to 23), accelerations (m/s2; 24 to 35) by all
-        other bodies and the potential (m2/s2; 36 to 39) of those; acceleration and potential of the Sun (40 to 43).
+    heavy : ndarray, shape (pieces, 5, columns)
+        Of ``HEAVY``: places (m), velocities (m/s), accelerations (m/s2) by all other bodies, and the potential
+        (m2/s2) of those; then acceleration and potential of the Sun.
     """
 
     when: Array
@@ -74,10 +79,10 @@ class Places(NamedTuple):
 def almanac(window: Window, belt: bool) -> Almanac:
     """The almanac of a window, with the massive asteroids or without; the last ones are kept."""
     grids = [
-        _grid(window, 4, 4.0 * DAY, 12, FAST, N_FAST, 16),
-        _grid(window, 0, 16.0 * DAY, 7, SLOW, N_SLOW, 24),
-        _grid(window, 0, 32.0 * DAY, 4, BELT if belt else (), N_BELT, 48),
-        _grid(window, 0, 16.0 * DAY, 4, HEAVY, N_HEAVY, 48),
+        _grid(window, MOON, 4.0 * DAY, 12, FAST, N_FAST, C_FAST),
+        _grid(window, SUN, 16.0 * DAY, 7, SLOW, N_SLOW, C_SLOW),
+        _grid(window, SUN, 32.0 * DAY, 4, BELT if belt else (), N_BELT, C_BELT),
+        _grid(window, SUN, 16.0 * DAY, 4, HEAVY, N_HEAVY, C_HEAVY),
     ]
     return Almanac(np.array([g[0] for g in grids]), *(g[1] for g in grids))
 
@@ -95,11 +100,11 @@ def _grid(
     nodes = -np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
     times = (start + length * (np.arange(count)[:, None] + 0.5 * (1.0 + nodes))).ravel()
     order = (*BODIES, *BELT)
-    rows = {0, *(order.index(name) for name in names)} | ({3, 4} if "earth" in names else set())
+    rows = {SUN, *(order.index(name) for name in names)} | ({EARTH, MOON} if "earth" in names else set())
     if names == HEAVY:
         rows = set(range(len(BODIES)))
     head = window.head[sorted(rows)]
-    # Beyond the ephemeris nobody asks; a piece that sticks out there is made of what there is.
+    # Times beyond the end of the ephemeris are never queried: a piece that reaches beyond is sampled at the end.
     times = np.clip(times, head[:, 3].max(), (head[:, 3] + head[:, 2] * head[:, 4]).min())
     sample = np.full((times.size, columns), _NOWHERE)
     if names == HEAVY:
@@ -108,7 +113,7 @@ def _grid(
         for slot, name in enumerate(names):
             sample[:, slot : 3 * slots : slots] = window.states(order.index(name), times)[:, :3]
     if names == FAST:
-        sample[:, 12:15] = window.states(0, times)[:, 3:]
+        sample[:, _SUN_VELOCITY : _SUN_VELOCITY + 3] = window.states(SUN, times)[:, 3:]
     by_chebyshev = np.linalg.inv(chebyshev.chebvander(nodes, degree)) @ sample.reshape(count, degree + 1, -1)
     powers = np.zeros((degree + 1, degree + 1))
     for n in range(degree + 1):
@@ -117,7 +122,7 @@ def _grid(
 
 
 def _write_heavy(window: Window, times: Array, out: Array) -> None:
-    """Write what :class:`Almanac` has of the heavy bodies at ``times``, shape (n,), into ``out[n, 48]``."""
+    """Write what :class:`Almanac` has of the heavy bodies at ``times``, shape (n,), into ``out``, a row per time."""
     states = np.array([window.states(b, times) for b in range(len(BODIES))])
     for slot, name in enumerate((*HEAVY, "sun")):
         body = BODIES.index(name)
@@ -127,10 +132,11 @@ def _write_heavy(window: Window, times: Array, out: Array) -> None:
         gm = window.gm[others, None]
         pull, potential = np.sum((gm / r**3)[:, :, None] * away, axis=0), np.sum(gm / r, axis=0)
         if name == "sun":
-            out[:, 40:43], out[:, 43] = pull, potential
+            out[:, 10 * N_HEAVY : 10 * N_HEAVY + 3], out[:, 10 * N_HEAVY + 3] = pull, potential
             continue
-        out[:, slot:12:N_HEAVY], out[:, 12 + slot : 24 : N_HEAVY] = states[body, :, :3], states[body, :, 3:]
-        out[:, 24 + slot : 36 : N_HEAVY], out[:, 36 + slot] = pull, potential
+        for block, values in enumerate((states[body, :, :3], states[body, :, 3:], pull)):
+            out[:, 3 * N_HEAVY * block + slot : 3 * N_HEAVY * (block + 1) : N_HEAVY] = values
+        out[:, 9 * N_HEAVY + slot] = potential
 
 
 @pasted_kernel
@@ -142,13 +148,13 @@ def _piece(when: Array, t: float) -> tuple[int, float]:
 
 
 @pasted_kernel
-def _find_quartic(when: Array, pieces: Array, t: float, p: Array) -> None:
-    """Write the 48 columns of a grid of degree 4 at `t`."""
+def _find_quartic(when: Array, pieces: Array, t: float, p: Array, columns: int) -> None:
+    """Write the columns of a grid of degree 4 at `t`."""
     i, x = _piece(when, t)
     c = pieces[i]
     x2 = x * x
     x4 = x2 * x2
-    for j in range(48):
+    for j in range(columns):
         p[j] = ((c[0, j] + c[1, j] * x) + (c[2, j] + c[3, j] * x) * x2) + c[4, j] * x4
 
 
@@ -162,7 +168,7 @@ def find_places(book: Almanac, t: float, belt: bool, out: Places) -> None:
     x2 = x * x
     x4 = x2 * x2
     x8 = x4 * x4
-    for j in range(16):
+    for j in range(C_FAST):
         p[j] = (
             ((c[0, j] + c[1, j] * x) + (c[2, j] + c[3, j] * x) * x2)
             + ((c[4, j] + c[5, j] * x) + (c[6, j] + c[7, j] * x) * x2) * x4
@@ -173,26 +179,34 @@ def find_places(book: Almanac, t: float, belt: bool, out: Places) -> None:
     p = out.slow
     x2 = x * x
     x4 = x2 * x2
-    for j in range(24):
+    for j in range(C_SLOW):
         p[j] = ((c[0, j] + c[1, j] * x) + (c[2, j] + c[3, j] * x) * x2) + (
             (c[4, j] + c[5, j] * x) + (c[6, j] + c[7, j] * x) * x2
         ) * x4
     if belt:
-        _find_quartic(book.when[2], book.belt, t, out.belt)
+        _find_quartic(book.when[2], book.belt, t, out.belt, C_BELT)
 
 
 @pasted_kernel
 def find_heavy(book: Almanac, t: float, out: Places) -> None:
     """Write what relativity needs of the heavy bodies at ``t`` (s)."""
-    _find_quartic(book.when[3], book.heavy, t, out.heavy)
+    _find_quartic(book.when[3], book.heavy, t, out.heavy, C_HEAVY)
 
 
 @pasted_kernel
 def gather(places: Places, out: Array) -> None:
-    """Write the places of ``BODIES`` into ``out[10, 3]``, m."""
-    for b in range(10):
+    """Write the places of ``BODIES`` into ``out[bodies, 3]``, m."""
+    for b in range(N_BODIES):
         s = SLOT[b]
         if GRID[b] == 0:
-            out[b, 0], out[b, 1], out[b, 2] = places.fast[s], places.fast[4 + s], places.fast[8 + s]
+            out[b, 0], out[b, 1], out[b, 2] = (
+                places.fast[s],
+                places.fast[N_FAST + s],
+                places.fast[2 * N_FAST + s],
+            )
         else:
-            out[b, 0], out[b, 1], out[b, 2] = places.slow[s], places.slow[8 + s], places.slow[16 + s]
+            out[b, 0], out[b, 1], out[b, 2] = (
+                places.slow[s],
+                places.slow[N_SLOW + s],
+                places.slow[2 * N_SLOW + s],
+            )

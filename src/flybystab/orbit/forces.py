@@ -22,7 +22,19 @@ from numpy.typing import NDArray
 from flybystab.constants import AU, DAY
 from flybystab.core.numerics.jit import kernel
 from flybystab.errors import UnknownName
-from flybystab.orbit.ephemeris import BELT, BELT_GM, BODIES, Window, series_position, series_state
+from flybystab.orbit.ephemeris import (
+    BELT,
+    BELT_GM,
+    BODIES,
+    EARTH,
+    MOON,
+    N_ALL,
+    N_BODIES,
+    SUN,
+    Window,
+    series_position,
+    series_state,
+)
 from flybystab.orbit.planets import PLANETS
 from flybystab.orbit.relativity import IS_SOURCE, one_pn
 
@@ -35,17 +47,20 @@ FORCES = (
     *(f"{name} J2" for name in BODIES),
     "non-gravitational",
 )
-N_BODIES, N_ALL = len(BODIES), len(BODIES) + len(BELT)
 _PN, _J2, _NON = N_ALL, N_ALL + 1, N_ALL + 1 + N_BODIES
 
 # Layout of a model, one flat array that a C callback can be handed as a pointer:
 #   [0] length  [1] Earth/Moon ratio  [2..5] switches: 1PN, any J2, non-gravitational, unused
 #   [6..8] A1 A2 A3 (m/s2)  [9..13] law: ALN, r0 (m), m, n, k  [14] address, [15] rows and [16] count of a log
-#   [20] head (26 x 5)  [150] gm (26)  [176] radius of the core (10)  [186] J2: c, pole (10 x 4)
-#   [226] GM in use (26; zero: left out)  [252...] coefficients
-# Rows 0 to 9 are BODIES, rows 10 to 25 are BELT.
+#   then, with the rows of BODIES before those of BELT where both are in: head (N_ALL x 5), gm (N_ALL), radius of the
+#   core (N_BODIES), J2: c, pole (N_BODIES x 4), GM in use (N_ALL; zero: left out), coefficients
 LOG_ADDRESS, LOG_ROWS, LOG_COUNT = 14, 15, 16
-_HEAD, _GM, _INNER, _FLAT, _USED, _DATA = 20, 150, 176, 186, 226, 252
+_HEAD = 20
+_GM = _HEAD + 5 * N_ALL
+_INNER = _GM + N_ALL
+_FLAT = _INNER + N_BODIES
+_USED = _FLAT + 4 * N_BODIES
+_DATA = _USED + N_ALL
 INNER = 0.9
 
 
@@ -89,7 +104,7 @@ def model(window: Window, forces: Iterable[str], nongrav: NonGravitational | Non
         raise UnknownName("force", name, [], known=f"(known: {', '.join(FORCES)})")
     out = np.zeros(_DATA + window.data.size)
     out[0] = out.size
-    out[1] = window.gm[4] / window.gm[3]
+    out[1] = window.gm[MOON] / window.gm[EARTH]
     out[_HEAD:_GM] = window.head.ravel()
     out[_GM : _GM + N_BODIES] = window.gm
     out[_GM + N_BODIES : _INNER] = list(BELT_GM.values())
@@ -116,15 +131,15 @@ def model(window: Window, forces: Iterable[str], nongrav: NonGravitational | Non
 
 @kernel
 def bodies(model: Array, t: float, out: Array, rates: Array) -> None:
-    """Write the positions (m) of bodies at ``t`` into ``out[26, 3]``, velocities (m/s) of ``SOURCES`` into ``rates``.
+    """Write positions (m) at ``t`` into ``out[N_ALL, 3]``, velocities (m/s) of the sources of 1PN into ``rates``.
 
-    Massive asteroids that are not in use are left out, and velocities that no force asks for.
+    Massive asteroids that are not in use are left out, and velocities that no force depends on.
     """
-    head = model[_HEAD:_GM].reshape((26, 5))
+    head = model[_HEAD:_GM].reshape((N_ALL, 5))
     data = model[_DATA:]
     state = np.empty(6)
-    for i in range(10):
-        if (model[2] != 0.0 and IS_SOURCE[i]) or (model[4] != 0.0 and i == 0):
+    for i in range(N_BODIES):
+        if (model[2] != 0.0 and IS_SOURCE[i]) or (model[4] != 0.0 and i == SUN):
             series_state(head, data, i, t, state)
             for j in range(3):
                 out[i, j] = state[j]
@@ -133,14 +148,14 @@ def bodies(model: Array, t: float, out: Array, rates: Array) -> None:
             series_position(head, data, i, t, out[i])
     # The Earth's velocity stays that of its barycentre with the Moon, 12 m/s off: the terms with it are small.
     for j in range(3):
-        far = out[4, j]
-        out[4, j] = out[3, j] + far
-        out[3, j] -= model[1] * far
-    for i in range(10, 26):
+        far = out[MOON, j]
+        out[MOON, j] = out[EARTH, j] + far
+        out[EARTH, j] -= model[1] * far
+    for i in range(N_BODIES, N_ALL):
         if model[_USED + i] != 0.0:
             series_position(head, data, i, t, out[i])
             for j in range(3):
-                out[i, j] += out[0, j]
+                out[i, j] += out[SUN, j]
 
 
 @kernel
@@ -206,7 +221,7 @@ def acceleration_among(model: Array, places: Array, rates: Array, x: Array, v: A
     """Write into ``out[3]`` the acceleration (m/s2) at ``x`` (m), ``v`` (m/s); bodies at ``places`` (m)."""
     ax = ay = az = potential = 0.0
     g = np.zeros(3)
-    for i in range(26):
+    for i in range(N_ALL):
         gm = model[_USED + i]
         if gm == 0.0:
             continue
@@ -214,12 +229,12 @@ def acceleration_among(model: Array, places: Array, rates: Array, x: Array, v: A
         dy = places[i, 1] - x[1]
         dz = places[i, 2] - x[2]
         r2 = dx * dx + dy * dy + dz * dz
-        inner = model[_INNER + i] if i < 10 else 0.0
+        inner = model[_INNER + i] if i < N_BODIES else 0.0
         c = gm / (r2 * np.sqrt(r2)) if r2 > inner * inner else gm * core(r2 / (inner * inner)) / inner**3
         ax += c * dx
         ay += c * dy
         az += c * dz
-        if i < 10 and r2 > inner * inner:
+        if i < N_BODIES and r2 > inner * inner:
             g[0] += c * dx
             g[1] += c * dy
             g[2] += c * dz
@@ -229,7 +244,7 @@ def acceleration_among(model: Array, places: Array, rates: Array, x: Array, v: A
     out[2] = az
     if model[3] != 0.0:
         d = np.empty(3)
-        for i in range(10):
+        for i in range(N_BODIES):
             p = _FLAT + 4 * i
             if model[p] != 0.0:
                 r2 = 0.0
@@ -238,22 +253,22 @@ def acceleration_among(model: Array, places: Array, rates: Array, x: Array, v: A
                     r2 += d[j] * d[j]
                 oblateness(model[p] * fade(r2 / model[_INNER + i] ** 2), model[p + 1 : p + 4], d, out)
     if model[2] != 0.0:
-        gms, used, inners = model[_GM : _GM + 10], model[_USED : _USED + 10], model[_INNER : _INNER + 10]
+        gms, used, inners = model[_GM : _GM + N_BODIES], model[_USED : _USED + N_BODIES], model[_INNER:_FLAT]
         one_pn(gms, used, inners, places, rates, g, potential, x, v, out)
     if model[4] != 0.0:
         r = np.empty(3)
         w = np.empty(3)
         for j in range(3):
-            r[j] = x[j] - places[0, j]
-            w[j] = v[j] - rates[0, j]
+            r[j] = x[j] - places[SUN, j]
+            w[j] = v[j] - rates[SUN, j]
         push(model[6:14], r, w, out)
 
 
 @kernel
 def acceleration(model: Array, t: float, x: Array, v: Array, out: Array) -> None:
     """Write into ``out[3]`` the acceleration (m/s2) at ``t`` (s), ``x`` (m), ``v`` (m/s)."""
-    places = np.empty((26, 3))
-    rates = np.zeros((10, 3))
+    places = np.empty((N_ALL, 3))
+    rates = np.zeros((N_BODIES, 3))
     bodies(model, t, places, rates)
     acceleration_among(model, places, rates, x, v, out)
 
@@ -284,37 +299,37 @@ def shares(window: Window, t: Array, states: Array, nongrav: NonGravitational | 
 @kernel
 def _sizes(model: Array, t: Array, states: Array, out: Array) -> None:
     """Write the size (m/s2) of each force of ``FORCES`` at each point of a track into ``out[n, forces]``."""
-    places = np.empty((26, 3))
-    rates = np.zeros((10, 3))
+    places = np.empty((N_ALL, 3))
+    rates = np.zeros((N_BODIES, 3))
     a = np.empty(3)
     g = np.empty(3)
     d = np.empty(3)
     for n in range(t.size):
         bodies(model, t[n], places, rates)
-        for i in range(26):
+        for i in range(N_ALL):
             r2 = 0.0
             for j in range(3):
                 d[j] = states[n, j] - places[i, j]
                 r2 += d[j] * d[j]
             out[n, i] = model[_GM + i] / r2
-            if i >= 10:
+            if i >= N_BODIES:
                 continue
             a[:] = 0.0
             oblateness(model[_FLAT + 4 * i], model[_FLAT + 4 * i + 1 : _FLAT + 4 * i + 4], d, a)
             out[n, _J2 + i] = np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2)
-        r = states[n, :3] - places[0]
-        w = states[n, 3:] - rates[0]
+        r = states[n, :3] - places[SUN]
+        w = states[n, 3:] - rates[SUN]
         a[:] = 0.0
         potential = 0.0
-        for i in range(10):
+        for i in range(N_BODIES):
             potential += model[_GM + i] / np.sqrt(np.sum((states[n, :3] - places[i]) ** 2))
         for j in range(3):
-            g[j] = -model[_GM] * r[j] / np.sum(r * r) ** 1.5
-        gms = model[_GM : _GM + 10]
+            g[j] = -model[_GM + SUN] * r[j] / np.sum(r * r) ** 1.5
+        gms = model[_GM : _GM + N_BODIES]
         one_pn(
             gms,
             gms,
-            model[_INNER : _INNER + 10],
+            model[_INNER:_FLAT],
             places,
             rates,
             g,

@@ -1,11 +1,13 @@
 """The bodies that an asteroid can meet: mass, figure, pole and the height where a passage becomes an impact.
 
-A new body is one new entry in ``_TABLE``.
+A new body is one new entry in ``_TABLE``; :mod:`flybystab.orbit` derives everything else from it. Three bodies are
+special: the Sun (the centre of two-body motion and of non-gravitational accelerations) and the pair of Earth and Moon,
+whose series are their barycentre and the Moon from the Earth; the Earth's pole is that of date.
 
 Sources
 -------
 GM: DE440 (Park et al. 2021), the planet alone, not its system, for Mars outwards (JPL satellite
-ephemerides: MAR097, JUP365, SAT427, URA111, NEP095); Earth: IERS 2010.
+ephemerides: MAR097, JUP365, SAT427, URA111, NEP095; Pluto: Brozovic et al. 2015); Earth: IERS 2010.
 Radius and pole: IAU Working Group on Cartographic Coordinates and Rotational Elements 2009 and 2015
 (Archinal et al. 2011, 2018), equatorial radii, pole at J2000; Earth: WGS 84; Sun: IAU 2015 Resolution B3.
 J2: Mercury: Mazarico et al. 2014; Venus: Konopliv et al. 1999; Earth, Moon, Sun: DE440; Mars: Konopliv et
@@ -51,7 +53,12 @@ class Planet:
     target : int
         NAIF number of the ephemeris target (a system barycentre from Mars outwards).
     orbit_radius : float
-        Mean distance from the Sun (Moon: from the Earth's orbit's centre, too), m; zero for the Sun.
+        Semi-major axis of the orbit around the Sun (Moon: that of the Earth), m; zero for the Sun.
+    series : tuple of int, optional
+        NAIF numbers (centre, target) of the series of an ephemeris that gives its place: with it the body attracts
+        asteroids and can be encountered on a real orbit. None: only hyperbolic encounters (:func:`planet`).
+    relativity : bool
+        Whether it is a source of the 1PN terms of its own (:mod:`flybystab.orbit.relativity`).
     """
 
     name: str
@@ -62,6 +69,8 @@ class Planet:
     atmosphere: float
     target: int
     orbit_radius: float
+    series: tuple[int, int] | None = None
+    relativity: bool = False
 
     @property
     def impact_distance(self) -> float:
@@ -100,13 +109,51 @@ def _direction(ra: float, dec: float) -> tuple[float, float, float]:
     return float(np.cos(d) * np.cos(a)), float(np.cos(d) * np.sin(a)), float(np.sin(d))
 
 
-# name: GM (km3/s2), radius (km), J2, pole (ra, dec; deg), atmosphere (km), NAIF target, orbit radius (au)
-_TABLE: dict[str, tuple[float, float, float, tuple[float, float], float, int, float]] = {
-    "sun": (132712440041.279419, 695700.0, 2.1961e-7, (286.13, 63.87), 0.0, 10, 0.0),
-    "mercury": (22031.868551, 2440.53, 5.0322e-5, (281.0103, 61.4155), 0.0, 1, 0.387098),
-    "venus": (324858.592, 6051.8, 4.4044e-6, (272.76, 67.16), 200.0, 2, 0.723332),
-    "earth": (GM_EARTH * 1e-9, R_EARTH * 1e-3, 1.08262539e-3, (0.0, 90.0), 100.0, 399, 1.000001),
-    "moon": (
+def _body(
+    name: str,
+    gm: float,
+    radius: float,
+    j2: float,
+    pole: tuple[float, float],
+    atmosphere: float,
+    target: int,
+    orbit_radius: float,
+    series: tuple[int, int],
+    relativity: bool = False,
+) -> Planet:
+    """One entry of the table: GM in km3/s2, lengths in km, pole (ra, dec) in deg, radius of the orbit in au."""
+    return Planet(
+        name,
+        gm * 1e9,
+        radius * 1e3,
+        j2,
+        _direction(*pole),
+        atmosphere * 1e3,
+        target,
+        orbit_radius * AU,
+        series,
+        relativity,
+    )
+
+
+_TABLE = (
+    _body("sun", 132712440041.279419, 695700.0, 2.1961e-7, (286.13, 63.87), 0.0, 10, 0.0, (0, 10), True),
+    _body("mercury", 22031.868551, 2440.53, 5.0322e-5, (281.0103, 61.4155), 0.0, 1, 0.387098, (0, 1)),
+    _body("venus", 324858.592, 6051.8, 4.4044e-6, (272.76, 67.16), 200.0, 2, 0.723332, (0, 2), True),
+    _body(
+        "earth",
+        GM_EARTH * 1e-9,
+        R_EARTH * 1e-3,
+        1.08262539e-3,
+        (0.0, 90.0),
+        100.0,
+        399,
+        1.000001,
+        (0, 3),
+        True,
+    ),
+    _body(
+        "moon",
         4902.800118,
         1737.4,
         2.03215685e-4 * (1738.0 / 1737.4) ** 2,
@@ -114,10 +161,23 @@ _TABLE: dict[str, tuple[float, float, float, tuple[float, float], float, int, fl
         0.0,
         301,
         1.000001,
+        (3, 301),
     ),
-    "mars": (42828.37362, 3396.19, 1.9566e-3, (317.68143, 52.88650), 125.0, 4, 1.523679),
-    "jupiter": (126686531.9, 71492.0, 1.4696572e-2, (268.056595, 64.495303), 450.0, 5, 5.202603),
-    "saturn": (
+    _body("mars", 42828.37362, 3396.19, 1.9566e-3, (317.68143, 52.88650), 125.0, 4, 1.523679, (0, 4)),
+    _body(
+        "jupiter",
+        126686531.9,
+        71492.0,
+        1.4696572e-2,
+        (268.056595, 64.495303),
+        450.0,
+        5,
+        5.202603,
+        (0, 5),
+        True,
+    ),
+    _body(
+        "saturn",
         37931206.234,
         60268.0,
         1.6290573e-2 * (60330.0 / 60268.0) ** 2,
@@ -125,9 +185,12 @@ _TABLE: dict[str, tuple[float, float, float, tuple[float, float], float, int, fl
         0.0,
         6,
         9.554909,
+        (0, 6),
+        True,
     ),
-    "uranus": (5793951.256, 25559.0, 3.51068e-3, (257.311, -15.175), 0.0, 7, 19.218446),
-    "neptune": (
+    _body("uranus", 5793951.256, 25559.0, 3.51068e-3, (257.311, -15.175), 0.0, 7, 19.218446, (0, 7)),
+    _body(
+        "neptune",
         6835099.97,
         24764.0,
         3.40843e-3 * (25225.0 / 24764.0) ** 2,
@@ -135,14 +198,13 @@ _TABLE: dict[str, tuple[float, float, float, tuple[float, float], float, int, fl
         0.0,
         8,
         30.110387,
+        (0, 8),
     ),
-}
+    _body("pluto", 869.6, 1188.3, 0.0, (132.993, -6.163), 0.0, 9, 39.482117, (0, 9)),
+)
 
 #: Every body that :func:`planet` knows, by name.
-PLANETS: dict[str, Planet] = {
-    name: Planet(name, gm * 1e9, r * 1e3, j2, _direction(*pole), h * 1e3, target, au * AU)
-    for name, (gm, r, j2, pole, h, target, au) in _TABLE.items()
-}
+PLANETS: dict[str, Planet] = {body.name: body for body in _TABLE}
 
 
 def planet(name: str | Planet) -> Planet:

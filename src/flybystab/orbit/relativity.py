@@ -18,22 +18,21 @@ from numpy.typing import NDArray
 
 from flybystab.constants import C_LIGHT
 from flybystab.core.numerics.jit import kernel, pasted_kernel
-from flybystab.orbit.almanac import HEAVY
-from flybystab.orbit.ephemeris import BODIES
+from flybystab.orbit.ephemeris import BODIES, N_BODIES
+from flybystab.orbit.planets import PLANETS
 
 Array = NDArray[np.float64]
 
 #: The bodies whose part counts: what the others do moves an asteroid by a metre in four years (median of 19).
-SOURCES = ("sun", *HEAVY)
-IS_SOURCE = np.array([name in SOURCES for name in BODIES])
+IS_SOURCE = np.array([PLANETS[name].relativity for name in BODIES])
 
 
 @kernel
 def among(places: Array, gm: Array, body: int, out: Array) -> float:
-    """Write the acceleration (m/s2) of a body by the other nine into ``out[3]``; their potential there (m2/s2)."""
+    """Write the acceleration (m/s2) of a body by the others into ``out[3]``; their potential there (m2/s2)."""
     potential = 0.0
     out[:] = 0.0
-    for i in range(10):
+    for i in range(N_BODIES):
         if i == body:
             continue
         r2 = 0.0
@@ -115,18 +114,18 @@ def one_pn(
 
     Parameters
     ----------
-    gm, used : ndarray, shape (10,)
+    gm, used : ndarray, shape (bodies,)
         GM (m3/s2) of ``BODIES`` where they act on each other, and on the asteroid (zero: left out).
-    inner : ndarray, shape (10,)
+    inner : ndarray, shape (bodies,)
         Radius below which a source is left out, m.
-    places, rates : ndarray, shape (10, 3)
-        Of the bodies, m and m/s; velocities of ``SOURCES``.
+    places, rates : ndarray, shape (bodies, 3)
+        Of the bodies, m and m/s; velocities of the sources.
     g, potential : ndarray, float
         Newton's field (m/s2) and potential (m2/s2) at ``x``.
     """
     a = np.empty(3)
     total = np.zeros(3)
-    for i in range(10):
+    for i in range(N_BODIES):
         if not IS_SOURCE[i] or used[i] == 0.0:
             continue
         dx, dy, dz = x[0] - places[i, 0], x[1] - places[i, 1], x[2] - places[i, 2]

@@ -16,6 +16,10 @@ from flybystab.constants import C_LIGHT
 from flybystab.core.numerics.jit import borrowed, kernel, pasted_kernel
 from flybystab.orbit import forces as table
 from flybystab.orbit.almanac import (
+    C_BELT,
+    C_FAST,
+    C_HEAVY,
+    C_SLOW,
     GRID,
     HEAVY,
     N_BELT,
@@ -29,11 +33,13 @@ from flybystab.orbit.almanac import (
     find_heavy,
     find_places,
 )
-from flybystab.orbit.ephemeris import BODIES, Window
+from flybystab.orbit.ephemeris import BODIES, SUN, Window
 from flybystab.orbit.forces import core, fade, model, push
 from flybystab.orbit.relativity import of_source
 
 Array = NDArray[np.float64]
+
+_SUN = int(SLOT[SUN])
 
 
 class Field(NamedTuple):
@@ -46,12 +52,12 @@ class Field(NamedTuple):
         GM (m3/s2) in use per slot; zero: left out.
     inner_fast, inner_slow : ndarray
         Square of the radius of the smooth core per slot, m2; ``nothing`` is zeros, for the asteroids.
-    flat : ndarray, shape (n, 6)
-        Bodies with J2: slot (plus 8 on the slow grid), strength ``3/2 J2 GM a^2`` (m5/s2), pole, square of the
+    flat : ndarray, shape (n, 7)
+        Bodies with J2: grid (0 fast, 1 slow), slot, strength ``3/2 J2 GM a^2`` (m5/s2), pole, square of the
         radius of the core (m2).
     gm_pn : float
         GM of the Sun if there is relativity, else zero.
-    heavy : ndarray, shape (2, 4)
+    heavy : ndarray, shape (2, N_HEAVY)
         GM in use of ``HEAVY``, and the square of the radius (m2) inside of which each is left out of relativity.
     head, data, gm : ndarray
         The ephemeris itself, for places to the last digit.
@@ -92,7 +98,7 @@ def field(window: Window, forces: Iterable[str]) -> Field:
     for b in range(len(BODIES)):
         at = table._FLAT + 4 * b
         if flat_model[at] != 0.0:
-            rows.append([float(SLOT[b] + 8 * GRID[b]), *flat_model[at : at + 4], inner[b]])
+            rows.append([float(GRID[b]), float(SLOT[b]), *flat_model[at : at + 4], inner[b]])
     return Field(
         almanac(window, bool(belt.any())),
         grids[0],
@@ -101,8 +107,8 @@ def field(window: Window, forces: Iterable[str]) -> Field:
         inners[0],
         inners[1],
         np.zeros(N_BELT),
-        np.array(rows).reshape(-1, 6),
-        float(window.gm[0]) if flat_model[2] != 0.0 else 0.0,
+        np.array(rows).reshape(-1, 7),
+        float(window.gm[SUN]) if flat_model[2] != 0.0 else 0.0,
         np.array([used[: len(BODIES)], inner])[:, [BODIES.index(name) for name in HEAVY]],
         window.head,
         window.data,
@@ -113,7 +119,7 @@ def field(window: Window, forces: Iterable[str]) -> Field:
 @kernel
 def empty_places() -> Places:
     """Room for the places of all bodies."""
-    return Places(np.zeros(4 * N_FAST), np.zeros(3 * N_SLOW), np.zeros(3 * N_BELT), np.zeros(12 * N_HEAVY))
+    return Places(np.zeros(C_FAST), np.zeros(C_SLOW), np.zeros(C_BELT), np.zeros(C_HEAVY))
 
 
 @kernel
@@ -181,7 +187,7 @@ def _push(law: Array, y: Array, places: Places, out: Array) -> None:
     r = np.empty(3)
     w = np.empty(3)
     for j in range(3):
-        r[j] = y[j] - places.slow[j * N_SLOW]
+        r[j] = y[j] - places.slow[j * N_SLOW + _SUN]
         w[j] = y[3 + j] - places.fast[3 * N_FAST + j]
     push(law, r, w, out[3:])
 
@@ -196,67 +202,66 @@ def rate(field: Field, law: Array, t: float, y: Array, places: Places, out: Arra
     find_places(field.book, t, belt, places)
     fast, slow = places.fast, places.slow
     px, py, pz, vx, vy, vz = y[0], y[1], y[2], y[3], y[4], y[5]
-    ax, ay, az, potential, n = _pull(fast, 4, field.gm_fast, field.inner_fast, px, py, pz)
-    bx, by, bz, other, m = _pull(slow, 8, field.gm_slow, field.inner_slow, px, py, pz)
+    ax, ay, az, potential, n = _pull(fast, N_FAST, field.gm_fast, field.inner_fast, px, py, pz)
+    bx, by, bz, other, m = _pull(slow, N_SLOW, field.gm_slow, field.inner_slow, px, py, pz)
     ax += bx
     ay += by
     az += bz
     potential += other
     gx, gy, gz = ax, ay, az
     if belt:
-        bx, by, bz, _, _ = _pull(places.belt, 16, field.gm_belt, field.nothing, px, py, pz)
+        bx, by, bz, _, _ = _pull(places.belt, N_BELT, field.gm_belt, field.nothing, px, py, pz)
         ax += bx
         ay += by
         az += bz
     for i in range(field.flat.shape[0]):
         row = field.flat[i]
-        s = int(row[0])
-        p, slots = (fast, 4) if s < 4 else (slow, 8)
-        s &= 3 if s < 4 else 7
+        p, slots = (fast, N_FAST) if row[0] == 0.0 else (slow, N_SLOW)
+        s = int(row[1])
         dx = px - p[s]
         dy = py - p[slots + s]
         dz = pz - p[slots + slots + s]
         r2 = dx * dx + dy * dy + dz * dz
-        z = dx * row[2] + dy * row[3] + dz * row[4]
-        c = row[1] / (r2 * r2 * np.sqrt(r2)) * (1.0 if r2 > row[5] else fade(r2 / row[5]))
+        z = dx * row[3] + dy * row[4] + dz * row[5]
+        c = row[2] / (r2 * r2 * np.sqrt(r2)) * (1.0 if r2 > row[6] else fade(r2 / row[6]))
         a = c * (5.0 * z * z / r2 - 1.0)
         b = -2.0 * c * z
-        ax += a * dx + b * row[2]
-        ay += a * dy + b * row[3]
-        az += a * dz + b * row[4]
+        ax += a * dx + b * row[3]
+        ay += a * dy + b * row[4]
+        az += a * dz + b * row[5]
     if field.gm_pn != 0.0:
         find_heavy(field.book, t, places)
         q = places.heavy
         ex, ey, ez = of_source(
             field.gm_pn,
-            px - slow[0],
-            py - slow[8],
-            pz - slow[16],
-            fast[12],
-            fast[13],
-            fast[14],
-            q[40],
-            q[41],
-            q[42],
-            q[43],
+            px - slow[_SUN],
+            py - slow[N_SLOW + _SUN],
+            pz - slow[2 * N_SLOW + _SUN],
+            fast[3 * N_FAST],
+            fast[3 * N_FAST + 1],
+            fast[3 * N_FAST + 2],
+            q[10 * N_HEAVY],
+            q[10 * N_HEAVY + 1],
+            q[10 * N_HEAVY + 2],
+            q[10 * N_HEAVY + 3],
             vx,
             vy,
             vz,
         )
-        for i in range(4):
-            dx, dy, dz = px - q[i], py - q[4 + i], pz - q[8 + i]
+        for i in range(N_HEAVY):
+            dx, dy, dz = px - q[i], py - q[N_HEAVY + i], pz - q[2 * N_HEAVY + i]
             bx, by, bz = of_source(
                 0.0 if dx * dx + dy * dy + dz * dz < field.heavy[1, i] else field.heavy[0, i],
                 dx,
                 dy,
                 dz,
-                q[12 + i],
-                q[16 + i],
-                q[20 + i],
-                q[24 + i],
-                q[28 + i],
-                q[32 + i],
-                q[36 + i],
+                q[3 * N_HEAVY + i],
+                q[4 * N_HEAVY + i],
+                q[5 * N_HEAVY + i],
+                q[6 * N_HEAVY + i],
+                q[7 * N_HEAVY + i],
+                q[8 * N_HEAVY + i],
+                q[9 * N_HEAVY + i],
                 vx,
                 vy,
                 vz,
@@ -271,8 +276,8 @@ def rate(field: Field, law: Array, t: float, y: Array, places: Places, out: Arra
         az += (a * gz + b * vz + ez) / (C_LIGHT * C_LIGHT)
     out[0], out[1], out[2], out[3], out[4], out[5] = vx, vy, vz, ax, ay, az
     if n + m > 0:
-        _pull_inside(fast, 4, field.gm_fast, field.inner_fast, y, out)
-        _pull_inside(slow, 8, field.gm_slow, field.inner_slow, y, out)
+        _pull_inside(fast, N_FAST, field.gm_fast, field.inner_fast, y, out)
+        _pull_inside(slow, N_SLOW, field.gm_slow, field.inner_slow, y, out)
     if law[0] != 0.0 or law[1] != 0.0 or law[2] != 0.0:
         _push(law, y, places, out)
 

@@ -21,8 +21,8 @@ from numpy.typing import NDArray
 
 from flybystab.constants import DAY, YEAR
 from flybystab.core.numerics.threads import in_order
-from flybystab.errors import InvalidInput, NotConverged
-from flybystab.orbit.almanac import GRID, N_FAST, SLOT
+from flybystab.errors import Impact, InvalidInput, NotConverged
+from flybystab.orbit.almanac import GRID, N_FAST, N_SLOW, SLOT
 from flybystab.orbit.ephemeris import BODIES, Ephemeris, Window
 from flybystab.orbit.forces import FORCES
 from flybystab.orbit.orbit import Orbit, _ephemeris, default_forces, later, seconds
@@ -39,6 +39,11 @@ Array = NDArray[np.float64]
 
 _SPEED = u.m / u.s
 
+#: A passage this close to an end of the span counts at `start` and not at `stop`, s: more than its time is uncertain
+#: by, so that of two spans side by side exactly one has it.
+_EDGE = 1.0
+#: How far the search goes beyond the span to see a passage at its end on both sides, s.
+_MARGIN = 60.0
 #: Tolerance over the error (m) that it leaves the median asteroid with after ten years; the error grows with the
 #: square of time (``flybystab bench sky``).
 _AT_10_YEARS, _TOLERANCES = 1e-12 / 100.0, (1e-15, 1e-8)
@@ -72,7 +77,8 @@ def find_encounters(
     objects : Orbit, object with ``orbit`` and ``name``, or an iterable of either
         The asteroids; they do not disturb each other.
     start, stop : Time
-        Span of the search.
+        Span of the search. A passage within 1 s of an end counts at `start` and not at `stop`, so that spans side
+        by side have each passage once.
     planets : sequence of str
         Bodies to look for: planets and ``"moon"``.
     within : Quantity
@@ -114,6 +120,8 @@ def find_encounters(
     ------
     OutOfSpan
         Where an epoch or the span lies outside the ephemeris.
+    Impact
+        A single asteroid hits a body between its epoch and `start`; of several it is listed in ``failed``.
     UnitMismatch, InvalidInput, UnknownName, NotConverged
     """
     rows = _objects(objects)
@@ -142,7 +150,11 @@ def find_encounters(
     t_start, t_stop = seconds(start, middle), seconds(stop, middle)
     epochs = _epochs(rows, middle)
     known = [seconds(neighbour_epoch(orbit), middle) for _, orbit in rows] if growth else []
-    every = [t_start, t_stop, *epochs, *known]
+    first, last = ((jd - middle.tdb.jd1 - middle.tdb.jd2) * DAY for jd in (eph.start_jd, eph.stop_jd))
+    begin, end = t_start - _MARGIN, t_stop + _MARGIN
+    if first <= t_start and t_stop <= last:
+        begin, end = max(begin, first + 1e-3), min(end, last - 1e-3)
+    every = [begin, end, *epochs, *known]
     window = _window(eph, middle.tdb.jd1, middle.tdb.jd2, min(every), max(every))
     chosen = forces
     if chosen is None:
@@ -160,7 +172,7 @@ def find_encounters(
     limits = np.zeros(len(BODIES))
     limits[[BODIES.index(b.name) for b in found]] = reach
     floors = np.array([PLANETS[name].impact_distance for name in BODIES])
-    always = np.zeros(12, dtype=bool)
+    always = np.zeros(N_FAST + N_SLOW, dtype=bool)
     for name in ("sun", *(b.name for b in found)):
         b = BODIES.index(name)
         always[SLOT[b] + N_FAST * GRID[b]] = True
@@ -184,7 +196,7 @@ def find_encounters(
         while i < size:
             out = np.empty((space, WIDTH))
             i, n, status, reached = search(
-                *tables, t_start, t_stop, limits, floors, steps, least, always, shares[part], i, out
+                *tables, begin, end, limits, floors, steps, least, always, shares[part], i, out
             )
             if status in (INSIDE, STALLED, EXHAUSTED):
                 name, orbit = rows[part][i]
@@ -218,6 +230,20 @@ def find_encounters(
             progress(task.stop, len(rows), sum(map(len, flat)))
     raw = np.concatenate(flat) if flat else np.empty((0, WIDTH))
     raw = raw[np.lexsort((raw[:, 1], raw[:, 11]))]
+    # An impact between the epoch of an orbit and the span ends the search of that asteroid.
+    since = np.array([epochs[int(i)] for i in raw[:, 11]])
+    early = (raw[:, 1] < t_start - _EDGE) & (since < t_start)
+    late = (raw[:, 1] >= t_stop - _EDGE) & (since > t_stop)
+    for r in raw[(raw[:, 10] > 0.0) & (early | late)]:
+        i = int(r[11])
+        hit = Impact(
+            f"{rows[i][0]} meets {BODIES[int(r[0])]} at {later(middle, float(r[1])).iso} TDB, between its epoch "
+            f"and the span of the search"
+        )
+        if len(rows) == 1:
+            raise hit
+        failed[i] = {"asteroid": rows[i][0], "why": str(hit)}
+    raw = raw[_in_span(raw, t_start, t_stop)]
     asked = np.isin(raw[:, 0], [BODIES.index(b.name) for b in found])
     elsewhere = [
         {"asteroid": rows[int(r[11])][0], "planet": BODIES[int(r[0])], "time_jd_tdb": later(middle, r[1]).jd}
@@ -252,6 +278,14 @@ def find_encounters(
 
         add_growth(out, beside, laws, window, field_of, tolerances, workers)
     return out
+
+
+def _in_span(raw: Array, t_start: float, t_stop: float) -> NDArray[np.bool_]:
+    """Rows of a sorted result inside the span, each passage once where the epoch of an orbit lies at it."""
+    keep = (raw[:, 1] >= t_start - _EDGE) & (raw[:, 1] < t_stop - _EDGE)
+    same = (np.diff(raw[:, 1]) < _EDGE) & (np.diff(raw[:, 11]) == 0.0) & (np.diff(raw[:, 0]) == 0.0)
+    keep[1:] &= ~same
+    return keep
 
 
 def starts_inside(name: str, epoch: Time, body: Planet) -> InvalidInput:

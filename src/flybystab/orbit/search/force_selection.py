@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from flybystab.constants import C_LIGHT
 from flybystab.core.numerics.jit import kernel
-from flybystab.orbit.almanac import FAST, N_BELT, N_FAST, N_SLOW, SLOW, Almanac, Places, find_places
-from flybystab.orbit.ephemeris import BELT
+from flybystab.orbit.almanac import FAST, N_BELT, N_FAST, N_SLOW, SLOT, SLOW, Almanac, Places, find_places
+from flybystab.orbit.ephemeris import BELT, SUN
 from flybystab.orbit.kepler import two_body
 from flybystab.orbit.search.acceleration import Field
 
@@ -27,11 +27,12 @@ NAMES = (
     "1PN",
 )
 _POINTS = 32
+_SUN = int(SLOT[SUN])
 
 
 @kernel
 def shares_along(field: Field, t0: float, y: Array, t_end: float, places: Places, share: Array) -> None:
-    """Raise ``share[29]`` (m) to the displacement that each force can make from ``t0`` to ``t_end``.
+    """Raise ``share`` (m) to the displacement that each force can make from ``t0`` to ``t_end``.
 
     Parameters
     ----------
@@ -42,15 +43,15 @@ def shares_along(field: Field, t0: float, y: Array, t_end: float, places: Places
         End, s, before or after.
     places : Places
         Room.
-    share : ndarray, shape (29,)
+    share : ndarray, shape (N_SHARES,)
         In the order of ``NAMES``.
     """
-    gm = field.gm[0]
+    gm = field.gm[SUN]
     belt = field.book.when[2, 2] > 0.0
     find_places(field.book, t0, belt, places)
     s = np.empty(6)
     for j in range(3):
-        s[j] = y[j] - places.slow[j * N_SLOW]
+        s[j] = y[j] - places.slow[j * N_SLOW + _SUN]
         s[3 + j] = y[3 + j] - places.fast[3 * N_FAST + j]
     total = np.zeros(N_SHARES)
     x = np.empty(3)
@@ -62,7 +63,7 @@ def shares_along(field: Field, t0: float, y: Array, t_end: float, places: Places
         v2 = 0.0
         r2 = 0.0
         for j in range(3):
-            x[j] = there[j] + places.slow[j * N_SLOW]
+            x[j] = there[j] + places.slow[j * N_SLOW + _SUN]
             r2 += there[j] ** 2
             v2 += there[3 + j] ** 2
         weight = 3.0 * abs(dt * (t_end - t))
@@ -88,7 +89,7 @@ def _square(p: Array, slots: int, i: int, x: Array) -> float:
 
 @kernel
 def reduced(field: Field, share: Array, least: float, always: Array) -> Field:
-    """The field without the forces of a share (m) below ``least``; slots flagged in ``always[12]`` stay."""
+    """The field without the forces of a share (m) below ``least``; slots flagged in ``always`` stay."""
     fast, slow, belt = field.gm_fast.copy(), field.gm_slow.copy(), field.gm_belt.copy()
     for i in range(N_FAST):
         if share[i] < least and not always[i]:

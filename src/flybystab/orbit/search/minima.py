@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 from flybystab.core.numerics.jit import kernel
 from flybystab.orbit.almanac import Places
 from flybystab.orbit.closest_approach import between
-from flybystab.orbit.ephemeris import body_state
+from flybystab.orbit.ephemeris import BODIES, body_state
 from flybystab.orbit.kepler import time_at_distance
+from flybystab.orbit.planets import PLANETS
 from flybystab.orbit.search.acceleration import Field
 from flybystab.orbit.search.dop853 import step
 
@@ -25,9 +26,16 @@ Array = NDArray[np.float64]
 WIDTH = 12
 #: Pieces in which ``r.v`` is sampled; more where the body's pull or the Sun's tide can turn a slow path round.
 _CUTS, FINE = 8, 64
-#: Largest acceleration of each of ``BODIES``, m/s2: GM_sun over the square of its perihelion distance; the Moon's
-#: with the Earth's pull.
-BENDING = np.array([1e-5, 0.0629, 0.0116, 0.0062, 0.0093, 0.0032, 2.5e-4, 8e-5, 2e-5, 7e-6])
+#: Upper bound of the acceleration of each of ``BODIES``, m/s2: GM_sun over the square of the perihelion distance for
+#: an eccentricity of 0.3, and for the Moon the Earth's pull (0.0029); the Sun's is below 1e-5.
+BENDING = np.array(
+    [
+        PLANETS["sun"].gm / (0.7 * PLANETS[name].orbit_radius) ** 2 + (0.003 if name == "moon" else 0.0)
+        if name != "sun"
+        else 1e-5
+        for name in BODIES
+    ]
+)
 
 
 @kernel

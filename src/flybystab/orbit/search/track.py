@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from flybystab.constants import DAY
 from flybystab.core.numerics.jit import kernel
 from flybystab.orbit.almanac import gather
-from flybystab.orbit.ephemeris import body_state
+from flybystab.orbit.ephemeris import N_BODIES, body_state
 from flybystab.orbit.search.acceleration import Field, borrowed_field, empty_places, rate
 from flybystab.orbit.search.dop853 import Room, advance, borrowed_room, empty_room
 from flybystab.orbit.search.force_selection import reduced, shares_along
@@ -43,7 +43,7 @@ def track_encounters(
     out: Array,
     n: int,
 ) -> tuple[int, int, float]:
-    """Encounters of one asteroid from ``t0`` to ``t_end``, s, not counting those before ``t_quiet``.
+    """Encounters of one asteroid from ``t0`` to ``t_end``, s; before ``t_quiet`` only impacts.
 
     Parameters
     ----------
@@ -53,7 +53,7 @@ def track_encounters(
         A1, A2, A3 (m/s2) and their law; zeros for none.
     t0, y0 : float, ndarray
         Start (s) and barycentric state (m, m/s). Time may run backward.
-    limits, floors : ndarray, shape (10,)
+    limits, floors : ndarray, shape (bodies,)
         Of each body: largest distance of an encounter (zero: only impacts count), distance of impact, m.
     tolerance : float
         Error per step, in units of 1.5e11 m and 30 km/s.
@@ -76,7 +76,7 @@ def track_encounters(
     spare, spare_places = borrowed_room(spare_room)
     y = y0.copy()
     new = np.empty(6)
-    old, now = np.empty((10, 3)), np.empty((10, 3))
+    old, now = np.empty((N_BODIES, 3)), np.empty((N_BODIES, 3))
     work = np.empty(6)
     pair = np.empty((2, 10))
     sign = 1.0 if t_end >= t0 else -1.0
@@ -84,7 +84,7 @@ def track_encounters(
     t = t0
     rate(field, law, t, y, places, k[0])
     gather(places, now)
-    for body in range(10):
+    for body in range(N_BODIES):
         if (y[0] - now[body, 0]) ** 2 + (y[1] - now[body, 1]) ** 2 + (y[2] - now[body, 2]) ** 2 < floors[
             body
         ] ** 2:
@@ -100,52 +100,53 @@ def track_encounters(
             return n, STALLED, t
         old[:] = now
         gather(places, now)
-        if (t - t_quiet) * sign >= 0.0:
-            early, late = (0, 1) if sign > 0.0 else (1, 0)
-            pair[early, 0] = t
-            pair[late, 0] = t_new
-            bend0 = 0.0
-            bend1 = 0.0
-            for j in range(6):
-                pair[early, 1 + j] = y[j]
-                pair[late, 1 + j] = new[j]
+        counts = (t - t_quiet) * sign >= 0.0
+        early, late = (0, 1) if sign > 0.0 else (1, 0)
+        pair[early, 0] = t
+        pair[late, 0] = t_new
+        bend0 = 0.0
+        bend1 = 0.0
+        for j in range(6):
+            pair[early, 1 + j] = y[j]
+            pair[late, 1 + j] = new[j]
+        for j in range(3):
+            pair[early, 7 + j] = k[0, 3 + j]
+            pair[late, 7 + j] = k[12, 3 + j]
+            bend0 += k[0, 3 + j] ** 2
+            bend1 += k[12, 3 + j] ** 2
+        bend = 3.0 * np.sqrt(max(bend0, bend1))
+        bulge = 0.125 * (t_new - t) ** 2
+        for body in range(N_BODIES):
+            limit = limits[body] if counts else 0.0
+            reach = max(limit, floors[body])
+            if chord_distance(y, old[body], new, now[body]) > reach + bulge * (bend + BENDING[body]):
+                continue
+            if n + FINE > out.shape[0]:
+                return n, FULL, t
+            d1 = 0.0
             for j in range(3):
-                pair[early, 7 + j] = k[0, 3 + j]
-                pair[late, 7 + j] = k[12, 3 + j]
-                bend0 += k[0, 3 + j] ** 2
-                bend1 += k[12, 3 + j] ** 2
-            bend = 3.0 * np.sqrt(max(bend0, bend1))
-            bulge = 0.125 * (t_new - t) ** 2
-            for body in range(10):
-                reach = max(limits[body], floors[body])
-                if chord_distance(y, old[body], new, now[body]) > reach + bulge * (bend + BENDING[body]):
-                    continue
-                if n + FINE > out.shape[0]:
-                    return n, FULL, t
-                d1 = 0.0
-                for j in range(3):
-                    d1 += (new[j] - now[body, j]) ** 2
-                if d1 < floors[body] ** 2:
-                    body_state(field.head, field.data, field.gm, body, t, work)
-                    for j in range(6):
-                        out[n, 2 + j] = y[j] - work[j]
-                    crash(out[n], body, field.gm[body], t, sign)
-                    return n + 1, 0, t_new
-                n, hit = look(
-                    field,
-                    law,
-                    pair,
-                    k[0] if sign > 0.0 else k[12],
-                    body,
-                    limits[body],
-                    floors[body],
-                    out,
-                    n,
-                    spare,
-                    spare_places,
-                )
-                if hit == hit:
-                    return n, 0, hit
+                d1 += (new[j] - now[body, j]) ** 2
+            if d1 < floors[body] ** 2:
+                body_state(field.head, field.data, field.gm, body, t, work)
+                for j in range(6):
+                    out[n, 2 + j] = y[j] - work[j]
+                crash(out[n], body, field.gm[body], t, sign)
+                return n + 1, 0, t_new
+            n, hit = look(
+                field,
+                law,
+                pair,
+                k[0] if sign > 0.0 else k[12],
+                body,
+                limit,
+                floors[body],
+                out,
+                n,
+                spare,
+                spare_places,
+            )
+            if hit == hit:
+                return n, 0, hit
         t = t_new
         y[:] = new
         k[0] = k[12]
@@ -171,7 +172,7 @@ def search(
 ) -> tuple[int, int, int, float]:
     """Encounters of asteroids ``first``, ``first + 1``, ... until all are done or ``out`` is full.
 
-    ``least`` (m) is the share of a force below which it is left out, ``shares[n, 29]`` takes the estimates.
+    ``least`` (m) is the share of a force below which it is left out; ``shares`` takes the estimates.
     Other arguments as in :func:`track_encounters`, one row per asteroid.
 
     Returns
