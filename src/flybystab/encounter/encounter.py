@@ -38,7 +38,8 @@ class Track(Protocol):
 class Encounter:
     """A close passage by one planet.
 
-    Made by :meth:`hyperbolic` (scripted, frame ``"periapsis"``) or from a real orbit (frame ``"ICRF"``).
+    Made by :meth:`hyperbolic` (scripted, frame ``"periapsis"``), from a real orbit (:meth:`from_orbit`, frame
+    ``"ICRF"``) or from samples (:meth:`from_trajectory`).
     Times are counted from closest approach.
 
     Attributes
@@ -63,7 +64,7 @@ class Encounter:
         First contact with the top of the atmosphere (surface, if there is none), s from closest approach.
     frame : str
         ``"periapsis"``: x from the planet's centre toward periapsis, z along the orbital angular momentum;
-        or ``"ICRF"``. The planet is the origin of both.
+        ``"ICRF"``; or ``"trajectory"``: that of a given trajectory. The planet is the origin of all.
     forces : tuple of str
         What moves the asteroid and what makes its tide.
     left_out : tuple of (str, float)
@@ -264,6 +265,55 @@ class Encounter:
         from flybystab.encounter.hyperbolic import scripted
 
         return scripted(cls, body, q, v, start, wait, j2, axis)
+
+    @classmethod
+    def from_trajectory(
+        cls,
+        times: Time | Quantity,
+        positions: Quantity,
+        velocities: Quantity,
+        planet: str | Planet,
+        *,
+        start_distance: Quantity | None = None,
+        settle: Quantity = SETTLE * u.s,
+        j2: bool = False,
+        pole: tuple[float, float, float] = (0.0, 0.0, 1.0),
+    ) -> Encounter:
+        """Encounter along a trajectory from elsewhere.
+
+        Between the samples the motion is a two-body orbit about the planet plus a cubic spline of the difference from
+        it: exact for two-body motion, else of fourth order in the distance of the samples. The tide is that of the
+        planet alone.
+
+        Parameters
+        ----------
+        times : Time or Quantity, shape (n,)
+            Increasing. With an astropy Time the frame is taken for ICRF (``frame == "ICRF"``); with a duration it is
+            any frame that does not rotate (``frame == "trajectory"``).
+        positions, velocities : Quantity, shape (n, 3)
+            Of the asteroid relative to the centre of the planet. They must include a closest approach; of several
+            the nearest counts.
+        planet : str or Planet
+            The body encountered.
+        start_distance : Quantity, optional
+            Where the encounter starts; as in :meth:`from_orbit`, but never before the first sample. After the last
+            one the two-body orbit goes on.
+        settle, j2, pole
+            As in :meth:`hyperbolic`; `pole` in the frame of the positions.
+
+        Raises
+        ------
+        NoEncounter
+            Without a closest approach between the first and the last sample.
+        UnitMismatch, InvalidInput, UnknownName
+        """
+        body = _planet(planet)
+        wait = to_si(settle, u.s, "settle", low=0.0)
+        start = None if start_distance is None else to_si(start_distance, u.m, "start_distance", low=0.0)
+        axis = _unit_vector(pole)
+        from flybystab.encounter.from_trajectory import sampled, samples
+
+        return sampled(cls, body, *samples(times, positions, velocities), start, wait, j2, axis)
 
     @classmethod
     def from_orbit(

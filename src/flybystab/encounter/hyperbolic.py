@@ -77,7 +77,7 @@ def scripted(
         impact_time=entry,
         frame="periapsis",
         forces=tuple(forces),
-        left_out=_left_out(body, q, j2),
+        left_out=left_out(body, q, j2),
         tide_error=error,
         t_start=-float(half),
         t_stop=float(stop),
@@ -86,7 +86,7 @@ def scripted(
     )
 
 
-def _left_out(body: Planet, q: float, j2: bool) -> tuple[tuple[str, float], ...]:
+def left_out(body: Planet, q: float, j2: bool) -> tuple[tuple[str, float], ...]:
     """What a two-body encounter leaves out, each with its share at periapsis.
 
     J2: at most 6 J2 (a/q)^2 of the tide (over the pole) and 3 J2 (a/q)^2 of the acceleration. A source GM'
