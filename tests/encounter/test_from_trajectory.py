@@ -21,7 +21,9 @@ def resampled(e, times, turn=None):
     """The encounter from its own states at `times`, in a frame that is turned."""
     turn = np.eye(3) if turn is None else turn
     r, v = e.position(times), e.velocity(times)
-    return Encounter.from_trajectory(times + 5 * u.h, r @ turn.T, v @ turn.T, e.planet, start_distance=10 * R_E)
+    return Encounter.from_trajectory(
+        times + 5 * u.h, r @ turn.T, v @ turn.T, e.planet, start_distance=10 * R_E
+    )
 
 
 @pytest.mark.parametrize("n", [7, 40])

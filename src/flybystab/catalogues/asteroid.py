@@ -18,6 +18,7 @@ from flybystab.catalogues.covariance_files import embedded_covariance
 from flybystab.catalogues.record import BODILY, ORBIT, ORBIT_SI, ORBITAL, SHAPE, Record
 from flybystab.catalogues.tumbling import attitude_matrix, ecliptic_direction, free_spin, tumbling_state
 from flybystab.errors import InvalidInput
+from flybystab.units import to_si
 
 if TYPE_CHECKING:
     from flybystab.orbit.covariance import Covariance
@@ -239,7 +240,7 @@ class Asteroid(Record):
         if self.tumbles:
             moments, size, j = self._tumbling
             momentum = moments * free_spin(moments, size, j, np.array([phase]))[0][0]
-        return attitude_matrix(momentum, direction, float(angle.to_value(u.rad)))
+        return attitude_matrix(momentum, direction, to_si(angle, u.rad, "angle"))
 
     @property
     def assumptions(self) -> tuple[str, ...]:
