@@ -17,7 +17,7 @@ from flybystab.body.pile import settled_pile
 from flybystab.core.ellipsoid.rigid_stress import demand, rigid_stress
 from flybystab.core.grains.clumps import moments, semi_axes, spin_of
 from flybystab.core.grains.simulation import Simulation
-from flybystab.core.material.yield_surface import DRUCKER_PRAGER
+from flybystab.core.material.surfaces import code_of
 from flybystab.core.numerics.threads import in_order
 
 Array = NDArray[np.float64]
@@ -51,7 +51,7 @@ def mobilised(sim: Simulation) -> tuple[float, float, Array]:
     stress = np.empty(6)
     s = axes**2
     rigid_stress(s[0], s[1], s[2], float(rho), float(np.pi * rho), spin, np.zeros(6), stress)
-    angle, _ = demand(DRUCKER_PRAGER, 0.0, 0.0, stress)
+    angle, _ = demand(code_of("drucker-prager"), 0.0, 0.0, stress)
     return float(np.rad2deg(angle)), float(spin @ spin / (np.pi * rho)), axes
 
 

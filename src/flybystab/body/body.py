@@ -12,6 +12,7 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.constants import G
+from flybystab.core.material.surfaces import DEFAULT, NAMES
 from flybystab.errors import InvalidInput, UnitMismatch, UnknownName, UnsettledBody
 from flybystab.units import brief, frozen, to_si
 
@@ -19,12 +20,12 @@ if TYPE_CHECKING:
     from flybystab.body.shape import Shape
 
 #: Yield surfaces, in the order of their integer codes in :mod:`flybystab.core.material.yield_surface`.
-YIELD_SURFACES = ("drucker-prager", "drucker-prager-extension", "mohr-coulomb", "matsuoka-nakai")
+YIELD_SURFACES = NAMES
 #: States of a body: one whole body at rest, and those in which an encounter may leave it.
 STATES = ("rigid", "flowing", "dispersed", "fluid", "partly unbound", "on the ground")
 #: The default yield surface: of the four the one that simulations of grains confirm best. The cone through triaxial
 #: compression overestimates the strength of a stretched body.
-DEFAULT_SURFACE = "mohr-coulomb"
+DEFAULT_SURFACE = DEFAULT
 #: Bulk densities of an asteroid, kg/m3: below the lightest comets, above the heaviest metal. What lies beyond is a
 #: slip, mostly of the unit.
 DENSITY_RANGE = (50.0, 25_000.0)

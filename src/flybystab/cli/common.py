@@ -9,11 +9,12 @@ import sys
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from flybystab.core.material.surfaces import DEFAULT, NAMES
 from flybystab.errors import InvalidInput, NothingComputed, WrongUsage
 from flybystab.plots.formats import FIGURES, FILMS
 
-#: Yield surfaces, the default first. Repeated here because importing `Material` would double the time of ``--help``.
-SURFACES = ("mohr-coulomb", "matsuoka-nakai", "drucker-prager", "drucker-prager-extension")
+#: Yield surfaces, the default first.
+SURFACES = (DEFAULT, *(name for name in NAMES if name != DEFAULT))
 
 
 def material_arguments(sub: argparse.ArgumentParser) -> None:

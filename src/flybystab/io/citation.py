@@ -8,6 +8,7 @@ from typing import Any
 
 from astropy.table import QTable
 
+from flybystab.core.material.surfaces import SURFACES
 from flybystab.errors import InvalidInput
 from flybystab.flybys.result import FlybyResult
 from flybystab.io.document import flyby_document, table_document
@@ -29,9 +30,7 @@ ALWAYS = ("Sharma2013", "SharmaJenkinsBurns2006", "Carlson1995", "Astropy2022")
 BY_WORD = {
     "de421": ("Folkner2009",),
     "de440": ("Park2021",),
-    "drucker-prager": ("DruckerPrager1952",),
-    "drucker-prager-extension": ("DruckerPrager1952",),
-    "matsuoka-nakai": ("MatsuokaNakai1974",),
+    **{surface.name: surface.references for surface in SURFACES if surface.references},
     "asteroids.csv": ("JPLSBDB", "WarnerHarrisPravec2009"),
 }
 

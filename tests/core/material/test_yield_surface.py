@@ -5,12 +5,17 @@ import pytest
 
 from flybystab.core.ellipsoid.rigid_stress import demand, invariants, load_interval, overload
 from flybystab.core.material import yield_surface as rheology
+from flybystab.core.material.surfaces import code_of
+
+DRUCKER_PRAGER, EXTENSION_CONE, MOHR_COULOMB, MATSUOKA_NAKAI = map(
+    code_of, ("drucker-prager", "drucker-prager-extension", "mohr-coulomb", "matsuoka-nakai")
+)
 
 CODES = [
-    rheology.DRUCKER_PRAGER,
-    rheology.EXTENSION_CONE,
-    rheology.MOHR_COULOMB,
-    rheology.MATSUOKA_NAKAI,
+    DRUCKER_PRAGER,
+    EXTENSION_CONE,
+    MOHR_COULOMB,
+    MATSUOKA_NAKAI,
 ]
 
 
@@ -29,15 +34,13 @@ def compressive_states(n=200, seed=3):
 
 def test_slope_of_the_compression_cone():
     for phi, k in zip((30, 35, 40, 50), (0.97979590, 1.15805799, 1.33590139, 1.67990630), strict=True):
-        assert rheology.slope(rheology.DRUCKER_PRAGER, np.sin(np.deg2rad(phi)), 0.0) == pytest.approx(
-            k, abs=5e-9
-        )
+        assert rheology.slope(DRUCKER_PRAGER, np.sin(np.deg2rad(phi)), 0.0) == pytest.approx(k, abs=5e-9)
 
 
 def test_mohr_coulomb_friction_is_that_of_the_extreme_principal_stresses():
     for (s1, _, s3), c in compressive_states():
         expected = np.arcsin((s1 - s3) / -(s1 + s3))
-        assert demand(rheology.MOHR_COULOMB, 0.5, 0.0, c)[0] == pytest.approx(expected, rel=1e-10)
+        assert demand(MOHR_COULOMB, 0.5, 0.0, c)[0] == pytest.approx(expected, rel=1e-10)
 
 
 def test_mohr_coulomb_cohesion_is_that_of_the_extreme_principal_stresses():
@@ -47,7 +50,7 @@ def test_mohr_coulomb_cohesion_is_that_of_the_extreme_principal_stresses():
         principal = rng.uniform(-1, 1, 3)
         s1, s3 = principal.max(), principal.min()
         expected = max(0.0, ((s1 - s3) + (s1 + s3) * np.sin(phi)) / (2 * np.cos(phi)))
-        got = demand(rheology.MOHR_COULOMB, phi, 0.0, rotated(principal, rng))[1]
+        got = demand(MOHR_COULOMB, phi, 0.0, rotated(principal, rng))[1]
         assert got == pytest.approx(expected, rel=1e-10, abs=1e-14)
 
 
@@ -56,17 +59,15 @@ def test_matsuoka_nakai_friction_from_the_three_invariants():
         i1, i2, i3 = -principal.sum(), np.prod(principal) * np.sum(1 / principal), -principal.prod()
         eta = i1 * i2 / i3
         expected = np.arctan(np.sqrt((eta - 9) / 8))
-        assert demand(rheology.MATSUOKA_NAKAI, 0.5, 0.0, c)[0] == pytest.approx(expected, rel=1e-9)
+        assert demand(MATSUOKA_NAKAI, 0.5, 0.0, c)[0] == pytest.approx(expected, rel=1e-9)
 
 
 def test_surfaces_meet_mohr_coulomb_at_the_ends_of_the_lode_angle():
     compression, extension = (-2 / 6**1.5, 2 / 6**1.5)  # det of (1,1,-2)/sqrt6 and (2,-1,-1)/sqrt6
     for sin in (0.1, 0.5, 0.8):
-        mc = [rheology.slope(rheology.MOHR_COULOMB, sin, d) for d in (compression, extension)]
-        mn = [rheology.slope(rheology.MATSUOKA_NAKAI, sin, d) for d in (compression, extension)]
-        cones = [
-            rheology.slope(code, sin, 0.0) for code in (rheology.DRUCKER_PRAGER, rheology.EXTENSION_CONE)
-        ]
+        mc = [rheology.slope(MOHR_COULOMB, sin, d) for d in (compression, extension)]
+        mn = [rheology.slope(MATSUOKA_NAKAI, sin, d) for d in (compression, extension)]
+        cones = [rheology.slope(code, sin, 0.0) for code in (DRUCKER_PRAGER, EXTENSION_CONE)]
         assert mc == pytest.approx(cones, rel=1e-7)
         assert mn == pytest.approx(cones, rel=1e-7)
     assert rheology.lode_angle(compression) == pytest.approx(np.pi / 6, abs=1e-7)
@@ -106,9 +107,9 @@ def test_overload_is_convex_in_the_stress(code):
 
 def test_no_friction_bears_tension_and_any_bears_pressure():
     tension = np.array([1.0, 0.5, 0.2, 0.0, 0.0, 0.0])
-    assert demand(rheology.DRUCKER_PRAGER, 0.6, 0.0, tension)[0] == np.inf
+    assert demand(DRUCKER_PRAGER, 0.6, 0.0, tension)[0] == np.inf
     pressure = np.array([-1.0, -1.0, -1.0, 0.0, 0.0, 0.0])
-    assert demand(rheology.DRUCKER_PRAGER, 0.0, 0.0, pressure) == (0.0, 0.0)
+    assert demand(DRUCKER_PRAGER, 0.0, 0.0, pressure) == (0.0, 0.0)
     assert invariants(pressure) == (1.0, 0.0, 0.0)
 
 
@@ -130,7 +131,7 @@ def test_load_interval_agrees_with_a_scan(code):
     assert found > 10
 
 
-LODE = [rheology.MOHR_COULOMB, rheology.MATSUOKA_NAKAI]
+LODE = [MOHR_COULOMB, MATSUOKA_NAKAI]
 SINES = [0.05, 0.4, 0.5736, 0.8]
 
 
@@ -197,10 +198,10 @@ def test_radial_flow_breaks_maximum_dissipation(code):
 def test_stress_and_normal_are_inverse_on_a_smooth_surface(sin):
     for theta in np.linspace(-np.pi / 6, np.pi / 6, 61):
         u = np.diag(unit_deviator(theta))
-        a, b, support = rheology.flow_direction(rheology.MATSUOKA_NAKAI, sin, np.linalg.det(u))
+        a, b, support = rheology.flow_direction(MATSUOKA_NAKAI, sin, np.linalg.det(u))
         d = isotropic(a, b, u)
         assert np.linalg.norm(d) == pytest.approx(1.0, rel=1e-9)
-        a, b, back, g, _ = rheology.normal(rheology.MATSUOKA_NAKAI, sin, np.linalg.det(d))
+        a, b, back, g, _ = rheology.normal(MATSUOKA_NAKAI, sin, np.linalg.det(d))
         np.testing.assert_allclose(isotropic(a, b, d) / g, u, atol=3e-7)
         assert back == pytest.approx(support, rel=1e-9)
 
@@ -210,7 +211,7 @@ def test_every_stress_on_a_face_of_mohr_coulomb_has_the_same_normal(sin):
     """The intermediate principal rate vanishes and tr D = sin(phi) (d1 - d3); both corners share the normal."""
     for theta in np.linspace(-0.5, 0.5, 11):
         u = np.diag(unit_deviator(theta))
-        a, b, support = rheology.flow_direction(rheology.MOHR_COULOMB, sin, np.linalg.det(u))
+        a, b, support = rheology.flow_direction(MOHR_COULOMB, sin, np.linalg.det(u))
         d = isotropic(a, b, u) + sin * support / 3.0 * np.eye(3)
         np.testing.assert_allclose(np.diag(d)[1], 0.0, atol=1e-12)
         assert np.trace(d) == pytest.approx(sin * (d[0, 0] - d[2, 2]), rel=1e-12)

@@ -17,7 +17,7 @@ from flybystab.core.dynamics import regimes, state
 from flybystab.core.dynamics.ground import Ground, no_ground
 from flybystab.core.dynamics.workspace import N_EVENT, N_HISTORY, Counts, workspace
 from flybystab.core.ellipsoid.tide import TidePanels
-from flybystab.core.material.yield_surface import DRUCKER_PRAGER, EXTENSION_CONE, least_slope
+from flybystab.core.material.yield_surface import is_circular, least_slope
 from flybystab.core.numerics.jit import inlined, kernel
 from flybystab.core.numerics.tensors import determinant, multiply, pack, unpack
 
@@ -89,7 +89,7 @@ def parameters(
     par[state.COS_PHI] = np.cos(phi)
     par[state.BETA] = dilatancy * least_slope(surface, np.sin(phi))
     # Associative flow on a slope k(theta) is the true normal; less dilatant flow goes along the stress deviator.
-    if dilatancy >= 1.0 and surface not in (DRUCKER_PRAGER, EXTENSION_CONE):
+    if dilatancy >= 1.0 and not is_circular(surface):
         par[state.NORMAL] = 1.0
         par[state.BETA] = 1.0
     par[state.COHESION] = 5.0 * cohesion / (rho * a0 * a0 * rate2)

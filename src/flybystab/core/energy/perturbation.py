@@ -26,9 +26,8 @@ from flybystab.core.ellipsoid.potential import index_symbols
 from flybystab.core.ellipsoid.rigid_stress import rigid_stress
 from flybystab.core.energy.potential import MASS, energy_along, energy_derivatives, path_frame
 from flybystab.core.material.yield_surface import (
-    DRUCKER_PRAGER,
-    EXTENSION_CONE,
     SQRT6,
+    is_circular,
     least_slope,
     normal,
     slope_over_sine,
@@ -163,7 +162,7 @@ def slope_of_flow(b: Pile, x: Array) -> tuple[float, float]:
     Associative flow: the support function ``m(D') = max over theta of k(theta) shat(theta):D'`` of the yield
     section serves as both (maximum dissipation); otherwise ``k`` at the Lode angle of ``D'`` and a fixed ``beta``.
     """
-    if b.code in (DRUCKER_PRAGER, EXTENSION_CONE):
+    if is_circular(b.code):
         g = slope_over_sine(b.code, b.sin, 0.0)
         return g, (g * b.sin if b.associative else b.beta)
     r = np.sqrt(np.sum(x * x))

@@ -34,7 +34,7 @@ from flybystab.core.energy.perturbation import (
 )
 from flybystab.core.energy.potential import MASS, energy_derivatives
 from flybystab.core.energy.trust_region import curvature_form, least_second_order, trust_region
-from flybystab.core.material.yield_surface import DRUCKER_PRAGER, EXTENSION_CONE
+from flybystab.core.material.yield_surface import is_circular
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import eigensystem
 
@@ -66,15 +66,10 @@ ON_YIELD = 1e-9
 
 
 @kernel
-def _circular(code: int) -> bool:
-    return code in (DRUCKER_PRAGER, EXTENSION_CONE)
-
-
-@kernel
 def first_to_flow(b: Pile, x: Array) -> float:
     """Greatest ``P1/V`` over all directions and the unit direction ``x[5]`` that has it."""
     size = np.sqrt(np.sum(b.stress * b.stress))
-    if _circular(b.code):
+    if is_circular(b.code):
         if size > 0.0:
             x[:] = b.stress / size
         else:
@@ -212,7 +207,7 @@ def classify(
         return
     seeds = np.zeros((3, 5))
     xs = np.empty(5)
-    if _circular(code):
+    if is_circular(code):
         xe = x.copy()
         row[ENERGY_2], row[STRAIN_2], most = least_second_order(b, xe, xs)
         row[SOFTEST] = most / MASS

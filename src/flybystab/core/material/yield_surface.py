@@ -3,16 +3,15 @@
 Stress is positive in tension, ``p = -tr(sigma)/3``, ``s`` the deviator, ``|s|^2 = s:s``. The Lode angle
 ``theta = asin(-3 sqrt6 det(s/|s|))/3`` runs from -30 deg (triaxial extension) to +30 deg (compression).
 
-============  ============================  =============================================================
-code          name                          slope k
-============  ============================  =============================================================
-0             drucker-prager                ``2 sqrt6 sin/(3 - sin)``, meets Mohr-Coulomb in compression
-1             drucker-prager-extension      ``2 sqrt6 sin/(3 + sin)``, meets it in extension
-2             mohr-coulomb                  ``sqrt2 sin/(cos theta - sin theta sin/sqrt3)``
-3             matsuoka-nakai                smallest positive root of
-                                            ``eta d k^3 + (eta-3)/2 k^2 - (eta-9) = 0``, d = det(s/|s|),
-                                            ``eta = I1 I2/I3 = 9 + 8 tan^2``; meets it at both ends
-============  ============================  =============================================================
+The surfaces are the rows of one table, :mod:`flybystab.core.material.surfaces`, and belong to three families:
+
+``CONE``            circular: ``k = 2 sqrt6 sin/(3 - c sin)``, the number ``c`` in the table; ``c = 1`` meets
+                    Mohr-Coulomb in triaxial compression, ``c = -1`` in extension
+``HEXAGON``         Mohr-Coulomb: ``k = sqrt2 sin/(cos theta - sin theta sin/sqrt3)``
+``SMOOTH_HEXAGON``  Matsuoka-Nakai: k is the smallest positive root of ``eta d k^3 + (eta-3)/2 k^2 - (eta-9) = 0``,
+                    ``d = det(s/|s|)``, ``eta = I1 I2/I3 = 9 + 8 tan^2``; meets Mohr-Coulomb at both ends
+
+An unknown code is an error in every kernel.
 
 Associative flow needs the yield section from the side of the rate of strain: the stress deviator whose normal a
 given ``D'`` is (`normal`), and the dilation ``tr D = m(D')`` that goes with it, ``m`` the support function of the
@@ -26,7 +25,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flybystab.core.numerics.jit import kernel
+from flybystab.core.material import surfaces
+from flybystab.core.numerics.jit import code, kernel
 
 Array = NDArray[np.float64]
 
@@ -34,10 +34,26 @@ SQRT2 = np.sqrt(2.0)
 SQRT3 = np.sqrt(3.0)
 SQRT6 = np.sqrt(6.0)
 
-DRUCKER_PRAGER = 0
-EXTENSION_CONE = 1
-MOHR_COULOMB = 2
-MATSUOKA_NAKAI = 3
+CONE = code(surfaces.CONE)
+HEXAGON = code(surfaces.HEXAGON)
+SMOOTH_HEXAGON = code(surfaces.SMOOTH_HEXAGON)
+MOHR_COULOMB = code(surfaces.code_of("mohr-coulomb"))
+_FAMILY = np.array([surface.family for surface in surfaces.SURFACES])
+_CONE = np.array([surface.cone for surface in surfaces.SURFACES])
+
+
+@kernel
+def family(surface: int) -> int:
+    """Family of a surface; an unknown code raises ValueError."""
+    if surface < 0 or surface >= _FAMILY.size:
+        raise ValueError("unknown code of a yield surface")
+    return _FAMILY[surface]
+
+
+@kernel
+def is_circular(surface: int) -> bool:
+    """Whether the slope of a surface does not depend on the Lode angle."""
+    return family(surface) == CONE
 
 
 @kernel
@@ -47,13 +63,12 @@ def lode_angle(det: float) -> float:
 
 
 @kernel
-def slope_over_sine(code: int, sin_phi: float, det: float) -> float:
+def slope_over_sine(surface: int, sin_phi: float, det: float) -> float:
     """``k / sin(phi)`` in the direction of a unit deviator with determinant `det`; finite at ``phi = 0``."""
-    if code == DRUCKER_PRAGER:
-        return 2.0 * SQRT6 / (3.0 - sin_phi)
-    if code == EXTENSION_CONE:
-        return 2.0 * SQRT6 / (3.0 + sin_phi)
-    if code == MOHR_COULOMB:
+    kind = family(surface)
+    if kind == CONE:
+        return 2.0 * SQRT6 / (3.0 - _CONE[surface] * sin_phi)
+    if kind == HEXAGON:
         theta = lode_angle(det)
         return SQRT2 / (np.cos(theta) - np.sin(theta) * sin_phi / SQRT3)
     # x = 1/k solves x^3 - x (eta-3)/(2(eta-9)) - eta det/(eta-9) = 0; with t = tan phi and
@@ -69,20 +84,20 @@ def slope_over_sine(code: int, sin_phi: float, det: float) -> float:
 
 
 @kernel
-def slope(code: int, sin_phi: float, det: float) -> float:
+def slope(surface: int, sin_phi: float, det: float) -> float:
     """Slope ``k(theta)`` of the yield surface in the direction of a unit deviator."""
-    return sin_phi * slope_over_sine(code, sin_phi, det)
+    return sin_phi * slope_over_sine(surface, sin_phi, det)
 
 
 @kernel
-def gauge(code: int, sin_phi: float, theta: float) -> tuple[float, float, float]:
+def gauge(surface: int, sin_phi: float, theta: float) -> tuple[float, float, float]:
     """``gamma = sin(phi)/k``, ``gamma'`` and ``gamma + gamma''`` at a Lode angle, rad."""
-    if code == MOHR_COULOMB:
+    if family(surface) == HEXAGON:
         t = sin_phi / SQRT3
         c, s = np.cos(theta), np.sin(theta)
         return (c - s * t) / SQRT2, -(s + c * t) / SQRT2, 0.0
-    if code != MATSUOKA_NAKAI:
-        g = 1.0 / slope_over_sine(code, sin_phi, 0.0)
+    if family(surface) != SMOOTH_HEXAGON:
+        g = 1.0 / slope_over_sine(surface, sin_phi, 0.0)
         return g, 0.0, g
     # gamma = size cos(psi/3) with cos psi = -b sin(3 theta), see `slope_over_sine`
     cos2 = 1.0 - sin_phi * sin_phi
@@ -150,7 +165,7 @@ def onto_face(sin_phi: float, det: float) -> tuple[float, float, float]:
 
 
 @kernel
-def normal(code: int, sin_phi: float, det: float) -> tuple[float, float, float, float, float]:
+def normal(surface: int, sin_phi: float, det: float) -> tuple[float, float, float, float, float]:
     """Stress on the yield section whose outward normal is a unit deviator ``u`` of determinant `det`.
 
     Returns ``a, b``: the stress deviator over ``p sin(phi) + Y cos(phi)`` is ``a u + b (u^2 - 1/3)``; the support
@@ -162,10 +177,10 @@ def normal(code: int, sin_phi: float, det: float) -> tuple[float, float, float, 
     that is normal to a face, ``theta = -atan(sin(phi)/sqrt3)``, the support is right and the stress is one end
     of the face.
     """
-    if code == MOHR_COULOMB:
+    if family(surface) == HEXAGON:
         return corner(sin_phi, det, beyond_face(sin_phi, det) <= 0.0)
-    if code != MATSUOKA_NAKAI:
-        g = slope_over_sine(code, sin_phi, det)
+    if family(surface) != SMOOTH_HEXAGON:
+        g = slope_over_sine(surface, sin_phi, det)
         return g, 0.0, g, g, det
     s3 = min(1.0 - 5e-13, max(5e-13 - 1.0, -3.0 * SQRT6 * det))
     c3 = np.sqrt(1.0 - s3 * s3)
@@ -173,7 +188,7 @@ def normal(code: int, sin_phi: float, det: float) -> tuple[float, float, float, 
     low, high = -np.pi / 6.0, np.pi / 6.0
     theta = flow
     for _ in range(60):
-        value, first, bend = gauge(code, sin_phi, theta)
+        value, first, bend = gauge(surface, sin_phi, theta)
         y = flow - theta
         f = first * np.cos(y) - value * np.sin(y)
         if f > 0.0:
@@ -189,13 +204,13 @@ def normal(code: int, sin_phi: float, det: float) -> tuple[float, float, float, 
         if new == theta:
             break
         theta = new
-    g = 1.0 / gauge(code, sin_phi, theta)[0]
+    g = 1.0 / gauge(surface, sin_phi, theta)[0]
     a, b = _turned(flow, s3, c3, theta - flow)
     return a * g, b * g, np.cos(theta - flow) * g, g, -np.sin(3.0 * theta) / (3.0 * SQRT6)
 
 
 @kernel
-def flow_direction(code: int, sin_phi: float, det: float) -> tuple[float, float, float]:
+def flow_direction(surface: int, sin_phi: float, det: float) -> tuple[float, float, float]:
     """Normal of the yield section at a stress whose unit deviator ``u`` has determinant `det`.
 
     Returns ``a, b, m/sin(phi)``: the unit normal is ``a u + b (u^2 - 1/3)``, ``m`` the support. At a corner the
@@ -204,7 +219,7 @@ def flow_direction(code: int, sin_phi: float, det: float) -> tuple[float, float,
     s3 = min(1.0, max(-1.0, -3.0 * SQRT6 * det))
     c3 = np.sqrt(1.0 - s3 * s3)
     theta = np.arcsin(s3) / 3.0
-    value, first, _ = gauge(code, sin_phi, theta)
+    value, first, _ = gauge(surface, sin_phi, theta)
     if c3 < 1e-9 or first == 0.0:
         return 1.0, 0.0, 1.0 / value
     angle = np.arctan(first / value)
@@ -213,22 +228,23 @@ def flow_direction(code: int, sin_phi: float, det: float) -> tuple[float, float,
 
 
 @kernel
-def least_slope(code: int, sin_phi: float) -> float:
+def least_slope(surface: int, sin_phi: float) -> float:
     """Smallest ``k`` over the Lode angle: the largest dilatancy that creates no energy."""
-    if code == DRUCKER_PRAGER:
-        return 2.0 * SQRT6 * sin_phi / (3.0 - sin_phi)
-    if code == MOHR_COULOMB:  # at tan(theta) = -sin(phi)/sqrt3
+    kind = family(surface)
+    if kind == CONE:
+        return 2.0 * SQRT6 * sin_phi / (3.0 - _CONE[surface] * sin_phi)
+    if kind == HEXAGON:  # at tan(theta) = -sin(phi)/sqrt3
         return SQRT2 * sin_phi / np.sqrt(1.0 + sin_phi * sin_phi / 3.0)
     return 2.0 * SQRT6 * sin_phi / (3.0 + sin_phi)
 
 
 @kernel
-def required_friction(code: int, cohesion: float, s: float, p: float, det: float) -> float:
+def required_friction(surface: int, cohesion: float, s: float, p: float, det: float) -> float:
     """Mobilised friction angle, rad: the least ``phi`` that bears a stress; inf where none does.
 
     Parameters
     ----------
-    code : int
+    surface : int
         Yield surface.
     cohesion : float
         Mohr-Coulomb cohesion ``Y``, in the unit of `s` and `p`.
@@ -244,7 +260,7 @@ def required_friction(code: int, cohesion: float, s: float, p: float, det: float
     """
     if s == 0.0:
         return 0.0 if p + cohesion >= 0.0 else np.inf
-    if code == MATSUOKA_NAKAI:
+    if family(surface) == SMOOTH_HEXAGON:
         if cohesion == 0.0:
             if p <= 0.0:
                 return np.inf
@@ -256,11 +272,11 @@ def required_friction(code: int, cohesion: float, s: float, p: float, det: float
             tan2 = (9.0 - 1.5 * k * k - 9.0 * i3) / (8.0 * i3)
             return np.arctan(np.sqrt(max(0.0, tan2)))
         # Cohesion counts for less as phi grows, so that a stress may be borne on an interval of phi only.
-        if _bears(code, 0.0, cohesion, s, p, det):
+        if _bears(surface, 0.0, cohesion, s, p, det):
             return 0.0
         step = 0.5 * np.pi * (1.0 - 1e-4) / 128.0  # tan^2 must stay finite
         n = 1
-        while n <= 128 and not _bears(code, n * step, cohesion, s, p, det):
+        while n <= 128 and not _bears(surface, n * step, cohesion, s, p, det):
             n += 1
         if n > 128:
             return np.inf
@@ -270,19 +286,18 @@ def required_friction(code: int, cohesion: float, s: float, p: float, det: float
             mid = 0.5 * (low + high)
             if mid in (low, high):
                 break
-            if _bears(code, mid, cohesion, s, p, det):
+            if _bears(surface, mid, cohesion, s, p, det):
                 high = mid
             else:
                 low = mid
         return high
-    if code == MOHR_COULOMB:
+    if family(surface) == HEXAGON:
         theta = lode_angle(det)
         a = SQRT2 * p + s * np.sin(theta) / SQRT3
         b = SQRT2 * cohesion
         c = s * np.cos(theta)
     else:
-        sign = 1.0 if code == DRUCKER_PRAGER else -1.0
-        a = 2.0 * SQRT6 * p + sign * s
+        a = 2.0 * SQRT6 * p + _CONE[surface] * s
         b = 2.0 * SQRT6 * cohesion
         c = 3.0 * s
     if c <= b:
@@ -296,22 +311,22 @@ def required_friction(code: int, cohesion: float, s: float, p: float, det: float
 
 
 @kernel
-def required_frictions(code: int, cohesion: float, s: Array, p: Array, det: Array) -> Array:
+def required_frictions(surface: int, cohesion: float, s: Array, p: Array, det: Array) -> Array:
     """`required_friction` of each of a row of stresses."""
     out = np.empty(len(s))
     for i in range(len(s)):
-        out[i] = required_friction(code, cohesion, s[i], p[i], det[i])
+        out[i] = required_friction(surface, cohesion, s[i], p[i], det[i])
     return out
 
 
 @kernel
-def _bears(code: int, phi: float, cohesion: float, s: float, p: float, det: float) -> bool:
-    g = slope_over_sine(code, np.sin(phi), det)
+def _bears(surface: int, phi: float, cohesion: float, s: float, p: float, det: float) -> bool:
+    g = slope_over_sine(surface, np.sin(phi), det)
     return s <= g * (p * np.sin(phi) + cohesion * np.cos(phi))
 
 
 @kernel
-def required_cohesion(code: int, phi: float, s: float, p: float, det: float) -> float:
+def required_cohesion(surface: int, phi: float, s: float, p: float, det: float) -> float:
     """Least cohesion ``Y = tan(phi) max(0, |s|/k - p)`` that bears a stress, in the unit of `s` and `p`."""
-    g = slope_over_sine(code, np.sin(phi), det)
+    g = slope_over_sine(surface, np.sin(phi), det)
     return max(0.0, (s / g - p * np.sin(phi)) / np.cos(phi))
