@@ -54,7 +54,7 @@ def test_a_row_is_enough_for_a_new_cone(tmp_path):
         from flybystab.cli.common import SURFACES
         from flybystab.io.citation import cite
         assert "middle-cone" in SURFACES
-        sphere = fs.Body([500, 500, 500] * u.m, 2 * u.g / u.cm**3, spin_period=3 * u.h)
+        sphere = fs.Body([500, 500, 500] * u.m, 2 * u.g / u.cm**3, spin_period=4 * u.h)
         made = [sphere.with_(material=fs.Material(yield_surface=s, friction_angle=30 * u.deg))
                 for s in ("drucker-prager", "middle-cone", "drucker-prager-extension")]
         angles = [fs.equilibrium(b).required_friction_angle.value for b in made]
