@@ -21,7 +21,7 @@ from flybystab.orbit.ephemeris import ephemeris
 from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.search.encounter_finder import find_encounters
 
-SHARED = Path(os.environ.get("FLYBYSTAB_SHARED", Path(__file__).resolve().parents[4] / "../shared")) / "data"
+SHARED = Path(os.environ.get("FLYBYSTAB_SHARED", Path(__file__).resolve().parents[3] / "../shared")) / "data"
 ORBITS, APPROACHES = "nea_sbdb_fullprec_2020-09.csv.gz", "cad_earth_2020_jan_jun.csv.gz"
 SPAN = Time(2458840.5, format="jd", scale="tdb"), Time(2459040.5, format="jd", scale="tdb")
 COMETS = ("CometA", "COM", "ETc", "HTC", "JFc", "JFC", "HYP", "PAR")

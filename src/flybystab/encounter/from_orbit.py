@@ -28,7 +28,7 @@ from flybystab.orbit.ephemeris import BODIES, Ephemeris, Window
 from flybystab.orbit.forces import FORCES, model, shares
 from flybystab.orbit.ias15 import EPSILON, TIGHT, Flight
 from flybystab.orbit.kepler import time_at_distance
-from flybystab.orbit.orbit import Orbit, _ephemeris, later, seconds
+from flybystab.orbit.orbit import Orbit, _ephemeris, later, seconds, without_itself
 from flybystab.orbit.planets import Planet
 from flybystab.orbit.predictability import (
     Neighbour,
@@ -131,7 +131,8 @@ def followed(
     away = orbit.barycentric(window) - window.states(index, np.array([epoch]))[0]
     if np.linalg.norm(away[:3]) < body.impact_distance:
         raise starts_inside(orbit.name, orbit.epoch, body)
-    everything = tuple(n for n in FORCES if n != "non-gravitational" or any(orbit.nongrav.a))
+    acting = (n for n in FORCES if n != "non-gravitational" or any(orbit.nongrav.a))
+    everything = without_itself(acting, orbit, window)
     first = _passage(orbit, window, index, forces or everything, reach, EPSILON)
     if first is not None:
         _check_way(orbit, body, window, first, epoch)

@@ -76,12 +76,15 @@ class Source:
         GM of each body in the header of the ephemeris, km3/s2; that of the table of planets for others.
     extra : str
         The extra of flybystab that installs the package.
+    kuiper_belt : bool
+        Whether masses of the Kuiper belt are in its barycentre, as from DE430 on; they move it by 115 km.
     """
 
     package: str
     file: str
     gm: dict[str, float]
     extra: str = ""
+    kuiper_belt: bool = True
 
     @property
     def path(self) -> Path | None:
@@ -131,6 +134,7 @@ EPHEMERIDES: dict[str, Source] = {
             "neptune": 6836535.0,
             "pluto": 977.0,
         },
+        kuiper_belt=False,
     ),
 }
 #: The one that comes with the package.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +18,7 @@ from flybystab.errors import Impact, InaccurateOrbit, InvalidInput, UnknownName
 from flybystab.orbit.closest_approach import first_contact
 from flybystab.orbit.covariance import Covariance
 from flybystab.orbit.elements import GM_SUN, ecliptic_to_icrf, state_from_elements
-from flybystab.orbit.ephemeris import BODIES, Ephemeris, Window, ephemeris
+from flybystab.orbit.ephemeris import BELT, BODIES, EPHEMERIDES, N_BODIES, Ephemeris, Window, ephemeris
 from flybystab.orbit.forces import FORCES, NonGravitational, model
 from flybystab.orbit.ias15 import EPSILON, TIGHT, Flight
 from flybystab.orbit.planets import PLANETS
@@ -34,6 +34,8 @@ _SPEED = u.m / u.s
 _ZERO = 0.0 * _AU_D2
 #: Difference of two integrations that is worth a warning, m.
 _LARGE_ERROR = 1e3
+#: Closer and slower than this at its epoch an orbit is that of a massive asteroid itself, m and m/s.
+TWIN_DISTANCE, TWIN_SPEED = 1e8, 100.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -184,6 +186,7 @@ class Orbit:
         """State at the epoch relative to the barycentre of the solar system, shape (6,), m and m/s."""
         state = np.concatenate([self.position.to_value(u.m), self.velocity.to_value(u.m / u.s)])
         if self.centre == "ssb":
+            check_barycentre(window)
             return state
         return (
             state + window.states(BODIES.index(self.centre), np.array([seconds(self.epoch, window.epoch)]))[0]
@@ -193,7 +196,7 @@ class Orbit:
         self, window: Window, forces: tuple[str, ...] | None = None, epsilon: float = EPSILON
     ) -> Flight:
         """The asteroid in rebound at the epoch of the orbit; times are seconds from ``window.epoch``."""
-        chosen = forces if forces is not None else default_forces(self, *BODIES)
+        chosen = forces if forces is not None else without_itself(default_forces(self, *BODIES), self, window)
         return Flight(
             model(window, chosen, self.nongrav),
             seconds(self.epoch, window.epoch),
@@ -403,6 +406,42 @@ def default_forces(orbit: Orbit, *bodies: str) -> tuple[str, ...]:
         or name in flat
         or (name == "non-gravitational" and any(orbit.nongrav.a))
     )
+
+
+def check_barycentre(window: Window) -> None:
+    """Warn that a barycentric state is read with an ephemeris whose barycentre differs from that of DE430 to DE441."""
+    source = EPHEMERIDES.get(window.name)
+    if source is not None and not source.kuiper_belt:
+        warnings.warn(
+            f"a barycentric state with {window.name.upper()}, whose barycentre is 115 km from that of DE430 to DE441 "
+            "(Horizons, ASSIST): take DE440, or give the state relative to the Sun",
+            InaccurateOrbit,
+            stacklevel=3,
+        )
+
+
+def massive_twin(window: Window, epoch: float, state: Array) -> str | None:
+    """The massive asteroid that an orbit is itself the orbit of, or None.
+
+    The table of the massive asteroids is good to 60,000 km: what starts within 100,000 km of one of them, at less than
+    100 m/s, is taken for it. A passage as slow as that does not happen in the main belt.
+
+    Parameters
+    ----------
+    epoch, state : float, ndarray
+        Time (s from the epoch of the window) and barycentric state (m, m/s).
+    """
+    for i, name in enumerate(BELT, N_BODIES):
+        away = state - window.states(i, np.array([epoch]))[0]
+        if np.linalg.norm(away[:3]) < TWIN_DISTANCE and np.linalg.norm(away[3:]) < TWIN_SPEED:
+            return name
+    return None
+
+
+def without_itself(forces: Iterable[str], orbit: Orbit, window: Window) -> tuple[str, ...]:
+    """The forces without the pull of the massive asteroid that the orbit belongs to."""
+    twin = massive_twin(window, seconds(orbit.epoch, window.epoch), orbit.barycentric(window))
+    return tuple(name for name in forces if name != f"{twin} point mass")
 
 
 def seconds(time: Time, origin: Time) -> float:

@@ -19,7 +19,7 @@ from flybystab.errors import InvalidInput
 from flybystab.orbit.ephemeris import BODIES, SUN, Ephemeris, Window, ephemeris
 from flybystab.orbit.forces import model
 from flybystab.orbit.ias15 import TIGHT, Flight
-from flybystab.orbit.orbit import Orbit, default_forces
+from flybystab.orbit.orbit import Orbit, default_forces, without_itself
 
 Array = NDArray[np.float64]
 
@@ -44,14 +44,14 @@ def ephemeris_file(name: str | Ephemeris | None = None) -> Any:
     return load_file(str((name if isinstance(name, Ephemeris) else ephemeris(name)).path))
 
 
-def _whole_and_fraction(t: Any) -> tuple[Array, Array]:
+def whole_and_fraction(t: Any) -> tuple[Array, Array]:
     """TDB of skyfield times as whole and fractional Julian dates: no digit is lost."""
     return np.atleast_1d(np.asarray(t.whole, dtype=float)), np.atleast_1d(
         np.asarray(t.tdb_fraction, dtype=float)
     )
 
 
-def _shaped(states: Array, t: Any) -> tuple[Array, Array, None, None]:
+def shaped(states: Array, t: Any) -> tuple[Array, Array, None, None]:
     """States (m, m/s), shape (n, 6), as skyfield wants them: au and au/d, shape (3,) or (3, n)."""
     r, v = states[:, :3].T / AU, states[:, 3:].T * (DAY / AU)
     if np.ndim(t.tt) == 0:
@@ -108,7 +108,7 @@ class OrbitVector(VectorFunction):
         """Barycentric states (m, m/s), shape (n, 6), at `t` s (TDB) from the epoch of the orbit."""
         window = self._cover(float(t.min()), float(t.max()))
         out = np.empty((t.size, 6))
-        forces = default_forces(self._orbit, *BODIES)
+        forces = without_itself(default_forces(self._orbit, *BODIES), self._orbit, window)
         flat = model(window, forces, self._orbit.nongrav)
         for side in (-1.0, 1.0):
             which = np.flatnonzero(t * side >= 0.0 if side > 0.0 else t < 0.0)
@@ -123,11 +123,11 @@ class OrbitVector(VectorFunction):
         return out
 
     def _at(self, t: Any) -> tuple[Array, Array, None, None]:
-        whole, fraction = _whole_and_fraction(t)
+        whole, fraction = whole_and_fraction(t)
         zero = self._orbit.epoch.tdb
         seconds = ((whole - zero.jd1) + (fraction - zero.jd2)) * DAY
         states = self.states(seconds)
         if self.center == CENTRES["sun"]:
             assert self._window is not None
             states = states - self._window.states(SUN, seconds)
-        return _shaped(states, t)
+        return shaped(states, t)

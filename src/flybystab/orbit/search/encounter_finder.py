@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterable, Sequence
 from functools import lru_cache
+from itertools import pairwise
 from numbers import Real
 from typing import Any
 
@@ -23,9 +24,18 @@ from flybystab.constants import DAY, YEAR
 from flybystab.core.numerics.threads import in_order
 from flybystab.errors import Impact, InvalidInput, NotConverged
 from flybystab.orbit.almanac import GRID, N_FAST, N_SLOW, SLOT
-from flybystab.orbit.ephemeris import BODIES, Ephemeris, Window
+from flybystab.orbit.ephemeris import BELT, BODIES, N_BODIES, Ephemeris, Window
 from flybystab.orbit.forces import FORCES
-from flybystab.orbit.orbit import Orbit, _ephemeris, default_forces, later, seconds
+from flybystab.orbit.orbit import (
+    TWIN_DISTANCE,
+    TWIN_SPEED,
+    Orbit,
+    _ephemeris,
+    check_barycentre,
+    default_forces,
+    later,
+    seconds,
+)
 from flybystab.orbit.planets import PLANETS, Planet, planet
 from flybystab.orbit.predictability import neighbour, neighbour_epoch
 from flybystab.orbit.search.acceleration import Field, field
@@ -182,6 +192,12 @@ def find_encounters(
             if any(orbit.nongrav.a):
                 laws[i] = *orbit.nongrav.a, *orbit.nongrav.constants
     states = _states(rows, window, epochs)
+    # A massive asteroid does not pull itself: it has forces of its own.
+    twins = {} if forces is not None else _twins(window, epochs, states)
+    own = {
+        i: field(window, [n for n in chosen if n not in ("non-gravitational", f"{name} point mass")])
+        for i, name in twins.items()
+    }
     shares = np.zeros((len(rows), N_SHARES))
     # A tenth: several shares add up, and passages on the way enlarge them.
     least = 0.1 * accuracy if forces is None else 0.0
@@ -189,7 +205,7 @@ def find_encounters(
     failed: dict[int, dict[str, str]] = {}
 
     def run(part: slice) -> list[Array]:
-        tables = everything, laws[part], epochs[part], states[part]
+        tables = own.get(part.start, everything), laws[part], epochs[part], states[part]
         steps = tolerances[part]
         size = len(tables[2])
         i, space, parts = 0, 64 * size + 256, []
@@ -222,7 +238,8 @@ def find_encounters(
     workers = threads or os.cpu_count() or 1
     # Parts small enough that threads end together, large enough that Python does not count.
     size = max(1, min(64, -(-len(rows) // (4 * workers)))) if workers > 1 else max(len(rows), 1)
-    tasks = [slice(i, min(i + size, len(rows))) for i in range(0, len(rows), size)]
+    cuts = sorted({*range(0, len(rows), size), *twins, *(i + 1 for i in twins), len(rows)})
+    tasks = [slice(i, j) for i, j in pairwise(cuts)]
     flat: list[Array] = []
     for task, parts in zip(tasks, in_order(run, tasks, workers), strict=True):
         flat += parts
@@ -274,7 +291,7 @@ def find_encounters(
             beside[i] = neighbour(rows[i][1], later(middle, farthest), eph)
 
         def field_of(i: int) -> Field:
-            return reduced(everything, shares[i], least, always)
+            return reduced(own.get(i, everything), shares[i], least, always)
 
         add_growth(out, beside, laws, window, field_of, tolerances, workers)
     return out
@@ -313,9 +330,23 @@ def _states(rows: list[tuple[str, Orbit]], window: Window, epochs: Array) -> Arr
     for i, (_, orbit) in enumerate(rows):
         out[i, :3] = orbit.position.to_value(u.m)
         out[i, 3:] = orbit.velocity.to_value(_SPEED)
+    if "ssb" in centres:
+        check_barycentre(window)
     for centre in set(centres) - {"ssb"}:
         where = centres == centre
         out[where] += window.states(BODIES.index(centre), epochs[where])
+    return out
+
+
+def _twins(window: Window, epochs: Array, states: Array) -> dict[int, str]:
+    """Numbers and names of the orbits that are those of massive asteroids."""
+    out = {}
+    for k, name in enumerate(BELT, N_BODIES):
+        away = states - window.states(k, epochs)
+        near = (np.linalg.norm(away[:, :3], axis=1) < TWIN_DISTANCE) & (
+            np.linalg.norm(away[:, 3:], axis=1) < TWIN_SPEED
+        )
+        out.update(dict.fromkeys(np.flatnonzero(near).tolist(), name))
     return out
 
 
