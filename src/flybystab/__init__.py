@@ -11,6 +11,7 @@ Names are loaded when they are first used, so that importing the package costs n
 
 from __future__ import annotations
 
+import sys
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
@@ -81,6 +82,8 @@ def __getattr__(name: str) -> Any:
     if name not in _HOME:
         raise AttributeError(f"module 'flybystab' has no attribute {name!r}")
     value = getattr(import_module(f"flybystab.{_HOME[name]}"), name)
+    if "numba" in sys.modules:
+        import_module("flybystab.core.numerics.compile_notice").install()
     globals()[name] = value
     return value
 

@@ -432,7 +432,7 @@ def test_numba_tells_what_it_compiles():
         assert twice(3) + twice(4) == 14
         assert (
             stream.getvalue()
-            == "flybystab: compiling its kernels, once on this machine (about a minute) ...\n"
+            == "flybystab: compiling numerical kernels, once on this machine (about a minute) ...\n"
         )
 
 

@@ -29,7 +29,7 @@ def axes(projection=None):
     [
         (lambda a, r: plotting.distance_plot(a, r.history, r.encounter), "(km)"),
         (lambda a, r: plotting.friction_plot(a, r.history, 35 * u.deg), "(deg)"),
-        (lambda a, r: plotting.spin_plot(a, r.history), "(turns/day)"),
+        (lambda a, r: plotting.spin_plot(a, r.history), "(rev/day)"),
         (lambda a, r: plotting.axes_plot(a, r.history), "(m)"),
     ],
 )

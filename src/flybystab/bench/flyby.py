@@ -26,6 +26,7 @@ from flybystab.core.dynamics.verdict_row import N_ANSWER
 from flybystab.core.ellipsoid.tide import TidePanels, tensor
 from flybystab.encounter.encounter import Encounter
 from flybystab.flybys.batch import MAX_STEPS, buffers, judge_rows, one_row
+from flybystab.plots.style import save
 from flybystab.units import R_earth
 
 PHI = np.deg2rad(35.0)
@@ -205,4 +206,4 @@ def _plot(rows: list[dict[str, Any]], path: str | Path) -> None:
         xlabel="processor time (ms)", ylabel="relative error of the semi-axes", title="Flyby P1, with flow"
     )
     panel.legend(frameon=False)
-    figure.savefig(path, dpi=150)
+    save(figure, path)

@@ -17,6 +17,7 @@ from astropy.time import Time
 from flybystab.body.body import Material
 from flybystab.catalogues.asteroid import Asteroid
 from flybystab.encounter.encounter import Encounter
+from flybystab.plots.style import save
 from flybystab.screening.draws import Attitudes, draws
 from flybystab.screening.encounters import Passage
 from flybystab.screening.sample_verdicts import Judged, judge
@@ -100,4 +101,4 @@ def _plot(rows: list[dict[str, Any]], path: str | Path) -> None:
         panel.loglog(*zip(*points, strict=True), marker=marker, label=f"{distance:g} Earth radii")
     panel.set(xlabel="time per sample (ms)", ylabel="largest error of the margin (deg)", title="Screening")
     panel.legend(frameon=False)
-    figure.savefig(path, dpi=150)
+    save(figure, path)

@@ -27,6 +27,7 @@ from flybystab.orbit.ephemeris import ephemeris
 from flybystab.orbit.forces import FORCES
 from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.search.encounter_finder import find_encounters
+from flybystab.plots.style import save
 
 Array = NDArray[np.float64]
 
@@ -254,4 +255,4 @@ def _plot(rows: list[dict[str, Any]], path: str | Path) -> None:
     panel.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))
     panel.xaxis.set_minor_formatter(NullFormatter())
     panel.legend(frameon=False)
-    figure.savefig(path, dpi=150)
+    save(figure, path)

@@ -1,4 +1,4 @@
-"""A word while kernels are compiled: the first run on a machine is otherwise silent for a minute."""
+"""Compilation notice of shell commands."""
 
 from __future__ import annotations
 
@@ -9,40 +9,21 @@ from typing import TextIO
 
 from numba.core import event
 
-WORDS = "flybystab: compiling its kernels, once on this machine (about a minute) ...\n"
+from flybystab.core.numerics.compile_notice import WORDS, Announcement
 
-
-class Announcement(event.Listener):
-    """Says on a stream, once, that kernels are compiled, at the first one; kernels from the cache do not count."""
-
-    def __init__(self, stream: TextIO) -> None:
-        self.stream = stream
-        self.said = False
-
-    def say(self) -> None:
-        """Say it, unless it has been said."""
-        if not self.said:
-            self.said = True
-            self.stream.write(WORDS)
-            self.stream.flush()
-
-    def on_start(self, event: event.Event) -> None:
-        """Numba begins to compile a function."""
-        self.say()
-
-    def on_end(self, event: event.Event) -> None:
-        """Numba has compiled a function."""
+__all__ = ["WORDS", "Announcement", "announced"]
 
 
 @contextmanager
 def announced(stream: TextIO, *, elsewhere: bool = False) -> Iterator[None]:
-    """Announce compilations on a stream, a terminal or a log, until the end of the block.
+    """Write the notice to a stream if kernels are compiled within the block.
 
     Parameters
     ----------
     stream : text file
     elsewhere : bool
-        Whether other processes compute: their kernels are announced at once, if the cache has none of a screening's.
+        Whether other processes compute: the notice is then written at once unless the cache holds a kernel of a
+        screening.
     """
     listener = Announcement(stream)
     if elsewhere and not _cached():
@@ -55,7 +36,7 @@ def announced(stream: TextIO, *, elsewhere: bool = False) -> Iterator[None]:
 
 
 def _cached() -> bool:
-    """Whether a screening has run here: its first kernel is in the cache, or cannot be."""
+    """Whether the cache holds the first kernel of a screening, or there is no cache."""
     from flybystab.core.ellipsoid.yield_bound import quick_margins
 
     folder = quick_margins.stats.cache_path

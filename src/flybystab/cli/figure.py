@@ -43,6 +43,7 @@ def run(options: argparse.Namespace) -> None:
         regions_figure,
         spin_figure,
     )
+    from flybystab.plots.style import save
 
     output = options.output or f"{options.what}.png"
     check_picture(output)
@@ -57,7 +58,7 @@ def run(options: argparse.Namespace) -> None:
     else:
         make = regions_figure if options.what == "regions" else spin_figure
         figure = make(catalogue_bodies(), material.yield_surface)
-    figure.savefig(output, dpi=130)
+    save(figure, output)
     show(
         options,
         lambda: {"flybystab": __version__, "figure": options.what, "file": output},

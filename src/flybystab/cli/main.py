@@ -45,6 +45,10 @@ def main(argv: Sequence[str] | None = None) -> int:
     warnings.filterwarnings("ignore", message=".*dubious year.*")
     try:
         check_arguments(options)
+        if (
+            "flybystab.core.numerics.compile_notice" in sys.modules
+        ):  # the notice of Python would be a second one
+            sys.modules["flybystab.core.numerics.compile_notice"].uninstall()
         if options.json or options.command in ("cite", "completion"):
             COMMANDS[options.command].run(options)
         else:

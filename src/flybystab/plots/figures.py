@@ -1,4 +1,4 @@
-"""The figures of equilibrium and stability that people of the field know, one function each."""
+"""Figures of equilibrium and stability, one function each."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from flybystab.plots.stability import (
 #: Spins of the panels of :func:`regions_figure`, omega^2/(pi G rho).
 SPINS = (0.0, 0.2, 0.4, 0.8)
 
-#: Asteroids with their names on a figure.
+#: Asteroids that are labelled.
 KNOWN = (
     "Apophis",
     "Eros",
@@ -46,7 +46,7 @@ def catalogue_bodies() -> dict[str, Body]:
 
 
 def regions_figure(bodies: Mapping[str, Body], surface: str = DEFAULT_SURFACE, cells: int = 200) -> Figure:
-    """Shapes that stand, by friction angle, at four spins; each body on the panel of the spin nearest to its own."""
+    """Required friction angle of shapes at four spins; each body is on the panel of the spin nearest to its own."""
     figure = Figure(figsize=(9.0, 8.6), layout="constrained")
     w2 = {name: float(b.omega @ b.omega) * b.dynamical_time**2 for name, b in bodies.items()}
     for axes, spin in zip(figure.subplots(2, 2).flat, SPINS, strict=True):
@@ -69,7 +69,7 @@ def spin_figure(bodies: Mapping[str, Body], surface: str = DEFAULT_SURFACE) -> F
 
 
 def barrier_figure(body: Body) -> Figure:
-    """Energy that a push loses against its strain, without dilatancy and with associative flow."""
+    """Energy lost by a perturbation against its strain, for volume-preserving and for associative flow."""
     figure = Figure(figsize=(9.6, 4.2), layout="constrained")
     for axes, dilatancy, name in zip(
         figure.subplots(1, 2), (0.0, 1.0), ("volume-preserving flow", "associative flow"), strict=True
@@ -80,7 +80,7 @@ def barrier_figure(body: Body) -> Figure:
 
 
 def failure_figure(surface: str = DEFAULT_SURFACE) -> Figure:
-    """Static failure distance from the Earth against the friction angle: bodies with their own spin, and satellites."""
+    """Static failure distance from the Earth against the friction angle, for free bodies and synchronous satellites."""
     figure = Figure(figsize=(9.6, 4.4), layout="constrained")
     free, bound = figure.subplots(1, 2)
     density, material = 2000 * u.kg / u.m**3, Material(yield_surface=surface)

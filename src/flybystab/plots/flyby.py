@@ -1,7 +1,7 @@
-"""Figures. Every function takes matplotlib axes and returns them; units are on every axis.
+"""Figures of one flyby: functions that take matplotlib axes and return them.
 
-Colours are those of Okabe & Ito (2008), which colour-blind readers tell apart; line styles differ too, so that the
-figures work in greyscale.
+The colours are those of Okabe & Ito (2008), distinguishable with colour-blindness; line styles differ as well, for
+greyscale.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ import numpy as np
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
 from flybystab.flybys.result import FlybyResult, History
+from flybystab.plots.style import save
 
 BLACK, ORANGE, SKY, GREEN, BLUE, RED = "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00"
 STYLES = ("-", "--", ":")
@@ -25,29 +26,33 @@ def _hours(history: History) -> Any:
     return history.time_from_periapsis.to_value(u.h)
 
 
-def _shade(axes: Any, history: History) -> None:
-    """Grey where the body flows, hatched where it is dispersed."""
+def _shade(axes: Any, history: History, labels: bool = False) -> None:
+    """Shade plastic flow (grey) and dispersal (hatched), with entries for the legend if asked for."""
     t = _hours(history)
-    for regime, style in (("flowing", {"color": "0.85"}), ("dispersed", {"color": "0.7", "hatch": "//"})):
+    for regime, name, style in (
+        ("flowing", "plastic flow", {"facecolor": "0.85"}),
+        ("dispersed", "dispersed", {"facecolor": "0.85", "edgecolor": "0.45", "hatch": "//"}),
+    ):
         inside = history.regime == regime
         edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
         for a, b in zip(edges[::2], edges[1::2], strict=True):
-            axes.axvspan(t[a], t[min(b, len(t) - 1)], lw=0, zorder=0, **style)
+            label = name if labels and a == edges[0] else None
+            axes.axvspan(t[a], t[min(b, len(t) - 1)], lw=0, zorder=0, label=label, **style)
 
 
 def distance_plot(axes: Any, history: History, encounter: Encounter) -> Any:
-    """Distance from the planet's centre against time, with the planet's radius."""
+    """Plot distance from the planet's centre against time, with the planet's radius and a legend of the shading."""
     axes.semilogy(_hours(history), history.distance.to_value(u.km), color=BLACK)
     radius = encounter.planet.radius / 1e3
     axes.axhline(radius, color=BLUE, ls="--", label=f"radius of {encounter.planet.name.capitalize()}")
     axes.set_ylabel("distance (km)")
+    _shade(axes, history, labels=True)
     axes.legend(frameon=False, fontsize=8)
-    _shade(axes, history)
     return axes
 
 
 def friction_plot(axes: Any, history: History, limit: u.Quantity) -> Any:
-    """Mobilised friction angle against time, with what the material has."""
+    """Plot the mobilised friction angle against time, with the friction angle of the material."""
     phi = history.required_friction_angle.to_value(u.deg)
     axes.plot(_hours(history), np.where(np.isfinite(phi), phi, np.nan), color=RED, label="mobilised")
     axes.axhline(limit.to_value(u.deg), color=BLACK, ls="--", label="material")
@@ -59,17 +64,17 @@ def friction_plot(axes: Any, history: History, limit: u.Quantity) -> Any:
 
 
 def spin_plot(axes: Any, history: History) -> Any:
-    """Spin rate against time."""
+    """Plot the spin rate against time."""
     rate = np.linalg.norm(history.spin.to_value(u.rad / u.s), axis=1)
     axes.plot(_hours(history), rate * 86400.0 / (2.0 * np.pi), color=GREEN)
-    axes.set_ylabel("spin rate (turns/day)")
+    axes.set_ylabel("spin rate (rev/day)")
     axes.set_ylim(bottom=0.0)
     _shade(axes, history)
     return axes
 
 
 def axes_plot(axes: Any, history: History) -> Any:
-    """Semi-axes against time."""
+    """Plot the semi-axes against time."""
     a = history.semi_axes.to_value(u.m)
     for i, (colour, style) in enumerate(zip((BLUE, ORANGE, BLACK), STYLES, strict=True)):
         axes.plot(_hours(history), a[:, i], color=colour, ls=style, label=f"$a_{i + 1}$")
@@ -81,7 +86,7 @@ def axes_plot(axes: Any, history: History) -> Any:
 
 
 def flyby_panels(panels: Sequence[Any], result: FlybyResult) -> Sequence[Any]:
-    """Distance, mobilised friction, spin and semi-axes into four axes that share their time."""
+    """Plot distance, mobilised friction angle, spin rate and semi-axes into four axes with a common time axis."""
     history = result.history
     if history is None:
         raise InvalidInput("result", "without history", "the result of flyby(..., history=True)")
@@ -94,7 +99,7 @@ def flyby_panels(panels: Sequence[Any], result: FlybyResult) -> Sequence[Any]:
 
 
 def flyby_figure(result: FlybyResult, title: str, path: str | Path) -> Path:
-    """Write the four panels of a flyby as a picture; returns its path."""
+    """Write a figure with the four panels of a flyby; returns its path."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
@@ -103,5 +108,4 @@ def flyby_figure(result: FlybyResult, title: str, path: str | Path) -> Path:
     panels: Any = figure.subplots(4, 1, sharex=True)
     flyby_panels(panels, result)
     panels[0].set_title(title)
-    figure.savefig(path, dpi=150)
-    return Path(path)
+    return save(figure, path)

@@ -1,7 +1,7 @@
-"""Names beside points that hide neither each other nor the points.
+"""Labels of points that overlap neither each other nor the points.
 
-Each name takes the first place that is free of what was placed before: close to its point on one of eight sides, else
-farther off with a thin line to it. A name for which no place is free is left out.
+Each label takes the first free position: close to its point on one of eight sides, otherwise farther away with a thin
+line to the point. A label without a free position is omitted.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ _LINE = 10.0
 def label_points(
     axes: Any, points: Sequence[tuple[float, float, str]], others: Any = None, **text: Any
 ) -> Any:
-    """Write names beside points; the axes must have their final limits.
+    """Write labels beside points; the axes must have their final limits.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Maps of what becomes of a body: over (periapsis, v_inf), and over the target plane of an encounter.
+"""Outcome maps: verdicts over periapsis and v_inf, and over the target plane of an encounter.
 
 Verdicts run from light (intact) to dark (disrupted) and carry a letter each, so that the maps can be read in
 greyscale and by colour-blind readers.
@@ -69,13 +69,13 @@ class OutcomeMap:
 
     @property
     def worst(self) -> NDArray[np.str_]:
-        """The heaviest verdict over the phases, shape (n, m)."""
+        """The most severe verdict over the phases, shape (n, m)."""
         rank = np.vectorize(_ORDER.index, otypes=[int])(self.verdict)
         return np.array(_ORDER, dtype=object)[rank.max(axis=-1)].astype(str)
 
     @property
     def share_yielding(self) -> Array:
-        """Share of the phases in which the body yields or hits the planet, shape (n, m)."""
+        """Fraction of the phases in which the body yields or hits the planet, shape (n, m)."""
         return np.mean(self.verdict != str(Verdict.INTACT), axis=-1)
 
 
@@ -90,7 +90,7 @@ def outcome_map(
     tolerance: float = 1e-6,
     workers: int | None = None,
 ) -> OutcomeMap:
-    """Verdicts of scripted encounters over a grid, the spin axis along the orbital angular momentum.
+    """Verdicts of hyperbolic encounters over a grid, with the spin axis along the orbital angular momentum.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def outcome_map(
 
 
 def outcome_plot(axes: Any, outcomes: OutcomeMap) -> Any:
-    """Worst verdict over (periapsis, v_inf); lines where a tenth and nine tenths of the phases yield."""
+    """Plot the most severe verdict over periapsis and v_inf, with contours of 10 % and 90 % of the phases yielding."""
     q = outcomes.periapsis.to_value(u.m) / outcomes.planet.radius
     v = outcomes.v_inf.to_value(u.km / u.s)
     worst = outcomes.worst
@@ -189,7 +189,7 @@ def target_map(
     tolerance: float = 1e-6,
     workers: int | None = None,
 ) -> TargetMap:
-    """What becomes of one body, its attitude fixed in space, wherever it crosses the target plane.
+    """Verdicts of a body with its attitude fixed in space over the target plane.
 
     Parameters
     ----------
@@ -242,7 +242,7 @@ def target_map(
 
 
 def target_plot(axes: Any, target: TargetMap) -> Any:
-    """The target plane with verdicts and the disc from which the planet is hit."""
+    """Plot the verdicts over the target plane, with the disc of impacts."""
     x, y = target.b_t.to_value(u.km), target.b_r.to_value(u.km)
     m = x.shape[1]
     step = np.pi / m

@@ -1,4 +1,4 @@
-"""The body beside the planet in three dimensions: stills and an animation.
+"""Path and body in three dimensions: figure and animation.
 
 The planet and the path are to scale with each other; so are the bodies with each other. Beside the planet a body
 of a kilometre would be a dot, so it is magnified, by a factor that stands in the picture.
@@ -38,7 +38,7 @@ def surface(shape: Array, n: int = 25) -> Array:
 def scene_plot(
     axes: Any, result: FlybyResult, times: Quantity | None = None, magnification: float | None = None
 ) -> Any:
-    """Planet, path and body at several times, in the periapsis frame.
+    """Plot planet, path and body at several times, in the periapsis frame.
 
     Parameters
     ----------
@@ -102,7 +102,7 @@ def scene_plot(
 def body_plot(
     axes: Any, history: History, row: int, turn: Array | None = None, reach: float | None = None
 ) -> Any:
-    """The body at one time of its history, to scale, km.
+    """Plot the body at one time of its history, to scale, in km.
 
     Parameters
     ----------
@@ -129,7 +129,7 @@ def body_plot(
 def animation(
     result: FlybyResult, path: str | Path, title: str = "", frames: int = 60, rate: int = 15
 ) -> Path:
-    """Write an animation: the path around the planet, and the body to scale beside it.
+    """Write an animation: the path around the planet, and the body in a panel of its own.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Figures of a screening's table and of the bounds that survival puts on a material."""
+"""Figures of screening tables, and of bounds on the material from survived encounters."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from astropy.table import QTable
 from flybystab.flybys.verdict import Verdict
 from flybystab.plots.labels import label_points
 from flybystab.plots.outcome_map import MARKERS, SCALE
+from flybystab.plots.style import save
 from flybystab.screening.columns import VERDICTS
 from flybystab.screening.inference import strongest_passage
 from flybystab.screening.results import read_results
@@ -19,12 +20,12 @@ from flybystab.screening.summary import summary
 
 PANELS = {
     "friction_equilibrium": "shape and spin",
-    "friction_any_attitude": "and passages, whatever the attitude",
-    "friction_every_attitude": "enough at every attitude",
+    "friction_any_attitude": "with encounters, necessary at any attitude",
+    "friction_every_attitude": "with encounters, sufficient at every attitude",
 }
-#: Friction angle, deg, below which a passage adds nothing on a figure.
+#: Smallest friction angle (deg) shown as the effect of an encounter.
 NOTHING = 1e-5
-#: Isolines of the least friction angle, deg.
+#: Contours of the minimum friction angle, deg.
 _LEVELS = (0, 5, 10, 15, 20, 25, 30, 35, 40, 45, 60)
 
 
@@ -38,9 +39,9 @@ def _figure(width: float, height: float) -> Any:
 
 
 def inference_figure(table: QTable, path: str | Path) -> Path:
-    """Plot the region of density, cohesion and friction that :func:`flybystab.infer` leaves.
+    """Plot the region of density, cohesion and friction angle that is consistent with :func:`flybystab.infer`.
 
-    Each panel is a map of the least friction angle over density and cohesion; hatched, no friction is enough.
+    Each panel is a map of the minimum friction angle over density and cohesion; hatched: no friction angle suffices.
     The white line and band are the density of the catalogue and its 1-sigma.
 
     Returns
@@ -85,12 +86,11 @@ def inference_figure(table: QTable, path: str | Path) -> Path:
     if strongest is not None:
         title += f"; strongest tide: {strongest['passage']}"
     figure.suptitle(title, fontsize=9)
-    figure.savefig(path, dpi=150)
-    return Path(path)
+    return save(figure, path)
 
 
 def results_figure(results: QTable | str | Path, path: str | Path, names: int = 4) -> Path:
-    """Plot a result table: what each passage adds to the mobilised friction, and how near that is to failure.
+    """Plot a result table: effect of each encounter on the mobilised friction angle, and the margin.
 
     Named are the passages that add most (left) and those nearest to failure (right).
 
@@ -117,14 +117,14 @@ def results_figure(results: QTable | str | Path, path: str | Path, names: int = 
                 "upper limit",
                 {"mfc": "none", "mec": "0.5", "marker": "v", "ms": 4},
             ),
-            (stands & (verdict == v) & ~bound, "by the dynamics", {"mec": "black", **known}),
+            (stands & (verdict == v) & ~bound, "integrated", {"mec": "black", **known}),
         ):
             if chosen.any():
                 style = {"ls": "", "mew": 0.5, **style}
                 left.plot(distance[chosen], rise[chosen], **style, label=f"{v}, {how} ({chosen.sum()})")
                 right.plot(rise[chosen], margin[chosen], **style)
     left.set(xscale="log", yscale="log", xlabel="distance at closest approach (au)")
-    adds = "friction angle that the passage adds (deg)"
+    adds = "increase of the mobilised friction angle (deg)"
     left.set_ylabel(adds)
     right.set(xscale="log", xlabel=adds)
     right.set_ylabel("margin (deg of friction angle)")
@@ -132,10 +132,10 @@ def results_figure(results: QTable | str | Path, path: str | Path, names: int = 
     if left.get_legend_handles_labels()[0]:
         left.legend(fontsize=7)
     out = int((verdict == Verdict.NOT_IN_EQUILIBRIUM).sum())
-    least = f"; {NOTHING:g} deg stands for that or less" if np.any(rise[stands] == NOTHING) else ""
+    least = f"; {NOTHING:g} deg: that or less" if np.any(rise[stands] == NOTHING) else ""
     figure.suptitle(
-        f"{len(table)} passages, ephemeris {table.meta.get('ephemeris', '-')}; not shown: {out} of bodies that "
-        "are not in equilibrium by themselves" + least,
+        f"{len(table)} encounters, ephemeris {table.meta.get('ephemeris', '-')}; not shown: {out} of bodies that "
+        "are not in equilibrium" + least,
         fontsize=9,
     )
     exact = stands & ~bound
@@ -147,5 +147,4 @@ def results_figure(results: QTable | str | Path, path: str | Path, names: int = 
             (x[k], y[k], f"{table['asteroid'][k]} {str(table['time_tdb'][k])[:4]}") for k in rows[:names]
         ]
         label_points(axes, named, np.column_stack([x[stands], y[stands]]), fontsize=7)
-    figure.savefig(path, dpi=150)
-    return Path(path)
+    return save(figure, path)

@@ -1,4 +1,4 @@
-"""Figures of equilibrium and stability. Every function takes matplotlib axes and returns them."""
+"""Figures of equilibrium and stability: functions that take matplotlib axes and return them."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ ANGLES = (1, 5, 10, 20, 30, 40)
 
 
 def _mark(axes: Any, points: Mapping[str, tuple[float, float]], named: Sequence[str] | None) -> None:
-    """Dots; with names at those of `named`, or at all of them. The axes must be finished otherwise."""
+    """Mark points, with labels at those of `named` (all by default). Call it last: labels avoid what is drawn."""
     shown = [name for name in points if named is None or name in named]
     for name, (x, y) in points.items():
         axes.plot(x, y, "o", ms=4 if name in shown else 2, color=BLACK, mec="white", mew=0.4, zorder=5)
@@ -46,12 +46,12 @@ def regions_plot(
     named: Sequence[str] | None = None,
     cells: int = 200,
 ) -> Any:
-    """Friction angle that a shape needs at one spin ``w2 = omega^2/(pi G rho)``, in the plane of axis ratios.
+    """Plot the required friction angle at one spin ``w2 = omega^2/(pi G rho)`` over the plane of axis ratios.
 
-    One contour per angle (deg): with that much friction all shapes between the contours of the same angle
-    stand. Grey: no friction suffices. Hatched: not stable to infinitesimal pushes with exactly the friction that it
-    needs (associative flow); more friction than that stops them. The fluid shapes are at zero. `bodies` are marked by
-    their axis ratios, whatever their spin; `named` are those with a name (all by default).
+    One contour per angle (deg); shapes between the contours of an angle are in equilibrium with it. Grey: no friction
+    angle suffices. Hatched: unstable to infinitesimal perturbations at exactly the required friction angle (associative
+    flow). Fluid shapes require zero. `bodies` are marked by their axis ratios, regardless of their spin; `named` are
+    those with a label (all by default).
     """
     ratio = np.linspace(0.05, 1.0, cells)
     table = stability_map(
@@ -72,7 +72,7 @@ def regions_plot(
         hatched.set_edgecolor("0.55")
         hatched.set_linewidth(0.0)
     if np.nanmin(required) < max(angles):
-        # dark to light with the angle, and numbers on the lines: legible in grey
+        # dark to light with increasing angle, and labels on the lines, for greyscale
         lines = axes.contour(
             ratio, ratio, required, levels=sorted(angles), cmap="viridis", linewidths=1.3, vmin=0, vmax=45
         )
@@ -90,7 +90,7 @@ def regions_plot(
 def critical_energy_plot(
     axes: Any, w2: float, friction_angle: Quantity, *, dilatancy: float = 1.0, cells: int = 100
 ) -> Any:
-    """Least critical energy at second order over the plane of axis ratios, in units of the binding energy."""
+    """Plot the minimum critical energy at second order over the plane of axis ratios, over the binding energy."""
     ratio = np.linspace(0.1, 1.0, cells)
     t = stability_map(ratio[None, :], ratio[:, None], w2, friction_angle, dilatancy=dilatancy, depth="second")
     energy = np.where(t.level >= 1, np.minimum(t.energy_second.value, 1.0), np.nan)
@@ -111,7 +111,7 @@ def spin_plot(
     bodies: Mapping[str, Body] | None = None,
     named: Sequence[str] | None = None,
 ) -> Any:
-    """Lower and upper spin limit ``omega^2/(pi G rho)`` against ``a3/a1``, one line per friction angle (deg).
+    """Plot the lower and upper spin limit ``omega^2/(pi G rho)`` against ``a3/a1``, one line per friction angle (deg).
 
     Oblate bodies ``a1 = a2`` with the Maclaurin and, dashed, the Jacobi fluids; or prolate ones ``a2 = a3``.
     """
@@ -123,7 +123,7 @@ def spin_plot(
         for j, r in enumerate(ratio):
             body = _unit_body((1.0, r, r) if prolate else (1.0, 1.0, r), rho, yield_surface)
             limits[j] = spin_limits(body, angle * u.deg).to_value(u.rad / u.s) ** 2 / (np.pi * G * rho)
-        # colour and line style both tell the angles apart
+        # colour and line style both distinguish the angles
         style = {"color": shades[i % len(shades)], "ls": STYLES[i % len(STYLES)], "lw": 1.2}
         axes.plot(ratio, limits[:, 1], label=f"{angle:g}°", **style)
         axes.plot(ratio, np.where(limits[:, 0] > 0, limits[:, 0], np.nan), **style)
@@ -145,10 +145,10 @@ def spin_plot(
 
 
 def barrier_plot(axes: Any, body: Body, *, dilatancy: float = 1.0, longest: float | None = None) -> Any:
-    """Energy that a push loses against its strain: second order, third order, whole path.
+    """Plot the energy lost by a perturbation against its strain: second order, third order, whole path.
 
-    Along the deviator of the push with the least barrier, up to 1.3 times its strain. The dot is the barrier: a
-    maximum, or the axis ratio of 6:1 where the model ends.
+    The direction is that of the lowest barrier, up to 1.3 times its strain. The point marks the barrier: a maximum, or
+    the axis ratio of 6:1 at which the model ends.
     """
     s = stability(body, dilatancy=dilatancy)
     ends = s.critical_strain.barrier
@@ -168,9 +168,9 @@ def barrier_plot(axes: Any, body: Body, *, dilatancy: float = 1.0, longest: floa
         axes.plot(strain, loss.to_value(u.J) / binding, color=color, ls=style, label=name)
     if 0.0 < ends < np.inf and not s.at_apex.barrier:
         top = s.critical_energy.barrier.to_value(u.J) / binding
-        words = {"maximum": "barrier", "edge": "barrier: the axis ratio passes 6:1"}
+        words = {"maximum": "barrier", "edge": "barrier: axis ratio of 6:1"}
         axes.plot(ends, top, "o", color=RED, zorder=5, label=words.get(s.barrier_kind, "barrier"))
-    axes.set_xlabel("strain of the push")
+    axes.set_xlabel("strain of the perturbation")
     axes.set_ylabel("kinetic energy lost / binding energy")
     lost = p.loss.barrier.to_value(u.J) / binding
     top = max(float(lost.max()), 1e-12)
@@ -187,7 +187,7 @@ def failure_distance_plot(
     *,
     synchronous: bool = False,
 ) -> Any:
-    """Static failure distance, in planetary radii, against friction angle, one line per body."""
+    """Plot the static failure distance, in planetary radii, against the friction angle, one line per body."""
     angles = np.linspace(1.0, 60.0, 119) * u.deg
     for i, (name, body) in enumerate(bodies.items()):
         d = failure_distance(body, mass_parameter, angles, synchronous=synchronous)

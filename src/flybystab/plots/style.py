@@ -1,0 +1,26 @@
+"""Style of figures: the file ``style.mplstyle`` (TrueType fonts in PDF and PostScript, resolution)."""
+
+from __future__ import annotations
+
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+#: Style file for ``matplotlib.style.context``.
+STYLE = resources.files("flybystab.plots").joinpath("style.mplstyle")
+
+
+def save(figure: Any, path: str | Path) -> Path:
+    """Write a figure with the settings of the style file; returns the path.
+
+    Parameters
+    ----------
+    figure : matplotlib Figure
+    path : str or Path
+        File whose suffix gives the format (:data:`flybystab.plots.formats.FIGURES`).
+    """
+    import matplotlib
+
+    with resources.as_file(STYLE) as file, matplotlib.rc_context(fname=file):
+        figure.savefig(path)
+    return Path(path)
