@@ -13,6 +13,7 @@ from flybystab.core.dynamics.run import REGIMES
 from flybystab.core.material.yield_surface import required_frictions
 from flybystab.flybys.batch import Judged
 from flybystab.flybys.inputs import FlybyInputs
+from flybystab.tabular import Tabular
 from flybystab.units import brief
 
 Array = NDArray[np.float64]
@@ -20,7 +21,7 @@ _Events = list[tuple[str, float, float]]
 
 
 @dataclass(frozen=True, eq=False)
-class History:
+class History(Tabular):
     """The body and its orbit against time; every array has the same first dimension.
 
     Attributes

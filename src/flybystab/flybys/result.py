@@ -260,6 +260,12 @@ class FlybyResult:
             return None
         return "path" if self.encounter.impact else "body"
 
+    def to_dict(self) -> dict[str, Any]:
+        """JSON document of the result (schema ``flyby/1``): units in the keys, numbers or None."""
+        from flybystab.flybys.document import flyby_document
+
+        return flyby_document(self)
+
     def __repr__(self) -> str:
         letter = f" ({self.verdict_class})" if self.verdict_class else ""
         phi = self.max_required_friction_angle

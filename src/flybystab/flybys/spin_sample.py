@@ -16,6 +16,7 @@ from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
 from flybystab.flybys.batch import TOLERANCE
 from flybystab.flybys.flyby_many import flyby_many
+from flybystab.tabular import Tabular
 from flybystab.units import counted, whole
 
 Array = NDArray[np.float64]
@@ -36,7 +37,7 @@ class SpinStates(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class SpinSample:
+class SpinSample(Tabular):
     """Encounters of one body at many attitudes; arrays over the sample.
 
     Attributes

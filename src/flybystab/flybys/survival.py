@@ -19,6 +19,7 @@ from flybystab.errors import InvalidInput
 from flybystab.flybys.flyby_many import flyby_many
 from flybystab.flybys.spin_sample import SpinStates, spin_states
 from flybystab.flybys.verdict import Verdict
+from flybystab.tabular import Tabular
 from flybystab.units import counted
 
 #: Verdicts after which there still is one body, all of it.
@@ -26,7 +27,7 @@ SURVIVES = (Verdict.INTACT, Verdict.RESHAPED)
 
 
 @dataclass(frozen=True, eq=False)
-class Survival:
+class Survival(Tabular):
     """Verdicts over the clones of an orbit, each with an attitude of its own.
 
     Attributes

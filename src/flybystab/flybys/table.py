@@ -8,13 +8,14 @@ import numpy as np
 from astropy.units import Quantity
 from numpy.typing import NDArray
 
+from flybystab.tabular import Tabular
 from flybystab.units import counted
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)
-class FlybyTable:
+class FlybyTable(Tabular):
     """Results of many encounters as arrays; attributes as in :class:`FlybyResult`, first dimension n.
 
     A row that could not be computed has the verdict "FAILED", its reason in `failure` and nan elsewhere; `contact` is
