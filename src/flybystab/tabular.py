@@ -26,7 +26,7 @@ class Tabular:
 
     def _columns(self) -> tuple[dict[str, Any], dict[str, Any]]:
         """Columns and metadata."""
-        values = {f.name: getattr(self, f.name) for f in fields(self)}
+        values = {f.name: getattr(self, f.name) for f in fields(self)}  # type: ignore[arg-type]
         columns = {
             k: v for k, v in values.items() if isinstance(v, np.ndarray) and v.shape[:1] == (len(self),)
         }
