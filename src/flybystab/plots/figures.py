@@ -7,6 +7,8 @@ from collections.abc import Mapping
 import astropy.units as u
 import numpy as np
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
 
 from flybystab.body.body import DEFAULT_SURFACE, Body, Material
 from flybystab.body.fluids import roche_limit
@@ -52,6 +54,14 @@ def regions_figure(bodies: Mapping[str, Body], surface: str = DEFAULT_SURFACE, c
     for axes, spin in zip(figure.subplots(2, 2).flat, SPINS, strict=True):
         near = {n: b for n, b in bodies.items() if min(SPINS, key=lambda s: abs(s - w2[n])) == spin}
         regions_plot(axes, spin, yield_surface=surface, bodies=near, named=KNOWN, cells=cells)
+    handles = [
+        Patch(facecolor="0.8", label="no friction angle suffices"),
+        Patch(
+            facecolor="none", edgecolor="0.55", hatch="////", label="unstable at the required friction angle"
+        ),
+        Line2D([], [], color=BLACK, ls="", marker="o", ms=4, mec="white", label="asteroids of the catalogue"),
+    ]
+    figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=8)
     return figure
 
 

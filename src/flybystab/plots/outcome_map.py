@@ -140,12 +140,16 @@ def outcome_plot(axes: Any, outcomes: OutcomeMap) -> Any:
     worst = outcomes.worst
     axes.pcolormesh(q, v, _ranks(worst).T, **_shades(), shading="nearest")
     _letters(axes, np.meshgrid(q, v, indexing="ij"), worst)
+    from matplotlib.patheffects import withStroke
+
     share = outcomes.share_yielding
     if share.min() < 0.5 <= share.max() and min(share.shape) > 1:
         lines = axes.contour(q, v, share.T, levels=[0.1, 0.9], colors="black", linestyles=["--", "-"])
-        axes.clabel(lines, fmt=lambda x: f"{x:.0%} of phases yield", fontsize=7)
+        labels = axes.clabel(lines, fmt=lambda x: f"{x:.0%} of phases yield", fontsize=7, inline=False)
+        for label in labels:  # a halo instead of a gap in the line
+            label.set_path_effects([withStroke(linewidth=2.5, foreground="white")])
     axes.set_xlabel(f"periapsis (radii of {outcomes.planet.name.capitalize()})")
-    axes.set_ylabel("speed far away $v_\\infty$ (km/s)")
+    axes.set_ylabel("hyperbolic excess speed $v_\\infty$ (km/s)")
     _legend(axes, worst)
     return axes
 
