@@ -1,0 +1,1 @@
+"""Readers of files of asteroids, one module a format (:mod:`flybystab.catalogues.readers.registry`)."""
