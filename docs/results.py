@@ -132,7 +132,7 @@ def passages(table, order):
 def number(x, digits=2):
     if np.isnan(x):
         return "-"
-    return f"{x:.{digits}f}" if np.isfinite(x) else "beyond any" if x > 0 else "none is enough"
+    return f"{x:.{digits}f}" if np.isfinite(x) else "infinite" if x > 0 else "no friction angle suffices"
 
 
 def standing(table):

@@ -1,11 +1,11 @@
 """From the published uncertainty of an orbit to the odds of survival: clones of Apophis, Bennu and Didymos.
 
-Clones are drawn from the covariance that JPL or ESA published and followed with all forces to the encounter. For
-Bennu and Didymos the tide at their closest passages before 2050 is nothing beside their own gravity. Apophis feels
-it: each clone meets the Earth at an attitude of its own, for the phase of a rotation cannot be foretold so far
-ahead. What is not known is then taken apart: how far the result spreads if the orbit alone is drawn, and how far with
-the attitude. A body stays INTACT as long as it mobilises less friction than it has, so that one run gives the odds at
-every friction angle. Writes out/real_clones.png.
+Clones are drawn from the covariance that JPL or ESA published and followed with all forces to the encounter.
+For Bennu and Didymos the tide at their closest encounters before 2050 is negligible compared with their own
+gravity. For Apophis it is not: each clone meets the Earth at its own attitude, since the rotation phase
+cannot be predicted so far ahead. The spread of the result is shown for sampled orbits alone, and for sampled
+orbits and attitudes. A body stays INTACT as long as it mobilises less friction than it has, so that one run
+gives the odds at every friction angle. Writes out/real_clones.png.
 """
 
 from pathlib import Path
@@ -40,7 +40,7 @@ apophis, clones = fs.Asteroid.from_catalogue("Apophis"), drawn["Apophis"]
 probability, least, most = fs.survival(apophis, clones, seed=1).probability()
 print(f"Apophis survives 2029 whole: {probability:.3f} (95 % interval {least:.3f} to {most:.3f})")
 
-# The same, taken apart: every clone at the same attitude, and each at its own.
+# Separate effects: every clone at the same attitude, and each at its own.
 passages = [
     fs.Encounter.hyperbolic("earth", q, v) for q, v in zip(clones.distance, clones.v_inf, strict=True)
 ]
@@ -67,13 +67,13 @@ left.set_xlabel(f"closest distance - {middle_of_q:.0f} km (km)")
 left.set_ylabel("clones")
 for axes, values, label in (
     (middle, friction, "friction angle of the material (deg)"),
-    (right, ratio, "spin rate after over before"),
+    (right, ratio, "spin rate after / before"),
 ):
     for what, style in (("orbit and attitude", "-"), ("orbit alone", "--")):
         axes.ecdf(values[what], color="black", linestyle=style, label=what)
     axes.set_xlabel(label)
 middle.set_ylabel("probability of INTACT")
-right.set_ylabel("share of the clones below")
+right.set_ylabel("fraction of the clones below")
 right.legend(title="drawn", loc="upper left")
 figure.suptitle(f"Apophis on 13 April 2029: {N} clones of {clones.source.split(' (')[0]}")
 Path("out").mkdir(exist_ok=True)
