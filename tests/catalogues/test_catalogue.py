@@ -235,7 +235,7 @@ def test_own_file_with_few_columns(tmp_path):
         ("a_au\n1\n", InvalidInput, "at least one of"),
         ("name,a_au\nx,1,2\n", InvalidInput, "line 2"),
         ("name,a_au\nx\n", InvalidInput, "line 2"),
-        ("", InvalidInput, "one of the formats"),
+        ("", InvalidInput, "at least one of"),
     ],
 )
 def test_bad_files_are_named(tmp_path, text, error, match):
@@ -277,12 +277,7 @@ def test_the_script_rebuilds_the_embedded_file(tmp_path):
         check=True,
         capture_output=True,
     )
-    with out.open() as made, (REPO / "data" / "asteroids.csv").open() as kept:
-        for one, other in zip(csv.reader(made), csv.reader(kept), strict=True):
-            assert len(one) == len(other)
-            for a, b in zip(one, other, strict=True):
-                # the last digit of a computed number differs between processors
-                assert a == b or float(a) == pytest.approx(float(b), rel=1e-12), (one[:3], a, b)
+    assert out.read_bytes() == (REPO / "data" / "asteroids.csv").read_bytes()
 
 
 @pytest.mark.parametrize(
@@ -292,7 +287,7 @@ def test_the_script_rebuilds_the_embedded_file(tmp_path):
         ("density_kg_m3", "2.6", "in [50, 25000]"),  # g/cm3
         ("semi_axis_a_m", "0", "in [0.05, 5e+06]"),
         ("spin_period_h", "-30", "in [0.0001, 100000]"),
-        ("e", "-0.1", "in [0, 1000]"),
+        ("e", "-0.1", "in [0, inf]"),
         ("sigma_a_au", "-1e-9", "in [0, inf]"),
         ("a_au", "nan", "a finite number"),
     ],

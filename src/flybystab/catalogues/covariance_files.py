@@ -6,7 +6,7 @@ from functools import lru_cache
 from importlib import resources
 from typing import TYPE_CHECKING
 
-from flybystab.catalogues.readers.registry import reader_of
+from flybystab.catalogues.formats import from_neocc, from_sbdb_answer
 
 if TYPE_CHECKING:
     from flybystab.orbit.covariance import Covariance
@@ -17,10 +17,8 @@ def embedded_covariance(number: str) -> Covariance | None:
     """Covariance of the orbit of a numbered asteroid, as its source published it; None where there is none."""
     if not number.isdigit():
         return None
-    for suffix in (".json", ".ke1"):
+    for suffix, read in ((".json", from_sbdb_answer), (".ke1", from_neocc)):
         file = resources.files("flybystab.data").joinpath("covariances", number + suffix)
         if file.is_file():
-            text = file.read_text(encoding="utf-8")
-            ((_, covariance),) = reader_of(text, number + suffix).read(text, number + suffix)
-            return covariance
+            return read(file.read_text(encoding="utf-8"), number + suffix)[1]
     return None
