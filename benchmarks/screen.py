@@ -28,7 +28,7 @@ import astropy.units as u
 from astropy.time import Time
 
 from flybystab.catalogues.catalogue import Asteroid, catalogue, key_of
-from flybystab.catalogues.formats import with_physical_data
+from flybystab.catalogues.completion import with_physical_data
 from flybystab.constants import AU, R_EARTH
 from flybystab.encounter.encounter import Encounter
 from flybystab.screening.encounters import Passage

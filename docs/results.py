@@ -18,7 +18,7 @@ from astropy.time import Time
 
 from flybystab.catalogues.asteroid import Asteroid
 from flybystab.catalogues.catalogue import catalogue, find
-from flybystab.catalogues.formats import with_physical_data
+from flybystab.catalogues.completion import with_physical_data
 from flybystab.plots.screening import inference_figure, results_figure
 from flybystab.screening.columns import YIELDED
 from flybystab.screening.executors import open_executor

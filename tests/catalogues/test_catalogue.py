@@ -2,6 +2,7 @@
 
 import csv
 import io
+import itertools
 import os
 import subprocess
 import sys
@@ -277,7 +278,12 @@ def test_the_script_rebuilds_the_embedded_file(tmp_path):
         check=True,
         capture_output=True,
     )
-    assert out.read_bytes() == (REPO / "data" / "asteroids.csv").read_bytes()
+    # Elements computed on the way differ in their last digits by the processor and its mathematical library.
+    built, kept = (list(csv.reader(p.open(encoding="utf-8"))) for p in (out, REPO / "data" / "asteroids.csv"))
+    assert [len(row) for row in built] == [len(row) for row in kept]
+    for new, old in zip(itertools.chain(*built), itertools.chain(*kept), strict=True):
+        if new != old:
+            assert float(new) == pytest.approx(float(old), rel=1e-12)
 
 
 @pytest.mark.parametrize(
@@ -287,7 +293,7 @@ def test_the_script_rebuilds_the_embedded_file(tmp_path):
         ("density_kg_m3", "2.6", "in [50, 25000]"),  # g/cm3
         ("semi_axis_a_m", "0", "in [0.05, 5e+06]"),
         ("spin_period_h", "-30", "in [0.0001, 100000]"),
-        ("e", "-0.1", "in [0, inf]"),
+        ("e", "-0.1", "in [0, 1000]"),
         ("sigma_a_au", "-1e-9", "in [0, inf]"),
         ("a_au", "nan", "a finite number"),
     ],

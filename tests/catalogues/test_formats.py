@@ -8,7 +8,7 @@ import pytest
 import reference
 
 from flybystab.catalogues.catalogue import Asteroid, catalogue
-from flybystab.catalogues.formats import with_physical_data
+from flybystab.catalogues.completion import with_physical_data
 from flybystab.errors import InvalidInput
 
 SHARED = reference.SHARED / "data"

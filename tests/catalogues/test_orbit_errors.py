@@ -8,8 +8,8 @@ from astropy.time import Time
 
 import flybystab as fs
 from flybystab.catalogues.asteroid import Asteroid
-from flybystab.catalogues.formats import from_mpc
 from flybystab.catalogues.orbit_errors import error_of, runoff
+from flybystab.catalogues.readers.mpc import from_mpc
 from flybystab.constants import AU, YEAR
 from flybystab.orbit.elements import GM_SUN
 from flybystab.orbit.kepler import two_body

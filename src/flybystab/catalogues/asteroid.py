@@ -127,7 +127,8 @@ class Asteroid(Record):
             au_per_day2(self._number(c)) if self.row.get(c) else 0.0
             for c in ("A1_au_d2", "A2_au_d2", "A3_au_d2")
         )
-        push = NonGravitational((a1, a2, a3))
+        push = NonGravitational((a1, a2, a3), self.row.get("nongrav_law") or "asteroid")
+        _ = push.constants  # refuses an unknown law
         return Orbit._from_si_elements(epoch, elements, push, self.name, self._covariance(epoch))
 
     def _covariance(self, epoch: Time) -> Covariance | None:

@@ -2,10 +2,6 @@
 
 from __future__ import annotations
 
-import csv
-import gzip
-import io
-import zlib
 from collections.abc import Sequence
 from difflib import get_close_matches
 from functools import lru_cache
@@ -17,9 +13,11 @@ import numpy as np
 from astropy.table import QTable
 
 from flybystab.catalogues.asteroid import CATALOGUE_DATE, Asteroid
-from flybystab.catalogues.formats import from_mpc, from_neocc, from_sbdb, from_sbdb_answer, kind_of
+from flybystab.catalogues.designations import unpacked
+from flybystab.catalogues.readers import reader_of, text_of
+from flybystab.catalogues.readers.native import read_native
 from flybystab.catalogues.record import TEXTS, UNITS, key_of
-from flybystab.errors import InvalidInput, UnknownName
+from flybystab.errors import UnknownName
 
 __all__ = ["CATALOGUE_DATE", "TEXTS", "UNITS", "Asteroid", "catalogue", "catalogue_table", "find", "key_of"]
 
@@ -31,6 +29,8 @@ def find(asteroids: Sequence[Asteroid], name: str | int, where: str) -> Asteroid
         for n in a.names:
             index.setdefault(key_of(n), a)
     wanted = key_of(name)
+    if wanted not in index:
+        wanted = key_of(unpacked(str(name).strip()))
     if wanted in index:
         return index[wanted]
     near = get_close_matches(wanted, index, n=8, cutoff=0.6)
@@ -41,43 +41,27 @@ def find(asteroids: Sequence[Asteroid], name: str | int, where: str) -> Asteroid
     raise UnknownName("asteroid", str(name), suggestions, known)
 
 
-def _read(text: str, file: str) -> tuple[Asteroid, ...]:
-    """Asteroids of a CSV text."""
-    reader = csv.DictReader(io.StringIO(text, newline=""))
-    columns = list(reader.fieldnames or [])
-    kind = kind_of(columns)
-    for c in columns if not kind else ():
-        if c not in UNITS and c not in TEXTS:
-            known = [*TEXTS, *UNITS]
-            if ";" in c or "\t" in c:
-                raise InvalidInput("columns", c, f"commas between the columns of {file}")
-            raise UnknownName("column", c, get_close_matches(c, known, cutoff=0.6), f"(in {file})")
-    if not kind and not {"name", "designation", "number"} & set(columns):
-        raise InvalidInput("columns", columns, f"at least one of name, designation, number in {file}")
-    out = []
-    for line, row in enumerate(reader, start=2):
-        if None in row or None in row.values():
-            raise InvalidInput("row", f"line {line} of {file}", f"{len(columns)} cells, as in the header")
-        stripped = {k: v.strip() for k, v in row.items()}
-        if kind:
-            stripped = (from_sbdb if kind == "sbdb" else from_mpc)(stripped, file)
-        out.append(Asteroid(stripped, file=file))
-    return tuple(out)
+def _read(text: str, file: str, name: str) -> tuple[Asteroid, ...]:
+    """Asteroids of a text, by the reader of its format."""
+    found = reader_of(text)
+    entries = found.read(text, name) if found else read_native(text, file)
+    return tuple(Asteroid(row, file=file, covariance=covariance) for row, covariance in entries)
 
 
 @lru_cache(maxsize=1)
 def _embedded() -> tuple[Asteroid, ...]:
     text = resources.files("flybystab.data").joinpath("asteroids.csv").read_text(encoding="utf-8")
-    return _read(text, f"embedded catalogue {CATALOGUE_DATE}")
+    file = f"embedded catalogue {CATALOGUE_DATE}"
+    return tuple(Asteroid(row, file=file) for row, _ in read_native(text, file))
 
 
 def catalogue(path: str | Path | None = None) -> tuple[Asteroid, ...]:
     """All asteroids of the embedded catalogue, or of a file, in their order.
 
-    A file has the catalogue's columns, or those of a JPL SBDB query or of an MPC table
-    (:mod:`flybystab.catalogues.formats`), and may be gzipped; or it is one orbit with its
-    covariance, of NEOCC (``.ke1``) or of the SBDB API (``.json``). It needs only
-    the columns that are used: a name, ``epoch_jd_tdb, a_au, e, i_deg, node_deg, peri_deg, M_deg`` for orbits,
+    The format is found from the content of the file (:mod:`flybystab.catalogues.readers`), which may be
+    gzipped: the catalogue's own columns, JPL SBDB queries and answers, MPC tables and MPCORB, OEF2.0 of NEOCC.
+    The catalogue's own format needs only the columns that are used: a name,
+    ``epoch_jd_tdb, a_au, e, i_deg, node_deg, peri_deg, M_deg`` for orbits,
     ``semi_axis_{a,b,c}_m, density_kg_m3, spin_period_h`` for bodies.
 
     Raises
@@ -89,16 +73,7 @@ def catalogue(path: str | Path | None = None) -> tuple[Asteroid, ...]:
     """
     if path is None:
         return _embedded()
-    try:
-        raw = Path(path).read_bytes()
-        text = (gzip.decompress(raw) if raw[:2] == b"\x1f\x8b" else raw).decode("utf-8-sig")
-    except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
-        raise InvalidInput("catalogue file", path, f"a readable CSV file ({error})") from None
-    one = {".ke1": from_neocc, ".json": from_sbdb_answer}.get(Path(path).suffix)
-    if one is not None:
-        row, covariance = one(text, Path(path).name)
-        return (Asteroid(row, file=str(path), covariance=covariance),)
-    return _read(text, str(path))
+    return _read(text_of(path), str(path), Path(path).name)
 
 
 def catalogue_table(path: str | Path | None = None) -> QTable:

@@ -6,7 +6,8 @@ from functools import lru_cache
 from importlib import resources
 from typing import TYPE_CHECKING
 
-from flybystab.catalogues.formats import from_neocc, from_sbdb_answer
+from flybystab.catalogues.readers.oef import from_neocc
+from flybystab.catalogues.readers.sbdb import from_sbdb_answer
 
 if TYPE_CHECKING:
     from flybystab.orbit.covariance import Covariance

@@ -41,7 +41,7 @@ def error_of(row: Mapping[str, str], epoch: Time) -> Covariance | None:
     ----------
     row : mapping
         A catalogue row. ``condition_code`` is U; ``observed_jd`` the middle of the observed arc (else the epoch);
-        digits count where the row comes from the MPC.
+        digits count where the row comes from the MPC or the SBDB.
     epoch : Time
         Of its elements.
     """
@@ -60,6 +60,10 @@ def error_of(row: Mapping[str, str], epoch: Time) -> Covariance | None:
         half[0] = 2.0 / 3.0 * axis * _HALF_UNITS["n"] * one / DAY / motion
         ways += [_state(elements + way) - middle for way in np.diag(half / np.sqrt(3.0))]
         said.append("digits")
+    elif row.get("orbit_source", "").startswith("JPL SBDB ("):
+        half = printed_half_units(row)
+        ways += [_state(elements + way) - middle for way in np.diag(half / np.sqrt(3.0))]
+        said.append("digits")
     if row.get("condition_code", "").isdigit():
         ago = (epoch.tdb.jd - float(row.get("observed_jd") or epoch.tdb.jd)) * DAY
         drift = runoff(int(row["condition_code"])) / 3.0
@@ -71,6 +75,21 @@ def error_of(row: Mapping[str, str], epoch: Time) -> Covariance | None:
     source, caveat = f"{words} of {row.get('orbit_source') or 'the row'}", f"by the {words} of its elements"
     matrix = np.transpose(ways) @ np.array(ways)
     return Covariance(epoch, SETS["cartesian"], middle, matrix, source, False, caveat)
+
+
+def printed_half_units(row: Mapping[str, str]) -> Array:
+    """Half a unit in the last printed digit of a, e, i, node, peri, M (m, rad), shape (6,).
+
+    Angles count the most decimals of the four, since tables leave out trailing zeros.
+    """
+    a, e, *angles = (_decimals(row[c]) for c in ("a_au", "e", "i_deg", "node_deg", "peri_deg", "M_deg"))
+    angle = np.radians(0.5 * 10.0 ** -max(angles))
+    return np.array([0.5 * 10.0**-a * AU, 0.5 * 10.0**-e, *[angle] * 4])
+
+
+def _decimals(text: str) -> int:
+    mantissa, _, exponent = text.lower().partition("e")
+    return len(mantissa.partition(".")[2]) - int(exponent or 0)
 
 
 def _state(elements: Array) -> Array:

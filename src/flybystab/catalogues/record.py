@@ -51,7 +51,7 @@ TEXTS = (
     ),
     *("binary", "shape_kind", "semi_axes_source", "diameter_source", "spin_state", "spin_source"),
     *("amplitude_source", "pole_source", "tumbling_mode", "tumbling_source", "density_assumed"),
-    *("density_source", "frame", "sigma_source", "nongrav_source", "orbit_solution"),
+    *("density_source", "frame", "sigma_source", "nongrav_source", "nongrav_law", "orbit_solution"),
     *("condition_code_source", "orbit_source", "assumed", "unchecked", "notes"),
 )
 
@@ -60,7 +60,7 @@ ORBIT = ("epoch_jd_tdb", "a_au", "e", "i_deg", "node_deg", "peri_deg", "M_deg")
 ORBIT_SI = np.array([UNITS[c].si.scale for c in ORBIT[1:]])
 #: Columns of an orbit: kept as they are when a row is completed from another.
 ORBITAL = frozenset(
-    {*ORBIT, "A1_au_d2", "A2_au_d2", "A3_au_d2", "frame", "sigma_source", "nongrav_source"}
+    {*ORBIT, "A1_au_d2", "A2_au_d2", "A3_au_d2", "frame", "sigma_source", "nongrav_source", "nongrav_law"}
     | {"sigma_" + c for c in ORBIT[1:]}
     | {"orbit_solution", "orbit_source", "condition_code", "condition_code_source"}
 )

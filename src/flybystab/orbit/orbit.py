@@ -14,7 +14,7 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.constants import DAY
-from flybystab.errors import Impact, InaccurateOrbit, InvalidInput, UnknownName
+from flybystab.errors import FlybystabWarning, Impact, InaccurateOrbit, InvalidInput, UnknownName
 from flybystab.orbit.closest_approach import first_contact
 from flybystab.orbit.covariance import Covariance
 from flybystab.orbit.elements import GM_SUN, ecliptic_to_icrf, state_from_elements
@@ -115,6 +115,13 @@ class Orbit:
             for v, n in ((_angle(i), "i"), (_angle(node), "node"), (_angle(peri), "peri"), (_angle(M), "M"))
         ]
         push = _nongrav(A1, A2, A3, law)
+        if isinstance(epoch, Time) and epoch.scale == "utc" and np.all(epoch.jd * 2.0 % 1.0 == 0.0):
+            warnings.warn(
+                "epoch is in UTC; elements are published in TDB or TT, which is 69 s ahead in 2026: "
+                "Time(..., scale='tdb')",
+                FlybystabWarning,
+                stacklevel=2,
+            )
         return cls._from_si_elements(_epoch(epoch), (axis, ecc, *angles), push, name, covariance)
 
     @classmethod

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from flybystab.catalogues.asteroid import identity
 from flybystab.catalogues.catalogue import Asteroid, catalogue
-from flybystab.catalogues.formats import foreign, with_physical_data
+from flybystab.catalogues.completion import foreign, with_physical_data
 from flybystab.errors import InvalidInput
 
 

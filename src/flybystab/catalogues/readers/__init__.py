@@ -1,0 +1,120 @@
+"""Readers of catalogue and orbit files, one module per publisher, found by the content of a file.
+
+A module of this package registers a function with :func:`reader`; nothing else is edited to add a format.
+"""
+
+from __future__ import annotations
+
+import csv
+import gzip
+import importlib
+import io
+import pkgutil
+import zlib
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from flybystab.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from flybystab.orbit.covariance import Covariance
+
+    #: A catalogue row and the published covariance of its orbit, if there is one.
+    Entry = tuple[dict[str, str], Covariance | None]
+
+#: Frame and time scale of the elements of every row.
+FRAME = "heliocentric, ecliptic J2000, TDB"
+
+
+@dataclass(frozen=True)
+class Reader:
+    """A file format.
+
+    Attributes
+    ----------
+    name : str
+        Shown in messages.
+    identify : callable
+        Whether a text has this format; it must not raise.
+    read : callable
+        Rows of a text; the second argument is the name of the file.
+    """
+
+    name: str
+    identify: Callable[[str], bool]
+    read: Callable[[str, str], list[Entry]]
+
+
+READERS: dict[str, Reader] = {}
+
+_Read = Callable[[str, str], "list[Entry]"]
+
+
+def reader(name: str, identify: Callable[[str], bool]) -> Callable[[_Read], _Read]:
+    """Register the decorated function as the reader of a format."""
+
+    def register(read: _Read) -> _Read:
+        READERS[name] = Reader(name, identify, read)
+        return read
+
+    return register
+
+
+@lru_cache(maxsize=1)
+def _load() -> None:
+    for module in pkgutil.iter_modules(__path__):
+        importlib.import_module(f"{__name__}.{module.name}")
+
+
+def reader_of(text: str) -> Reader | None:
+    """The reader whose format a text has; None where no reader recognises it."""
+    _load()
+    return next((r for r in READERS.values() if r.identify(text)), None)
+
+
+def text_of(path: str | Path) -> str:
+    """Text of a file, decompressed if it is gzipped.
+
+    Raises
+    ------
+    InvalidInput
+        The file cannot be read, or is a binary SPK kernel.
+    """
+    try:
+        raw = Path(path).read_bytes()
+        if raw[:4] == b"DAF/":
+            raise InvalidInput(
+                "catalogue file",
+                path,
+                "a text file: SPK kernels are not read here; give one state to fs.Orbit.from_state",
+            )
+        return (gzip.decompress(raw) if raw[:2] == b"\x1f\x8b" else raw).decode("utf-8-sig")
+    except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
+        raise InvalidInput("catalogue file", path, f"a readable CSV file ({error})") from None
+
+
+def header_of(text: str) -> Sequence[str]:
+    """Column names of the first line of a CSV text."""
+    first = text.partition("\n")[0]
+    return [c.strip() for c in next(csv.reader([first]), [])]
+
+
+def rows_of(text: str, file: str) -> list[dict[str, str]]:
+    """Rows of a CSV text without surrounding spaces.
+
+    Raises
+    ------
+    InvalidInput
+        A row has another number of cells than the header.
+    """
+    table = csv.DictReader(io.StringIO(text, newline=""))
+    columns = list(table.fieldnames or [])
+    out = []
+    for line, row in enumerate(table, start=2):
+        if None in row or None in row.values():
+            raise InvalidInput("row", f"line {line} of {file}", f"{len(columns)} cells, as in the header")
+        out.append({k.strip(): v.strip() for k, v in row.items()})
+    return out

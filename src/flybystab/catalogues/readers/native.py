@@ -1,0 +1,32 @@
+"""CSV files with the columns of the embedded catalogue (``data/README.md``)."""
+
+from __future__ import annotations
+
+from difflib import get_close_matches
+from typing import TYPE_CHECKING
+
+from flybystab.catalogues.readers import header_of, rows_of
+from flybystab.catalogues.record import TEXTS, UNITS
+from flybystab.errors import InvalidInput, UnknownName
+
+if TYPE_CHECKING:
+    from flybystab.catalogues.readers import Entry
+
+
+def read_native(text: str, file: str) -> list[Entry]:
+    """Rows of a catalogue; the format that is assumed where no registered reader recognises the text.
+
+    Raises
+    ------
+    InvalidInput, UnknownName
+    """
+    columns = header_of(text)
+    known = (*TEXTS, *UNITS)
+    for c in columns:
+        if c not in known:
+            if ";" in c or "\t" in c:
+                raise InvalidInput("columns", c, f"commas between the columns of {file}")
+            raise UnknownName("column", c, get_close_matches(c, known, cutoff=0.6), f"(in {file})")
+    if not {"name", "designation", "number"} & set(columns):
+        raise InvalidInput("columns", columns, f"at least one of name, designation, number in {file}")
+    return [(row, None) for row in rows_of(text, file)]

@@ -1,0 +1,164 @@
+"""Orbit files as the agencies publish them, and what is read from them."""
+
+import gzip
+from pathlib import Path
+
+import astropy.units as u
+import numpy as np
+import pytest
+from astropy.time import Time
+
+import flybystab as fs
+from flybystab.catalogues import readers
+from flybystab.catalogues.catalogue import Asteroid, catalogue
+from flybystab.catalogues.designations import unpacked, unpacked_date
+from flybystab.errors import FlybystabWarning, InvalidInput
+
+FILES = Path(__file__).parent / "files"
+AU_KM = 149597870.7
+
+
+def closest(asteroid, start, stop, within):
+    """The first encounter with the Earth: JD (TDB) and distance, km."""
+    found = fs.find_encounters(
+        asteroid.orbit, Time(start, scale="tdb"), Time(stop, scale="tdb"), within=within * u.au
+    )
+    return found["time"][0].tdb.jd, found["distance"][0].to_value(u.km)
+
+
+def test_a_covariance_at_the_epoch_of_the_orbit_needs_no_elements_of_its_own():
+    (a,) = catalogue(FILES / "sbdb_covariance_same_epoch.json")
+    assert a.orbit.covariance.correlated
+    _, distance = closest(a, "2029-04-01", "2029-05-01", 0.05)
+    assert distance == pytest.approx(37724.5, abs=5.0)  # JPL, solution 199; one sigma is 232 km
+    (b,) = catalogue(FILES / "2001VB.json")
+    assert b.covariance is not None
+
+
+@pytest.mark.parametrize(
+    ("name", "parameters"), [("bennu_nocov", "AMRAT, RHO"), ("bennu_cov", "AMRAT, RHO"), ("67P", "DT")]
+)
+def test_parameters_that_are_not_modelled_are_refused_by_name(name, parameters):
+    with pytest.raises(InvalidInput, match=parameters):
+        catalogue(FILES / f"{name}.json")
+
+
+def test_an_unknown_parameter_is_refused(tmp_path):
+    path = tmp_path / "x.json"
+    path.write_text((FILES / "67P.json").read_text().replace('"DT"', '"XYZ"'))
+    with pytest.raises(InvalidInput, match="XYZ"):
+        catalogue(path)
+    path.write_text(
+        (FILES / "comets.csv").read_text().replace(".9806622092195985", ".98").replace("-12,,", "-12,,35")
+    )
+    with pytest.raises(InvalidInput, match="DT"):
+        catalogue(path)
+
+
+@pytest.mark.parametrize(
+    ("name", "row", "span", "au"),
+    [
+        ("321P", 3, ("2020-02-01", "2020-03-01"), 0.22665410843796),
+        ("249P", 1, ("2020-06-01", "2020-07-01"), 0.428991134008876),
+    ],
+)
+def test_comets_of_a_query_have_the_law_of_comets(name, row, span, au):
+    """JPL's close approaches; with an acceleration that falls as 1/r2 they are 18,800 and 430 km off."""
+    a = catalogue(FILES / "comets.csv")[row]
+    assert a.orbit.nongrav.law == "comet"
+    assert closest(a, *span, 0.5)[1] == pytest.approx(au * AU_KM, abs=10.0)
+
+
+def test_a_minor_planet_of_the_same_table_keeps_the_inverse_square():
+    assert catalogue(FILES / "comets.csv")[0].orbit.nongrav.law == "asteroid"
+
+
+@pytest.mark.parametrize(
+    ("row", "span", "truth"),
+    [
+        (1, ("2017-08-25", "2017-09-10"), 7066521.0),  # Florence
+        (2, ("2017-12-10", "2017-12-24"), 10312033.0),  # Phaethon
+    ],
+)
+def test_four_printed_digits_are_an_error_that_covers_the_truth(row, span, truth):
+    a = catalogue(FILES / "sbdb_query_results.csv")[row]
+    orbit = a.orbit
+    assert "digits" in orbit.covariance.caveat
+    nominal = closest(a, *span, 0.15)[1]
+    moved = [closest(clone, *span, 0.3)[1] for clone in orbit.clones(8, seed=1)]
+    assert abs(truth - nominal) < 3.0 * np.std(moved)
+
+
+def test_columns_of_a_query_that_define_an_orbit():
+    (a,) = catalogue(FILES / "no_pdes.csv")
+    (b,) = catalogue(FILES / "epoch_mjd.csv")
+    assert a.number == b.number == 3122
+    assert b.epoch.jd == 2459800.5
+    (c,) = catalogue(FILES / "q_tp.csv")
+    (d,) = catalogue(FILES / "sbdb_query.json")
+    for x in (c, d):
+        assert closest(x, "2020-01-01", "2020-02-01", 0.1)[1] == pytest.approx(13588539.1, abs=20.0)  # JPL
+
+
+@pytest.mark.parametrize(
+    "name", ["2023BU.ke0", "sbdb_covariance_same_epoch.json", "comets.csv", "apophis_2010.dat"]
+)
+def test_the_content_decides_not_the_suffix(tmp_path, name):
+    raw = (FILES / name).read_bytes()
+    rows = [a.row["a_au"] for a in catalogue(FILES / name)]
+    for other, data in (("x.txt", raw), ("X.JSON", raw), ("x.ke1", raw), ("x.csv.gz", gzip.compress(raw))):
+        (tmp_path / other).write_bytes(data)
+        assert [a.row["a_au"] for a in catalogue(tmp_path / other)] == rows
+
+
+def test_an_spk_kernel_is_named(tmp_path):
+    (tmp_path / "x.bsp").write_bytes(b"DAF/SPK \xa3")
+    with pytest.raises(InvalidInput, match="SPK"):
+        catalogue(tmp_path / "x.bsp")
+
+
+def test_mpcorb():
+    (a,) = catalogue(FILES / "apophis_2010.dat")
+    assert (a.number, a.name, a.epoch.jd) == (99942, "Apophis", 2455400.5)
+    assert closest(a, "2029-04-01", "2029-05-01", 0.05)[1] == pytest.approx(36001.0, abs=60.0)
+
+
+@pytest.mark.parametrize(
+    ("packed", "plain"),
+    [
+        ("K04M04N", "2004 MN4"),
+        ("J99R36Q", "1999 RQ36"),
+        ("K08T03C", "2008 TC3"),
+        ("~0K8Q", "697402"),
+        ("a0001", "360001"),
+        ("00433", "433"),
+        ("2004 MN4", "2004 MN4"),
+    ],
+)
+def test_packed_designations(packed, plain):
+    assert unpacked(packed) == plain
+
+
+def test_a_packed_designation_finds_an_asteroid():
+    assert Asteroid.from_catalogue("K04M04N").number == 99942
+    assert unpacked_date("K107N") == 2455400.5
+
+
+def test_an_epoch_of_elements_in_utc_warns():
+    elements = {"a": 0.92 * u.au, "e": 0.19, "M": 312.0 * u.deg} | dict.fromkeys(
+        ("i", "node", "peri"), 3.0 * u.deg
+    )
+    with pytest.warns(FlybystabWarning, match="UTC"):
+        fs.Orbit.from_elements(Time(2461000.5, format="jd"), **elements)
+
+
+def test_a_reader_is_one_registered_function(tmp_path, monkeypatch):
+    monkeypatch.setattr(readers, "READERS", dict(readers.READERS))
+    readers.reader_of("")  # loads the modules
+
+    @readers.reader("test", lambda text: text.startswith("MINE "))
+    def read(text, file):
+        return [({"name": text.split()[1]}, None)]
+
+    (tmp_path / "x.any").write_text("MINE Own")
+    assert [a.name for a in catalogue(tmp_path / "x.any")] == ["Own"]
