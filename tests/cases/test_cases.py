@@ -21,7 +21,10 @@ AU_KM = 149597870.7
 def closest(asteroid, start, stop, within):
     """The first encounter with the Earth: JD (TDB) and distance, km."""
     found = fs.find_encounters(
-        asteroid.orbit, Time(start, scale="tdb"), Time(stop, scale="tdb"), within=within * u.au
+        getattr(asteroid, "orbit", asteroid),
+        Time(start, scale="tdb"),
+        Time(stop, scale="tdb"),
+        within=within * u.au,
     )
     return found["time"][0].tdb.jd, found["distance"][0].to_value(u.km)
 

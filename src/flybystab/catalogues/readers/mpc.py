@@ -104,7 +104,7 @@ def read_mpcorb(text: str, file: str) -> list[Entry]:
         if not _MPCORB.match(line):
             raise InvalidInput("row", line[:40], f"the fixed columns of MPCORB in {file}")
         key = unpacked(line[:7].strip())
-        name = re.sub(r"^\(\d+\)", "", line[166:194]).strip()
+        name = re.sub(r"^\(\d+\)", "", line[166:194].strip()).strip()
         number = key if key.isdigit() else ""
         row = {
             "name": name or names_of(key)[0] or key,

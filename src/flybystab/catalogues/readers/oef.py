@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     from flybystab.orbit.covariance import Covariance
 
 
-@reader("OEF2.0", lambda text: text.lstrip().startswith("format") and "OEF2" in text[:200])
+@reader("OEF2.0", lambda text: bool(re.match(r"\s*(format\s*=.*OEF2|(KEP|EQU|CAR) )", text)))
 def read_oef(text: str, file: str) -> list[Entry]:
     """The orbit of an OEF2.0 file."""
     return [from_neocc(text, file)]
