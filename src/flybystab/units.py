@@ -58,11 +58,11 @@ def to_si(
         except (TypeError, ValueError):
             raise InvalidInput(name, value, "a number") from None
     if np.any(getattr(value, "mask", False)):
-        raise InvalidInput(name, value, "values that are there: some are masked (missing)")
+        raise InvalidInput(name, value, "values without gaps: some are masked (missing)")
     if np.iscomplexobj(value.value):
         raise InvalidInput(name, value, "real numbers")
     try:
-        # A copy: what the caller does to the array afterwards is not ours.
+        # A copy: later changes of the caller's array have no effect.
         array = np.array(value.to_value(unit), dtype=float)
     except u.UnitConversionError:
         raise UnitMismatch(name, value, f"a unit that converts to {unit}") from None
@@ -94,7 +94,7 @@ def whole(value: Any, name: str, least: int) -> int:
 
 
 def brief(value: Any, unit: u.UnitBase | None = None) -> str:
-    """A quantity in few characters, for the one line that an object says of itself: ``14030 km``, ``1 x 2 m``."""
+    """A quantity in few characters, for one-line descriptions of objects: ``14030 km``, ``1 x 2 m``."""
     quantity = value if unit is None else value.to(unit)
     numbers = " x ".join(f"{x:.0f}" if 1e4 <= abs(x) < 1e7 else f"{x:.4g}" for x in np.ravel(quantity.value))
     return f"{numbers} {quantity.unit.to_string()}".replace(" / ", "/").rstrip()

@@ -46,7 +46,7 @@ def attitude_matrix(attitude: Any) -> Array:
 
 
 def attitude_matrices(attitudes: Sequence[Any] | None, n: int) -> tuple[Array, NDArray[np.object_]]:
-    """Rotation matrices (n, 3, 3) of attitudes, and why those that are none are none."""
+    """Rotation matrices (n, 3, 3) of attitudes, and why each invalid one is invalid (empty if it is valid)."""
     out = np.broadcast_to(np.eye(3), (n, 3, 3)).copy()
     failures = np.full(n, "", dtype=object)
     if attitudes is None:

@@ -44,12 +44,12 @@ class EncounterDistribution:
         The row of :func:`flybystab.find_encounters` for the nominal orbit.
     clones : tuple of Orbit, length n
     found : ndarray of bool, shape (n,)
-        Clones that have a closest approach near this time; the others passed at another time or not at all,
-        and their rows below are nan.
+        Clones that have a closest approach near this time; the others passed at another time or not at all;
+        and their values below are nan.
     time_offset : Quantity, shape (n,)
         Closest approach after that of the nominal orbit.
     distance, v_inf : Quantity, shape (n,)
-        Distance between the centres (impacts: of the two-body orbit without a surface), speed far away.
+        Distance between the centres (impacts: of the two-body orbit without a surface), hyperbolic excess speed.
     b : Quantity, shape (n, 2)
         ``(B.T, B.R)``, :mod:`flybystab.orbit.target_plane`.
     position, velocity : Quantity, shape (n, 3)
@@ -57,7 +57,7 @@ class EncounterDistribution:
     impact : ndarray of bool, shape (n,)
         Surface or atmosphere reached.
     linear : LinearPlane or None
-        The linear map; None where a point at one sigma has no passage, or a bound one.
+        The linear map; None where a point at one sigma has no encounter, or is bound to the planet.
     source : str
         The covariance.
     correlated : bool
@@ -151,18 +151,18 @@ def encounter_distribution(
     n, seed : int
         Number of clones and seed: see :meth:`flybystab.Orbit.clones`.
     search : Quantity
-        How far from the time of the nominal passage those of the clones may be.
+        Largest time between the closest approaches of a clone and of the nominal orbit.
     within : Quantity, optional
-        Largest distance that counts as a passage; by default 20 Hill radii, at most 1 au.
+        Largest distance that counts as an encounter; by default 20 Hill radii, at most 1 au.
     ephemeris, tolerance, threads
         As in :func:`flybystab.find_encounters`.
 
     Raises
     ------
     NoEncounter
-        The nominal orbit has no passage there.
+        The nominal orbit has no encounter there.
     OutOfSpan
-        The ephemeris covers the passage or the epoch of the covariance not at all.
+        The ephemeris does not cover the encounter or the epoch of the covariance.
     InvalidInput, UnitMismatch, UnknownName
     """
     path = _path(orbit)
@@ -258,7 +258,7 @@ def clone_passages(
     tolerance: float = 1e-12,
     threads: int | None = None,
 ) -> tuple[Array, Array, Array]:
-    """The passages of some clones that belong to one of the nominal orbit, at `time`.
+    """The encounters of some clones that correspond to that of the nominal orbit at `time`.
 
     Other arguments as of :func:`encounter_distribution`, of which this is a part: the answer for a clone does not
     depend on the others.
@@ -266,7 +266,7 @@ def clone_passages(
     Returns
     -------
     time_offset, distance, v_inf : ndarray (n,)
-        s, m, m/s; nan for a clone without a passage there.
+        s, m, m/s; nan for a clone without an encounter there.
     """
     body = _planet(planet)
     reach = to_si(search, u.s, "search", low=0.0, open_low=True)
@@ -288,7 +288,7 @@ def clone_passages(
 def _distribution(
     orbit: Orbit, nominal: Any, clones: tuple[Orbit, ...], points: int, found: QTable, reach: float
 ) -> EncounterDistribution:
-    """The passages that belong to one of the nominal orbit; `found` has the clones, then the sigma points."""
+    """The encounters that correspond to one of the nominal orbit; `found` has the clones, then the sigma points."""
     covariance = orbit.covariance
     assert covariance is not None
     body = planet(str(nominal["planet"]))
@@ -314,7 +314,7 @@ def _distribution(
 
 
 def _belonging(found: QTable, body: Planet, time: Time, n: int, reach: float) -> Array:
-    """Of `n` orbits the passages that belong to the one at `time`, SI; nan without one.
+    """Encounters of `n` orbits that correspond to the one at `time`, SI; nan without one.
 
     Columns: time offset, distance, b_t, b_r, v_inf, impact, position and velocity.
     """
@@ -343,7 +343,7 @@ def _path(orbit: Any) -> Orbit:
 def add_clones(table: QTable, found: Sequence[EncounterDistribution | None]) -> None:
     """Add what clones say to a table of encounters, one distribution a row; None where there is no covariance.
 
-    Columns: ``clones`` (number), ``clones_found`` (with a passage near this time), ``distance_sigma``,
+    Columns: ``clones`` (number), ``clones_found`` (with an encounter near this time), ``distance_sigma``,
     ``distance_low``, ``distance_high`` (99.73 % of those found; km), ``time_sigma`` (s), ``b_major``,
     ``b_minor`` (km) and ``b_angle`` (deg from +T to +R) of the one-sigma ellipse, ``p_impact`` with its 95 %
     interval ``p_impact_low``, ``p_impact_high``, and ``p_impact_linear``. nan where fewer than two were found.

@@ -1,4 +1,4 @@
-"""One close passage of an asteroid by a planet, scripted or real: its path and the tide that it feels."""
+"""A close encounter of an asteroid with a planet, scripted or real: its path and its tide."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ class Track(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class Encounter:
-    """A close passage by one planet.
+    """A close encounter with one planet.
 
     Made by :meth:`hyperbolic` (scripted, frame ``"periapsis"``), from a real orbit (:meth:`from_orbit`, frame
     ``"ICRF"``) or from samples (:meth:`from_trajectory`).
@@ -207,7 +207,7 @@ class Encounter:
         Raises
         ------
         InvalidInput
-            For a bound passage, which has no target plane, or if the asymptote points north.
+            For a bound orbit, which has no target plane, or if the asymptote points north.
         """
         when = 0.0 if self.impact_time is None else min(0.0, self.impact_time)
         b, v_inf = target_plane(self.track.states(np.array([when])), self.planet.gm, north)

@@ -42,7 +42,7 @@ from flybystab.orbit.search.encounter_finder import starts_inside
 
 Array = NDArray[np.float64]
 
-#: Crossings of the surface within this time of a passage are its own, s.
+#: Crossings of the surface within this time of a closest approach belong to it, s.
 _OWN = 2.0 * HOUR
 
 
@@ -173,7 +173,7 @@ def followed(
 
 
 def _check_way(orbit: Orbit, body: Planet, window: Window, passage: _Passage, epoch: float) -> None:
-    """Raise NoEncounter if the asteroid hits the planet between its epoch and a passage."""
+    """Raise NoEncounter if the asteroid hits the planet between its epoch and a closest approach."""
     index = BODIES.index(body.name)
     found, _ = crossings(passage.log, window.head, window.data, window.gm, index, body.impact_distance, 8)
     low, high = sorted((epoch, passage.t))
@@ -263,7 +263,7 @@ def _around(
         0.25,
         0.125,
         0.0625,
-    ):  # a passage by the Moon on the way is narrower than the encounter
+    ):  # an encounter with the Moon on the way is shorter than that with the planet
         panels, miss = tide_panels(tide, t_in - zero, end - zero, tau, width=width)
         if miss < 1e-10:  # below lies the rounding of barycentric coordinates
             break

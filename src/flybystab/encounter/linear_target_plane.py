@@ -1,4 +1,4 @@
-"""A covariance mapped linearly to the target plane: its ellipse, and the share of it that hits the planet."""
+"""A covariance mapped linearly to the target plane: its ellipse and its impact probability."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class LinearPlane:
     distance_sigma, time_sigma : Quantity
         1-sigma of distance and time of closest approach, by the same map.
     impact_probability : float
-        Share of the normal law inside the capture radius of the nominal ``v_inf``.
+        Probability inside the capture radius of the nominal ``v_inf``.
     nonlinearity : float
         Largest deviation of the middle of a pair of one-sigma points from the nominal, over the longer
         semi-axis of the ellipse: the map, and the probability, hold while it is far below one.

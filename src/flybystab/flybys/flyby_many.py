@@ -42,7 +42,7 @@ def flyby_many(
     max_axis_ratio: float = 6.0,
     workers: int | None = None,
 ) -> FlybyTable:
-    """Carry bodies through encounters, row by row, on all cores.
+    """Follow bodies through encounters, one for each row, on all cores.
 
     Parameters
     ----------
@@ -61,8 +61,8 @@ def flyby_many(
     Raises
     ------
     InvalidInput
-        If the lengths differ, for something that is no body or no encounter, a tolerance out of [1e-13, 1e-3], or
-        workers that are no whole number above zero. An attitude that is no rotation costs its own row only.
+        If the lengths differ, for anything but bodies and encounters, a tolerance outside [1e-13, 1e-3], or
+        `workers` that is not a positive whole number. An invalid attitude or an unsettled body only fails its own row.
     """
     bodies, encounters = _all(Body, bodies, "bodies"), _all(Encounter, encounters, "encounters")
     attitudes = None if attitudes is None else _all(object, attitudes, "attitudes")

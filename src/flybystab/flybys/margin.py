@@ -1,4 +1,4 @@
-"""The stability margin of a flyby: what the encounter gives the body, held against the body's barrier.
+"""Stability margin of a flyby: the energy that the encounter gives the body against its energy barrier.
 
 A quick estimate from the rigid course alone: where the stress that rigidity needs passes the yield surface, the body
 slides (:mod:`flybystab.core.energy.newmark`), and the tide does work on it. A body with a barrier above that work
@@ -30,13 +30,13 @@ from flybystab.units import brief, to_si
 
 Array = NDArray[np.float64]
 
-#: What the margin foretells.
+#: Predicted outcomes.
 HOLDS, RECOVERS, RUNS_AWAY = "holds", "recovers", "runs away"
 
 
 @dataclass(frozen=True, eq=False)
 class FlybyMargin:
-    """What an encounter gives a body, and what the body stands.
+    """Energy given by an encounter, and the energy barrier of the body.
 
     Attributes
     ----------

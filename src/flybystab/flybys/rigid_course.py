@@ -1,6 +1,6 @@
 """The rigid course of a body through an encounter: its attitude, spin and tide at every instant.
 
-What the surface feels and what the tide could do to a body that friction holds both follow from it.
+Surface slopes and the stability margin of a flyby follow from it.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ class Course:
 def rigid_course(
     body: Body, encounter: Encounter, attitude: Any = None, *, tolerance: float = 1e-10
 ) -> Course:
-    """The course of a body that does not yield.
+    """Course of a body that stays rigid.
 
     Parameters
     ----------

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 class SpinStates(Protocol):
-    """What a catalogue knows of a spin: bodies and attitudes by phase (:class:`flybystab.Asteroid`)."""
+    """Spin state of a catalogue entry: bodies and attitudes by phase (:class:`flybystab.Asteroid`)."""
 
     @property
     def pole(self) -> Array | None:

@@ -1,4 +1,4 @@
-"""From the uncertainty of an orbit to the odds of what becomes of the body."""
+"""Probability of survival of a body whose orbit is uncertain."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from flybystab.flybys.verdict import Verdict
 from flybystab.tabular import Tabular
 from flybystab.units import counted
 
-#: Verdicts after which there still is one body, all of it.
+#: Verdicts that leave one body with all of its mass.
 SURVIVES = (Verdict.INTACT, Verdict.RESHAPED)
 
 
@@ -55,7 +55,7 @@ class Survival(Tabular):
         return len(self.verdict)
 
     def probability(self, *verdicts: str, level: float = 0.95) -> tuple[float, float, float]:
-        """Share of these verdicts (by default: survives, whole) and its Clopper-Pearson interval.
+        """Fraction of these verdicts (by default INTACT and RESHAPED) and its Clopper-Pearson interval.
 
         Clones and attitudes are drawn together, so that the samples are independent and the interval is that
         of a binomial law. Samples that failed count against it at the lower end and for it at the upper.
@@ -75,8 +75,8 @@ class Survival(Tabular):
 
     def __repr__(self) -> str:
         p, low, high = self.probability()
-        odds = f"survives with {p:.4g} ({low:.3g} to {high:.3g})"
-        return f"<Survival {len(self)} clones: {counted(self.verdict)}; {odds}>"
+        chance = f"survives with {p:.4g} ({low:.3g} to {high:.3g})"
+        return f"<Survival {len(self)} clones: {counted(self.verdict)}; {chance}>"
 
 
 def survival(
@@ -90,7 +90,7 @@ def survival(
     workers: int | None = None,
     quick: bool = True,
 ) -> Survival:
-    """Odds of the verdicts on a body whose orbit is uncertain.
+    """Probabilities of the verdicts on a body whose orbit is uncertain.
 
     Each clone meets the planet on its own two-body path through closest approach (which has the tide of the
     real one to about 1e-4 of its peak near the planet), with the body at an attitude of its own. Where a bound on the

@@ -72,7 +72,7 @@ def class_of(bound: float) -> MassClass:
 
 
 def bound_fraction(shape: Array, velocity_gradient: Array, density: float) -> float:
-    """Share of the mass that is gravitationally bound to a homogeneous ellipsoid with velocity ``L x``.
+    """Mass fraction gravitationally bound to a homogeneous ellipsoid with velocity ``L x``.
 
     A point is bound if ``|L x|^2/2 < pi G rho (A_0 - sum A_i x_i^2)``. With ``x = F xi``, ``F F^T = S``, that
     is ``xi^T [(L F)^T (L F)/2 + pi G rho diag(A_i a_i^2)] xi < pi G rho A_0`` on the unit ball, and the share
