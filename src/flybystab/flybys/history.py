@@ -78,7 +78,7 @@ class FlybyError:
     Attributes
     ----------
     semi_axes, spin, bound_fraction : float
-        Largest relative difference of the semi-axes, of the spin vector, absolute difference of the bound mass fraction.
+        Largest relative difference of the semi-axes and of the spin vector; absolute one of the bound fraction.
     required_friction_angle, event_times : Quantity
         Absolute differences; nan if the two runs have different events.
     verdict_agrees : bool
