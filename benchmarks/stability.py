@@ -131,7 +131,7 @@ def minima() -> None:
                 spin = np.array([0.0, 0.0, np.sqrt(w2)])
                 given = (*np.square(axes), spin, code, np.deg2rad(40.0), 0.0, dilatancy, 0.0)
                 b = pile(*given)
-                classify(*given, 5, row, found)
+                classify(*given[:7], *given[6:], 5, row, found)
                 ours = row[[columns.ENERGY_2, columns.ENERGY_3, columns.ENERGY_B]]
                 if row[columns.LEVEL] < 1:
                     print(f"{name:>22} {surface:>25} {dilatancy:9.1f}   does not stand with this friction")

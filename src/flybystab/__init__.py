@@ -40,6 +40,7 @@ _HOME = {
     "flyby_margin": "flybys.margin",
     "infer": "screening.inference",
     "periapsis_axes": "encounter.attitude",
+    "recovery": "body.recovery",
     "screen": "screening.screening",
     "spin_sample": "flybys.spin_sample",
     "stability": "body.stability",
@@ -52,6 +53,7 @@ __all__ = ["__version__", *_HOME]
 if TYPE_CHECKING:
     from flybystab.body.body import Body, Material
     from flybystab.body.equilibrium import equilibrium
+    from flybystab.body.recovery import recovery
     from flybystab.body.shape import Shape
     from flybystab.body.stability import stability
     from flybystab.catalogues.asteroid import Asteroid

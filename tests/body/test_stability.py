@@ -9,7 +9,9 @@ from scipy.optimize import minimize
 from flybystab.body.body import YIELD_SURFACES, Body, Material
 from flybystab.body.equilibrium import equilibrium, spin_limits
 from flybystab.body.fluids import maclaurin
+from flybystab.body.recovery import pushed
 from flybystab.body.stability import body_units, push, stability
+from flybystab.body.stability_regions import stability_many
 from flybystab.constants import G
 from flybystab.core.ellipsoid.tide import components, tensor
 from flybystab.core.energy import stability_row as columns
@@ -88,8 +90,8 @@ def test_trust_region_is_the_global_minimum(ball):
 CASES = [
     {"axes": (1, 1, 1), "spin": (0, 0, 0.63)},
     {"axes": (1, 0.8, 0.7), "spin": (0, 0, 0.45)},
-    {"axes": (1, 0.8, 0.7), "spin": (0, 0, 0.91), "dilatancy": 0.0},
-    {"axes": (1, 0.8, 0.7), "spin": (0, 0, 0.9), "dilatancy": 0.5},
+    {"axes": (1, 0.8, 0.7), "spin": (0, 0, 0.91), "dilatancy": 0.0, "kappa": 0.1},
+    {"axes": (1, 0.8, 0.7), "spin": (0, 0, 0.9), "dilatancy": 0.5, "kappa": 0.2},
     {"axes": (1, 1, 0.6), "spin": (0, 0, 0.9), "phi": 36.0},
     {"axes": (1, 0.5, 0.4), "spin": (0, 0, 0.6), "cohesion": 0.05},
     {"axes": (1, 0.6, 0.55), "spin": (0.3, 0.1, 0.4)},  # tumbling
@@ -142,7 +144,7 @@ def test_no_second_search_goes_below_the_minima(code, dilatancy):
     given = (1.96, 0.7225, 0.5625), np.array([0.0, 0.0, 0.449]), code, np.deg2rad(40.0), 0.0, dilatancy, 0.0
     b = pile(*given[0], *given[1:])
     row, found = np.empty(columns.COLUMNS), np.empty((columns.DIRECTIONS, 5))
-    classify(*given[0], *given[1:], 5, row, found)
+    classify(*given[0], *given[1:5], given[4], *given[5:], 5, row, found)
     samples = directions(2000, seed=7, ball=dilatancy == 1.0)
     for order, column in ((SECOND, columns.ENERGY_2), (THIRD, columns.ENERGY_3), (BARRIER, columns.ENERGY_B)):
 
@@ -173,7 +175,7 @@ def test_powers_are_the_derivatives_of_the_loss_along_the_path(code, dilatancy):
     b = scene((1, 0.7, 0.5), phi=33, dilatancy=dilatancy, code=code, cohesion=0.02, kappa=kappa)
     h = 0.02
     for x in directions(6, seed=4):
-        v = np.array([loss_at(b, x, k * h) for k in range(-4, 5)])
+        v = np.array([loss_at(b, x, k * h, np.bool_(True)) for k in range(-4, 5)])
         first = v @ [1 / 280, -4 / 105, 1 / 5, -4 / 5, 0, 4 / 5, -1 / 5, 4 / 105, -1 / 280] / h
         second = v @ [-1 / 560, 8 / 315, -1 / 5, 8 / 5, -205 / 72, 8 / 5, -1 / 5, 8 / 315, -1 / 560] / h**2
         third = v @ [-7 / 240, 3 / 10, -169 / 120, 61 / 30, 0, -61 / 30, 169 / 120, -3 / 10, 7 / 240] / h**3
@@ -232,7 +234,7 @@ def test_critical_energy_falls_as_spin_rises_and_friction_falls():
     assert np.all(np.diff(by_friction) < 0)
 
 
-def test_kappa_has_no_say_under_associative_flow():
+def test_kappa_has_no_effect_under_associative_flow():
     free, stiff = (stability(body((1, 0.8, 0.7), bulk_modulus=k)) for k in (None, 1e6 * u.Pa))
     assert free.critical_energy == stiff.critical_energy
     assert stiff.kappa_crit is None
@@ -293,13 +295,17 @@ def test_critical_momentum_spins_the_body_to_its_limit():
     assert np.isnan(tumbling.critical_momentum).all()
 
 
-def test_expanding_alike_for_ever_costs_the_whole_energy():
+def test_uniform_dilation_ends_and_leads_nowhere():
+    """The dilation fades at V/V0 = 1.5, as in the dynamics: the apex alone (pure dilation) disperses no body."""
     b = scene((1, 0.9, 0.8), (0, 0, 0.3))
-    lost, strain = barrier(b, np.zeros(5), LONGEST, np.inf)  # the apex: pure dilation
-    assert np.isinf(strain)
+    assert barrier(b, np.zeros(5), LONGEST, np.inf) == (np.inf, np.inf)
+    # and the loss tends to what that volume costs
     momentum = MASS / 5 * (b.s.sum() - b.s[2]) * 0.3
-    phi = energy(np.array([*b.s, 0, 0, 0]), np.array([0, 0, momentum]))
-    assert lost == pytest.approx(-phi, rel=1e-12)
+    largest = np.array([*(b.s * 1.5 ** (2 / 3)), 0, 0, 0])
+    cost = energy(largest, np.array([0, 0, momentum])) - energy(
+        np.array([*b.s, 0, 0, 0]), np.array([0, 0, momentum])
+    )
+    assert loss_at(b, np.zeros(5), 10.0, np.bool_(True)) == pytest.approx(cost, rel=1e-2)
 
 
 def test_barrier_ends_at_a_maximum_or_at_the_edge_of_the_model():
@@ -338,11 +344,14 @@ def test_softening_never_takes_the_pressure_below_that_of_the_apex(kappa):
     pressure = np.maximum(b.pressure - kappa * beta * grid, -apex)
     power = MASS * np.exp(beta * grid) * ((k - beta) * pressure + k * apex)
     work = np.concatenate([[0], np.cumsum(0.5 * (power[1:] + power[:-1])) * grid[1]])
-    frictionless = scene((1, 0.8, 0.7), dilatancy=0.5, kappa=0.0)
-    for t in (0.1, 0.45, 0.8):
+    constant = scene((1, 0.8, 0.7), dilatancy=0.5, kappa=1e-12)
+    for t in (0.1, 0.45, 0.7):  # before the dilation fades
         i = np.searchsorted(grid, t - 1e-9)
-        phi = loss_at(frictionless, x, t) - MASS * (k - beta) * b.pressure * np.expm1(beta * t) / beta
-        assert loss_at(b, x, t) == pytest.approx(phi + work[i], rel=1e-6)
+        phi = (
+            loss_at(constant, x, t, np.bool_(True))
+            - MASS * (k - beta) * b.pressure * np.expm1(beta * t) / beta
+        )
+        assert loss_at(b, x, t, np.bool_(True)) == pytest.approx(phi + work[i], rel=1e-6)
 
 
 def test_push_reports_its_loss_to_each_order():
@@ -363,6 +372,59 @@ def test_bad_input_is_named():
         stability("Apophis")
     with pytest.raises(InvalidInput, match="dilatancy"):
         stability(body((1, 0.8, 0.7)), dilatancy=1.5)
+
+
+def test_bodies_at_yield_that_flow_on_are_not_stable_to_infinitesimal_perturbations():
+    """Axes 1 : .691 : .155, w2 = .254, exactly the friction that it needs: the dynamics carry it far away."""
+    b = body((1, 0.691, 0.155), 0.254, yield_surface="drucker-prager")
+    enough = equilibrium(b).required_friction_angle * (1 + 1e-9)
+    b = b.with_(material=b.material.with_(friction_angle=enough))
+    for dilatancy in (0.0, 0.3, 0.6, 0.9, 1.0):
+        s = stability(b, dilatancy=dilatancy)
+        assert s.admissible
+        assert not s.stable_infinitesimal
+        assert pushed(b, np.diag([1, 0.2, -1.2]), 1e-9 * s.binding_energy, dilatancy=dilatancy).strain > 0.1
+    firm = b.with_(material=b.material.with_(friction_angle=enough + 8 * u.deg))
+    assert stability(firm, dilatancy=0.0).stable_infinitesimal
+
+
+@pytest.mark.parametrize("surface", YIELD_SURFACES)
+def test_stability_at_yield_is_that_of_the_dynamics_over_the_plane(surface):
+    """Random shapes and spins with exactly the friction that they need, and a perturbation of 1e-9."""
+    rng = np.random.default_rng(5)
+    seen = set()
+    for _ in range(60):
+        a3, a2 = np.sort(rng.uniform(0.15, 1.0, 2))
+        b = body((1, a2, a3), rng.uniform(0, 0.9), yield_surface=surface)
+        required = equilibrium(b).required_friction_angle
+        if not 1 * u.deg < required < 50 * u.deg:
+            continue
+        b = b.with_(material=b.material.with_(friction_angle=required * (1 + 1e-10)))
+        dilatancy = rng.choice([0.0, 0.3, 0.6, 0.9])
+        s = stability(b, dilatancy=dilatancy)
+        d = rng.standard_normal((3, 3))
+        r = pushed(b, d + d.T, 1e-9 * s.binding_energy, dilatancy=dilatancy)
+        flows_on = not r.recovered or r.strain > 3e-3
+        assert s.stable_infinitesimal != flows_on
+        seen.add(flows_on)
+    assert False in seen
+
+
+def test_brittle_cohesion_is_lost_in_flow():
+    """The body needs its cohesion to stand: one that loses it at yield does not survive the least perturbation."""
+    fast = body((1, 0.8, 0.7), 1.4, cohesion=200 * u.Pa)
+    tough, brittle = fast, fast.with_(material=fast.material.with_(brittle=True))
+    assert stability(tough).stable_infinitesimal
+    s = stability(brittle)
+    assert s.admissible
+    assert not s.stable_infinitesimal
+    assert s.critical_energy.barrier.value == 0.0
+    assert stability_many([brittle, tough], depth="second").level.tolist()[0] == 1
+    slow = body((1, 0.8, 0.7), 0.3, cohesion=200 * u.Pa)
+    lost = stability(slow.with_(material=slow.material.with_(brittle=True)))
+    none = stability(slow.with_(material=slow.material.with_(cohesion=0 * u.Pa)))
+    assert lost.critical_energy.barrier.value == pytest.approx(none.critical_energy.barrier.value, rel=1e-9)
+    assert lost.critical_energy.barrier < stability(slow).critical_energy.barrier
 
 
 def test_units_of_a_body():

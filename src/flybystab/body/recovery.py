@@ -1,8 +1,9 @@
-"""What a push does to a free body, by the full dynamics: the judge of the energy criterion.
+"""Recovery of a free body from a perturbation, by the full dynamics: the reference for the energy criterion.
 
-A push is a velocity gradient in the frame without relative angular momentum (``L I`` symmetric, theory.md, section
-5), on top of the spin: it adds kinetic energy and no angular momentum. The body then flows, by the dynamics that carry
-it through encounters, until it comes to rest, disperses or passes the axis ratio at which the model ends.
+A perturbation is a velocity gradient in the frame without relative angular momentum (``L I`` symmetric, theory,
+section 5), added to the spin: it adds kinetic energy and no angular momentum. The body then flows, by the equations
+that are integrated through encounters, until it is at rest, disperses or passes the axis ratio at which the model
+ends. A deforming body is at yield: brittle cohesion is lost at once.
 """
 
 from __future__ import annotations
@@ -16,34 +17,35 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.body.body import Body, check_body
+from flybystab.body.equilibrium import equilibrium
 from flybystab.body.stability import unit_deviator
 from flybystab.constants import G
 from flybystab.core.dynamics.run import Passage, passage
-from flybystab.core.ellipsoid.tide import components, no_tide
-from flybystab.core.energy.perturbation import EDGE
+from flybystab.core.ellipsoid.tide import components, no_tide, tensor
+from flybystab.core.energy.perturbation import EDGE, pile, rate_of_strain, slope_of_flow
+from flybystab.core.energy.perturbation import direction as strain_direction
 from flybystab.core.energy.potential import velocity_gradient
-from flybystab.core.material.yield_surface import least_slope
-from flybystab.errors import NotConverged
+from flybystab.errors import InvalidInput, NotConverged
 from flybystab.units import to_si
 
 Array = NDArray[np.float64]
 
-#: How long a pushed body is followed, in dynamical times: a body at rest may tumble and yield anew.
+#: How long a perturbed body is followed, in dynamical times: a body at rest may tumble and yield anew.
 PATIENCE = 100.0
 
 
 @dataclass(frozen=True, eq=False)
 class Recovery:
-    """What became of a pushed body.
+    """End of the motion of a perturbed body.
 
     Attributes
     ----------
     recovered : bool
         Whether it is at rest again, inside the model.
     ending : str
-        "rest", "beyond model" (axis ratio past 6:1), "dispersed" or "moving" (still, after 100 dynamical times).
+        "rest", "beyond model" (axis ratio past 6:1), "dispersed" or "moving" (after 100 dynamical times).
     time : Quantity
-        Until it came to rest for the last time, or until the end of the run, s.
+        Until the last arrest, or until the end of the run, s.
     semi_axes : Quantity (3,)
         At the end, longest first, m.
     strain : float
@@ -60,16 +62,16 @@ class Recovery:
 def pushed(
     body: Body, direction: Any, energy: Quantity, *, dilatancy: float | None = None, tolerance: float = 1e-7
 ) -> Recovery:
-    """Push a free body once, and wait.
+    """Motion of a free body after one perturbation.
 
     Parameters
     ----------
     body : Body
-        It must stand before the push.
+        In admissible equilibrium.
     direction : array_like, shape (3, 3)
         Symmetric rate of strain in body axes. Only its deviator counts; its trace follows from the dilatancy.
     energy : Quantity
-        Kinetic energy of the push, J.
+        Kinetic energy of the perturbation, J.
     dilatancy : float, optional
         ``beta/min k``; the material's own by default.
     tolerance : float
@@ -99,7 +101,7 @@ def recovery_energy(
     high: float = 2.0,
     precision: float = 0.01,
 ) -> Quantity:
-    """Energy of a push beyond which a body does not come to rest inside the model, by bisection.
+    """Energy of a perturbation in one direction beyond which a body does not come to rest inside the model.
 
     Parameters
     ----------
@@ -113,11 +115,11 @@ def recovery_energy(
     Returns
     -------
     Quantity
-        J; zero if the least push of the bracket is too much, inf if the largest is not.
+        J; zero if the least energy of the bracket is too large, inf if the largest is not.
 
     Notes
     -----
-    Outcomes need not be in order: a stronger push may come to rest where a weaker one did not. One change is found.
+    Found by bisection. Recovery need not be monotonic in the energy: one change is found.
     """
     beta = _dilatancy(body, dilatancy)
     unit = 0.6 * G * body.mass.value**2 / float(np.cbrt(np.prod(body.axes)))
@@ -138,6 +140,189 @@ def recovery_energy(
     return float(np.sqrt(low * high)) * unit * u.J
 
 
+@dataclass(frozen=True, eq=False)
+class RecoveryLimit:
+    """Least energy of a perturbation from which a body does not recover, over its directions.
+
+    Attributes
+    ----------
+    energy : Quantity
+        Least over all searches, J; zero if the smallest perturbation tried is too large, inf if the largest is not.
+    error : float
+        Sampling error: largest over least energy of the independent searches, less one; inf where only some of them
+        found a direction without recovery. Bisection adds `precision`.
+    direction : ndarray, shape (3, 3)
+        Rate of strain in body axes, ``|D'| = 1``, that has it; nan where there is none.
+    searches : Quantity, shape (n,)
+        Least energy of each independent search, J.
+    precision : float
+        Relative, of the bisection.
+    binding_energy : Quantity
+        ``(3/5) G m^2/a`` of the sphere of the same mean radius ``a``, J, for scale.
+    runs : int
+        Integrations of the dynamics.
+    """
+
+    energy: Quantity
+    error: float
+    direction: Array
+    searches: Quantity
+    precision: float
+    binding_energy: Quantity
+    runs: int
+
+    def __repr__(self) -> str:
+        if not np.isfinite(self.energy):
+            return f"<RecoveryLimit no loss found up to the largest energy tried; {self.runs} runs>"
+        share = float(self.energy / self.binding_energy)
+        return f"<RecoveryLimit {share:.3g} of the binding energy, sampling error {self.error:.2g}; {self.runs} runs>"
+
+
+def recovery(
+    body: Body,
+    *,
+    dilatancy: float | None = None,
+    directions: int = 24,
+    refinements: int = 24,
+    searches: int = 3,
+    precision: float = 0.05,
+    low: float = 1e-8,
+    high: float = 2.0,
+    largest_strain: float | None = None,
+    seed: int = 0,
+) -> RecoveryLimit:
+    """Least energy of a perturbation from which a body does not recover, by the full dynamics.
+
+    Parameters
+    ----------
+    body : Body
+        In admissible equilibrium.
+    dilatancy : float, optional
+        ``beta/min k``; the material's own by default.
+    directions, refinements : int
+        Random directions of strain of each search, and random steps, ever shorter, from the best of them.
+    searches : int
+        Independent searches, at least 2: their differences are the sampling error.
+    precision : float
+        Relative, of the energy in one direction.
+    low, high : float
+        Bracket, in binding energies of the sphere of the same mean radius.
+    largest_strain : float, optional
+        A body that is at rest after a larger change of the logarithms of its semi-axes counts as lost too. None: any
+        shape inside the model.
+    seed : int
+        Of the random directions.
+
+    Returns
+    -------
+    RecoveryLimit
+
+    Raises
+    ------
+    InvalidInput
+        A body that is not in equilibrium, an argument out of range.
+    NotConverged
+        The integration stopped.
+
+    Notes
+    -----
+    A direction is bisected only where the body is lost at the least energy known by then less the precision: most
+    cost one run. The result is the least over the directions tried, an upper bound of the least over all.
+    """
+    beta = _dilatancy(body, dilatancy)
+    if not equilibrium(body).admissible:
+        raise InvalidInput("body", body, "a body in admissible equilibrium")
+    for name, value, least in (
+        ("directions", directions, 1),
+        ("refinements", refinements, 0),
+        ("searches", searches, 2),
+    ):
+        if not (isinstance(value, int | np.integer) and value >= least):
+            raise InvalidInput(name, value, f"an integer of at least {least}")
+    if not 0.0 < precision < 1.0:
+        raise InvalidInput("precision", precision, "a number between 0 and 1")
+    if not 0.0 < low < high:
+        raise InvalidInput("low", low, "a positive number below high")
+    search = _Search(body, beta, precision, low, high, np.inf if largest_strain is None else largest_strain)
+    found = [search.least(np.random.default_rng([seed, i]), directions, refinements) for i in range(searches)]
+    energies = np.array([e for e, _ in found])
+    best = int(np.argmin(energies))
+    least = float(energies[best])
+    error = float(energies.max() / least - 1.0) if least > 0.0 else 0.0
+    if not np.isfinite(least):
+        error = 0.0
+    return RecoveryLimit(
+        energy=least * search.unit * u.J,
+        error=error,
+        direction=found[best][1],
+        searches=energies * search.unit * u.J,
+        precision=precision,
+        binding_energy=search.unit * u.J,
+        runs=search.runs,
+    )
+
+
+class _Search:
+    """Searches over the directions of a perturbation; energies in units of :attr:`unit`."""
+
+    def __init__(
+        self, body: Body, beta: float, precision: float, low: float, high: float, largest_strain: float
+    ) -> None:
+        self.body, self.beta, self.precision = body, beta, precision
+        self.low, self.high, self.largest_strain = low, high, largest_strain
+        self.unit = 0.6 * G * body.mass.value**2 / float(np.cbrt(np.prod(body.axes)))
+        self.runs = 0
+
+    def recovers(self, direction: Array, energy: float) -> bool:
+        """Whether the body is at rest inside the model, and not strained too much, after a perturbation."""
+        self.runs += 1
+        r = _recovery(self.body, _push(self.body, direction, energy * self.unit, self.beta, 1e-6))
+        return r.recovered and r.strain <= self.largest_strain
+
+    def threshold(self, direction: Array, lost: float) -> float:
+        """Least energy of a loss in a direction, given one, by bisection of its logarithm."""
+        low = lost
+        while low > self.low:  # down by factors first: the threshold is mostly near
+            low = max(self.low, low / 3.0)
+            if self.recovers(direction, low):
+                break
+            lost = low
+        else:
+            return 0.0
+        while lost > low * (1.0 + self.precision):
+            middle = float(np.sqrt(low * lost))
+            if self.recovers(direction, middle):
+                low = middle
+            else:
+                lost = middle
+        return lost
+
+    def least(self, rng: np.random.Generator, directions: int, refinements: int) -> tuple[float, Array]:
+        """Least threshold over random directions and steps from the best one, with its direction."""
+        best, x = np.inf, np.full(5, np.nan)
+        for i in range(directions + refinements):
+            if i < directions:
+                y = rng.standard_normal(5)
+            elif best in (0.0, np.inf):
+                break
+            else:
+                y = x + 0.5 * 0.9 ** (i - directions) * rng.standard_normal(5)
+            y = y / np.linalg.norm(y)
+            energy = min(self.high, best * (1.0 - self.precision))
+            if not self.recovers(_deviator(y), energy):
+                best, x = self.threshold(_deviator(y), energy), y
+                if best == 0.0:
+                    break
+        return best, _deviator(x)
+
+
+def _deviator(x: Array) -> Array:
+    """Deviator (3, 3) with the components ``x[5]`` in an orthonormal basis."""
+    d = np.empty(6)
+    rate_of_strain(x, 0.0, d)
+    return tensor(d)
+
+
 def _dilatancy(body: Body, dilatancy: float | None) -> float:
     check_body(body)
     own = body.material.dilatancy if dilatancy is None else dilatancy
@@ -147,8 +332,11 @@ def _dilatancy(body: Body, dilatancy: float | None) -> float:
 def _push(body: Body, direction: Any, energy: float, dilatancy: float, tolerance: float) -> Passage:
     d = unit_deviator(direction)
     m = body.material
-    beta = dilatancy * least_slope(m.surface_code, np.sin(m.phi))
     squares = body.axes**2
+    scene = pile(*squares, np.zeros(3), m.surface_code, m.phi, 0.0, dilatancy, 0.0)
+    x = np.empty(5)
+    strain_direction(components(d), x)
+    _, beta = slope_of_flow(scene, x)  # tr D of the flow rule at |D'| = 1
     gradient = np.empty((3, 3))
     velocity_gradient(squares[0], squares[1], squares[2], components(d + beta / 3.0 * np.eye(3)), gradient)
     # K = tr(L I L^T)/2 with I = (m/5) S
@@ -163,7 +351,7 @@ def _push(body: Body, direction: Any, energy: float, dilatancy: float, tolerance
         PATIENCE * body.dynamical_time,
         no_tide(),
         phi=m.phi,
-        cohesion=m.c_pa,
+        cohesion=0.0 if m.brittle and energy > 0.0 else m.c_pa,
         dilatancy=dilatancy,
         surface=m.surface_code,
         brittle=m.brittle,
@@ -175,7 +363,7 @@ def _push(body: Body, direction: Any, energy: float, dilatancy: float, tolerance
 
 def _recovery(body: Body, run: Passage) -> Recovery:
     if run.reason == "stuck":
-        raise NotConverged(f"the pushed body could not be followed beyond {run.time:.1f} s ({run.regime})")
+        raise NotConverged(f"the perturbed body could not be followed beyond {run.time:.1f} s ({run.regime})")
     axes = np.sqrt(np.linalg.eigvalsh(run.shape)[::-1])
     if run.reason == "beyond model":
         ending = "beyond model"

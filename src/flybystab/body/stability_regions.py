@@ -18,7 +18,7 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.body.body import DEFAULT_SURFACE, YIELD_SURFACES, Body
-from flybystab.body.stability import LEVELS
+from flybystab.body.stability import LEVELS, flow_cohesion
 from flybystab.constants import G
 from flybystab.core.ellipsoid.potential import carlson_fd
 from flybystab.core.energy import stability_row as columns
@@ -126,6 +126,7 @@ def stability_many(
         YIELD_SURFACES.index(surfaces.pop()),
         np.broadcast_to(phi, rho.shape),
         np.array([b.material.c_pa for b in bodies]) / stress,
+        np.array([flow_cohesion(b) for b in bodies]) / stress,
         np.array([0.0 if k is None else k.to_value(u.Pa) for k in moduli]) / stress,
         dilatancy,
         depth,
@@ -188,6 +189,7 @@ def stability_map(
         YIELD_SURFACES.index(yield_surface),
         np.full(n, phi),
         np.full(n, float(cohesion)),
+        np.full(n, float(cohesion)),
         np.zeros(n),
         dilatancy,
         depth,
@@ -205,6 +207,7 @@ def _rows(
     code: int,
     phi: Array,
     cohesion: Array,
+    in_flow: Array,
     kappa: Array,
     dilatancy: float,
     depth: str,
@@ -220,12 +223,14 @@ def _rows(
     out = np.empty((n, columns.COLUMNS))
     # Small interleaved chunks: neighbouring cells of a map cost alike, distant ones do not.
     size = max(1, min(512, -(-n // (8 * cores))))
-    contiguous = [np.ascontiguousarray(v) for v in (s, spin, phi, cohesion, kappa)]
+    contiguous = [np.ascontiguousarray(v) for v in (s, spin, phi, cohesion, in_flow, kappa)]
 
     def work(start: int) -> None:
         part = slice(start, start + size)
-        s_, spin_, phi_, cohesion_, kappa_ = (v[part] for v in contiguous)
-        classify_many(s_, spin_, code, phi_, cohesion_, beta, kappa_, DEPTHS.index(depth), out[part])
+        s_, spin_, phi_, cohesion_, in_flow_, kappa_ = (v[part] for v in contiguous)
+        classify_many(
+            s_, spin_, code, phi_, cohesion_, in_flow_, beta, kappa_, DEPTHS.index(depth), out[part]
+        )
 
     with ThreadPoolExecutor(cores) as pool:
         list(pool.map(work, range(0, n, size)))

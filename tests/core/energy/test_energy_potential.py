@@ -17,6 +17,7 @@ from flybystab.core.energy.potential import (
     energy_along,
     energy_derivatives,
     path_frame,
+    principal_axes,
     velocity_gradient,
 )
 from flybystab.core.numerics.tensors import unpack
@@ -125,17 +126,18 @@ def test_path_of_constant_gradient_and_its_slope():
     s = squared((1, 0.8, 0.6))
     rng = np.random.default_rng(3)
     rates, frame, gradient = np.empty(3), np.empty((3, 3)), np.empty((3, 3))
-    shape, rate, momentum = np.empty(6), np.empty(6), moments(s) * rng.standard_normal(3)
+    axes, momentum = principal_axes(), moments(s) * rng.standard_normal(3)
+    shape = axes.shape
     for _ in range(10):
         d = rng.standard_normal(6)
         path_frame(*s, d, rates, frame)
         velocity_gradient(*s, d, gradient)
-        phi, slope, ratio2 = energy_along(rates, frame, momentum, 0.3, shape, rate)
+        phi, slope, ratio2 = energy_along(rates, frame, momentum, 0.3, 1.0, 0.0, axes)
         assert shape == pytest.approx(components(expm(0.6 * gradient) @ np.diag(s)), rel=1e-12, abs=1e-12)
         assert phi == pytest.approx(energy(shape, momentum), rel=1e-13)
         squares = np.linalg.eigvalsh(tensor(shape))
         assert ratio2 == pytest.approx(squares[-1] / squares[0], rel=1e-12)
-        ends = [energy_along(rates, frame, momentum, 0.3 + h, shape, rate)[0] for h in (-1e-4, 1e-4)]
+        ends = [energy_along(rates, frame, momentum, 0.3 + h, 1.0, 0.0, axes)[0] for h in (-1e-4, 1e-4)]
         assert slope == pytest.approx((ends[1] - ends[0]) / 2e-4, rel=1e-6, abs=1e-7)
 
 

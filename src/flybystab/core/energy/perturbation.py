@@ -1,16 +1,18 @@
-"""How hard a push a granular ellipsoid stands: the least energy and strain over all admissible directions.
+"""Critical energy of a perturbation of a granular ellipsoid, along one direction of strain.
 
-A push is a rate of strain ``D = sum_a x_a E_a + (beta/3) 1`` held for a time ``t`` (theory, section 5), with
-``E_a`` an orthonormal basis of the deviators and ``|x| = 1``: ``e t`` is then the strain. While it flows the
-stress does the work ``sigma*:D = (k - beta) p + k c`` per volume and time with the pressure of equilibrium, and
+A perturbation is a rate of strain ``D = sum_a x_a E_a + (beta/3) 1`` held for a time ``t`` (theory, section 5), with
+``E_a`` an orthonormal basis of the deviators and ``|x| = 1``: ``e t`` is then the strain. Its kinetic energy is
 
-    K(t) - K(0) = t P1 + t^2/2 P2 + t^3/6 P3 + ...
-    P1 = V (s:D' - k (p + c)),    P2 = -Phi'' + V beta [(k - beta)(kappa - p) - k c],
-    P3 = -Phi''' - V beta^2 [(k - beta)(p - 2 kappa) + k c].
+    K(t) - K(0) = t P1 + t^2/2 P2 + t^3/6 P3 + ...,    P_n = -(d/dt)^n Phi - (d/dt)^(n-1) (V sigma*:D)   at t = 0
+
+with the power of the stress ``V sigma*:D`` of :mod:`flybystab.core.energy.flow_work`, that is with the pressure that
+the flow needs, not that of the equilibrium. At the start ``-Phi' = V sigma_eq:D``.
 
 Associative flow (``beta = k``, for a slope ``k(theta)`` the support function of the yield section) also admits the
 apex of the yield surface, ``tr D > k |D'|``: that is ``|x| < 1`` at ``tr D = k``, the same formulas on the ball
 instead of the sphere.
+
+Holding ``D`` is a constraint: the least barrier over such paths is an upper bound of the least over all paths.
 
 Units as in :mod:`flybystab.core.energy.potential`.
 """
@@ -24,7 +26,27 @@ from numpy.typing import NDArray
 
 from flybystab.core.ellipsoid.potential import index_symbols
 from flybystab.core.ellipsoid.rigid_stress import rigid_stress
-from flybystab.core.energy.potential import MASS, energy_along, energy_derivatives, path_frame
+from flybystab.core.energy.flow_work import (
+    FADE_BEGINS,
+    Flow,
+    depends_on_pressure,
+    gauss,
+    gauss_up_to,
+    growth_at,
+    power,
+    power_derivatives,
+    volume_at,
+)
+from flybystab.core.energy.potential import (
+    MASS,
+    PrincipalAxes,
+    energy_along,
+    energy_derivatives,
+    path_frame,
+    principal_axes,
+    velocity_gradient,
+)
+from flybystab.core.material.flow_rule import isotropic
 from flybystab.core.material.yield_surface import (
     SQRT6,
     is_circular,
@@ -65,7 +87,7 @@ class Pile(NamedTuple):
     cohesion: float  # Y cos(phi)
     associative: bool
     beta: float  # not associative
-    kappa: float
+    kappa: float  # plastic bulk modulus; 0: the pressure is the reaction to the flow rule
 
 
 @kernel
@@ -174,18 +196,40 @@ def slope_of_flow(b: Pile, x: Array) -> tuple[float, float]:
 
 
 @kernel
-def powers(b: Pile, x: Array) -> tuple[float, float, float]:
-    """``P1, P2, P3`` of a direction ``x[5]``, ``|x| <= 1``."""
-    g, beta = slope_of_flow(b, x)
-    k = g * b.sin
-    kc = g * b.cohesion
+def flow_along(b: Pile, x: Array) -> Flow:
+    """What the power of the stress depends on in a direction ``x[5]``, ``|x| <= 1``."""
+    r = np.sqrt(np.sum(x * x))
+    det = _unit_determinant(x, r) if r > 0.0 else 0.0
+    size, trace = slope_of_flow(b, x)
+    first, second = size, 0.0
+    share = b.sin
+    if not b.associative:
+        share = b.beta / size
+    elif not is_circular(b.code):
+        first, second, _, _, _ = normal(b.code, b.sin, det)
     d = np.empty(6)
-    rate_of_strain(x, beta, d)
+    rate_of_strain(x, 0.0, d)
+    if r > 0.0:
+        d /= r
+    section = np.empty((3, 3))
+    kappa = 0.0 if b.associative else b.kappa
+    isotropic(first, second, d, section)
+    return Flow(
+        section, size, r if b.associative else 1.0, trace, share, b.sin, b.cohesion, kappa, b.pressure
+    )
+
+
+@kernel
+def powers(b: Pile, x: Array) -> tuple[float, float, float]:
+    """``P1, P2, P3`` of a direction ``x[5]``, ``|x| <= 1``; minus infinity, 0, 0 where the flow jams."""
+    flow = flow_along(b, x)
+    d = np.empty(6)
+    rate_of_strain(x, flow.trace, d)
     _, f2, f3 = energy_derivatives(b.s[0], b.s[1], b.s[2], b.one, b.two, b.three, b.spin, d)
-    p1 = MASS * (np.sum(b.stress * x) - k * b.pressure - kc)
-    p2 = -f2 + MASS * beta * ((k - beta) * (b.kappa - b.pressure) - kc)
-    p3 = -f3 - MASS * beta * beta * ((k - beta) * (b.pressure - 2.0 * b.kappa) + kc)
-    return p1, p2, p3
+    w0, w1, w2 = power_derivatives(flow, b.s, b.one, b.two, b.three, b.spin, d)
+    if not w0 < np.inf:
+        return -np.inf, 0.0, 0.0
+    return MASS * (np.sum(b.stress * x) - b.pressure * flow.trace) - w0, -f2 - w1, -f3 - w2
 
 
 @kernel
@@ -214,122 +258,165 @@ def third_order(p1: float, p2: float, p3: float) -> tuple[float, float]:
     return -t * (p1 + t * (p2 / 2.0 + t * p3 / 6.0)), t
 
 
-@kernel
-def _grown(beta: float, t: float) -> tuple[float, float]:
-    """``int_0^t e^(beta t) dt`` and ``int_0^t t e^(beta t) dt``."""
-    z = beta * t
-    if z > 1e-2:
-        grown = np.expm1(z) / beta
-        return grown, (t * np.exp(z) - grown) / beta
-    grown = t * (1.0 + z / 2.0 + z**2 / 6.0 + z**3 / 24.0 + z**4 / 120.0 + z**5 / 720.0)
-    return grown, t * t * (0.5 + z / 3.0 + z**2 / 8.0 + z**3 / 30.0 + z**4 / 144.0 + z**5 / 840.0)
+class Path(NamedTuple):
+    """A path of constant direction: the flow along it, the deformation, and the body at the last instant asked for."""
 
-
-class Work(NamedTuple):
-    """Work of the stress per volume and strain along a path: ``hard - soft t`` up to ``t = loose``, then `left`.
-
-    With a plastic bulk modulus the pressure falls to that of the apex, ``p = -Y cot(phi)``, and no further.
-    """
-
-    beta: float
-    hard: float
-    soft: float
-    loose: float
-    left: float
+    flow: Flow
+    gradient: Array  # the part of L that keeps the volume
+    rates: Array
+    frame: Array
+    axes: PrincipalAxes
 
 
 @kernel
-def _rate(w: Work, t: float) -> float:
-    """Power of the stress at strain `t`, with the volume growing."""
-    return MASS * np.exp(w.beta * t) * (w.hard - w.soft * t if t < w.loose else w.left)
-
-
-@kernel
-def _work(w: Work, t: float) -> float:
-    """``int_0^t V sigma*:D dt``."""
-    early = min(t, w.loose)
-    grown, softened = _grown(w.beta, early)
-    work = w.hard * grown - w.soft * softened
-    if t > w.loose:
-        work += w.left * (_grown(w.beta, t)[0] - grown)
-    return MASS * work
-
-
-@kernel
-def _path(b: Pile, x: Array, rates: Array, frame: Array) -> Work:
-    """Set the path of a direction, and the work of the stress along it."""
-    g, beta = slope_of_flow(b, x)
-    k = g * b.sin
+def path_along(b: Pile, x: Array) -> Path:
+    """Path of a direction ``x[5]``."""
+    flow = flow_along(b, x)
     d = np.empty(6)
-    rate_of_strain(x, beta, d)
-    path_frame(b.s[0], b.s[1], b.s[2], d, rates, frame)
-    kc = g * b.cohesion
-    if b.associative:
-        return Work(beta, kc, 0.0, np.inf, kc)
-    soft = (k - beta) * b.kappa * beta
-    if soft <= 0.0:
-        return Work(beta, (k - beta) * b.pressure + kc, 0.0, np.inf, kc)
-    return Work(
-        beta, (k - beta) * b.pressure + kc, soft, (b.pressure + kc / k) / (b.kappa * beta), beta * kc / k
-    )
-
-
-@kernel
-def loss_at(b: Pile, x: Array, t: float) -> float:
-    """Energy lost at strain `t`: ``Phi(t) - Phi(0) + int V sigma*:D dt`` along ``F = exp(L t)``."""
+    rate_of_strain(x, 0.0, d)
     rates = np.empty(3)
     frame = np.empty((3, 3))
-    work = _path(b, x, rates, frame)
-    shape = np.empty(6)
-    rate = np.empty(6)
-    phi0, _, _ = energy_along(rates, frame, b.momentum, 0.0, shape, rate)
-    phi, _, _ = energy_along(rates, frame, b.momentum, t, shape, rate)
-    return phi - phi0 + _work(work, t)
+    path_frame(b.s[0], b.s[1], b.s[2], d, rates, frame)
+    gradient = np.empty((3, 3))
+    velocity_gradient(b.s[0], b.s[1], b.s[2], d, gradient)
+    return Path(flow, gradient, rates, frame, principal_axes())
+
+
+@kernel
+def state_at(b: Pile, path: Path, t: float) -> tuple[float, float, float]:
+    """``Phi``, the rate at which kinetic energy is lost in slow flow, and the squared axis ratio at strain `t`."""
+    volume = volume_at(path.flow.trace, t)
+    growth = growth_at(path.flow.trace, volume)
+    phi, slope, ratio2 = energy_along(path.rates, path.frame, b.momentum, t, volume, growth, path.axes)
+    return phi, slope + power(path.flow, volume, path.gradient, path.axes)[0], ratio2
+
+
+@kernel
+def _mobility(path: Path, t: float, volume: float, growth: float) -> float:
+    """``tr(L S L^T) M/5``: twice the kinetic energy at unit rate of strain."""
+    total = 0.0
+    for k in range(3):
+        f = path.frame[:, k]
+        rate = path.rates[k] + growth / 3.0
+        total += rate * rate * np.exp(2.0 * path.rates[k] * t) * (f[0] * f[0] + f[1] * f[1] + f[2] * f[2])
+    return MASS / 5.0 * np.cbrt(volume * volume) * total
+
+
+@kernel
+def _work(b: Pile, path: Path, start: float, end: float, inertia: float) -> tuple[float, float]:
+    """Work of the stress between two strains, by Gauss' rule between the kinks of its power.
+
+    The kinetic energy ``K`` that is needed at the start to reach a strain at rest obeys ``dK/dt = -y - w K`` with the
+    loss ``y`` of slow flow and what inertia adds to the pressure, ``w``: it is ``int y exp(int w dt) dt``. `inertia`
+    is ``int w dt`` up to the start, or negative to leave it out; returns its value at the end too.
+    """
+    flow = path.flow
+    trace = flow.trace
+    fading = np.log(FADE_BEGINS) / trace if trace > 0.0 else np.inf
+    loose = np.inf  # strain at which a softening material has lost its pressure
+    if flow.kappa > 0.0 and trace > 0.0 and flow.sin > 0.0:
+        loose = (flow.pressure + flow.cohesion / flow.sin) / (flow.kappa * trace)
+    work = 0.0
+    added = np.zeros(3)
+    lost = np.zeros(3)
+    for piece in range(3):
+        a = start if piece == 0 else max(start, min(fading, loose) if piece == 1 else max(fading, loose))
+        z = (
+            min(end, min(fading, loose))
+            if piece == 0
+            else (min(end, max(fading, loose)) if piece == 1 else end)
+        )
+        if z <= a:
+            continue
+        h = z - a
+        reacts = False
+        for i in range(3):
+            node, weight = gauss(i)
+            t = a + node * h
+            volume = volume_at(trace, t)
+            growth = growth_at(trace, volume)
+            slope = 0.0
+            if depends_on_pressure(flow, volume):
+                _, slope, _ = energy_along(path.rates, path.frame, b.momentum, t, volume, growth, path.axes)
+                reacts = True
+            rate, square = power(flow, volume, path.gradient, path.axes)
+            work += weight * h * rate
+            lost[i] = slope + rate
+            added[i] = 2.0 * square / _mobility(path, t, volume, growth) if square != 0.0 else 0.0
+        if reacts and inertia >= 0.0:
+            for i in range(3):
+                _, weight = gauss(i)
+                work += weight * h * lost[i] * np.expm1(inertia + h * gauss_up_to(i, added))
+            inertia = max(0.0, inertia + h * (gauss(0)[1] * (added[0] + added[2]) + gauss(1)[1] * added[1]))
+    return work, inertia
+
+
+@kernel
+def loss_at(b: Pile, x: Array, t: float, slow: bool) -> float:
+    """Energy needed to reach strain `t`; `slow`: ``Phi(t) - Phi(0) + int V sigma*:D dt`` without inertia."""
+    path = path_along(b, x)
+    phi0, _, _ = state_at(b, path, 0.0)
+    phi, _, _ = state_at(b, path, t)
+    pieces = max(1, int(np.ceil(abs(t) / STEP)))
+    total = 0.0
+    inertia = -1.0 if slow else 0.0
+    for i in range(pieces):
+        start, end = abs(t) * i / pieces, abs(t) * (i + 1) / pieces
+        if t > 0.0:
+            work, inertia = _work(b, path, start, end, inertia)
+            total += work
+        else:
+            total -= _work(b, path, -end, -start, inertia)[0]
+    return phi - phi0 + total
+
+
+@kernel
+def loss_rate(b: Pile, x: Array, t: float) -> float:
+    """Rate at which slow flow loses kinetic energy at strain `t`, per strain."""
+    return state_at(b, path_along(b, x), t)[1]
 
 
 @kernel
 def barrier(b: Pile, x: Array, longest: float, enough: float) -> tuple[float, float]:
-    """First maximum of ``Phi(t) - Phi(0) + int V sigma*:D dt`` along ``F = exp(L t)``, and the strain there.
+    """Energy needed to reach the strain at which slow flow ceases to lose energy, along ``F = exp(L t)``; that strain.
+
+    Up to the inertia of the flow (see `_work`) it is the first maximum of ``Phi(t) - Phi(0) + int V sigma*:D dt``.
 
     The path ends where the axis ratio passes :data:`EDGE` and the homogeneous model with it: the loss there counts
-    as the maximum. Where the loss grows up to the strain `longest` without either: ``-Phi(0)`` at infinite strain
-    if the flow dissipates nothing (associative, no cohesion), the energy that disperses the body; inf if it does.
+    as the maximum. Infinite where the loss grows up to the strain `longest` without either.
     A loss above `enough` is returned as it is met: the barrier is at least that high.
-    The maximum is the first zero of the exact slope, bracketed by steps of :data:`STEP`, and at the loss of
-    pressure, and refined by the Illinois rule.
+    The maximum is the first zero of the exact slope, bracketed by steps of :data:`STEP` and refined by the Illinois
+    rule.
     """
-    rates = np.empty(3)
-    frame = np.empty((3, 3))
-    work = _path(b, x, rates, frame)
-    shape = np.empty(6)
-    rate = np.empty(6)
-    phi0, slope, ratio2 = energy_along(rates, frame, b.momentum, 0.0, shape, rate)
+    path = path_along(b, x)
+    phi0, y0, ratio2 = state_at(b, path, 0.0)
     edge = max(EDGE * EDGE, BEYOND_EDGE * ratio2)
     t0 = 0.0
-    y0 = slope + _rate(work, 0.0)
     if y0 <= 0.0:
         return 0.0, 0.0
     t1 = 0.0
     y1 = y0
     phi = phi0
     ratio0 = ratio2
+    before = work = 0.0  # work up to t0 and t1
+    held = inertia = 0.0  # the exponent of `_work` there
     while y1 > 0.0:
         t0 = t1
         y0 = y1
+        before, held = work, inertia
         t1 = t0 + STEP
-        if t0 < work.loose < t1:
-            t1 = work.loose
-        if t0 >= longest:
-            return (-phi0 if work.hard <= 0.0 and phi0 < 0.0 else np.inf), np.inf
-        phi, slope, ratio2 = energy_along(rates, frame, b.momentum, t1, shape, rate)
+        if t0 >= longest or not y0 < np.inf:
+            return np.inf, np.inf
+        phi, y1, ratio2 = state_at(b, path, t1)
         if ratio2 > edge:
             a = t0
             fa = np.log(ratio0 / edge)
             fb = np.log(ratio2 / edge)
             side = 0
+            t = t1
             for _ in range(30):
                 t = (a * fb - t1 * fa) / (fb - fa)
-                phi, slope, ratio2 = energy_along(rates, frame, b.momentum, t, shape, rate)
+                phi, y1, ratio2 = state_at(b, path, t)
                 f = np.log(ratio2 / edge)
                 if abs(f) < 1e-9:
                     break
@@ -344,20 +431,21 @@ def barrier(b: Pile, x: Array, longest: float, enough: float) -> tuple[float, fl
                     fa *= 0.5 if side > 0 else 1.0
                     side = 1
             t1 = t
-            if slope + _rate(work, t1) > 0.0:
-                return phi - phi0 + _work(work, t1), t1
+            if y1 > 0.0:
+                return phi - phi0 + before + _work(b, path, t0, t1, held)[0], t1
         ratio0 = ratio2
-        y1 = slope + _rate(work, t1)
+        work, inertia = _work(b, path, t0, t1, held)
+        work += before
         if y1 > 0.0:
-            lost = phi - phi0 + _work(work, t1)
+            lost = phi - phi0 + work
             if lost > enough:
                 return lost, t1
+    start = t0
     t = t1
     side = 0
     for _ in range(40):
         t = (t0 * y1 - t1 * y0) / (y1 - y0)
-        phi, slope, _ = energy_along(rates, frame, b.momentum, t, shape, rate)
-        y = slope + _rate(work, t)
+        phi, y, _ = state_at(b, path, t)
         # the error of the maximum is of second order
         if abs(y) <= 1e-8 * MASS or t1 - t0 < 1e-8:
             break
@@ -371,4 +459,4 @@ def barrier(b: Pile, x: Array, longest: float, enough: float) -> tuple[float, fl
             y1 = y
             y0 *= 0.5 if side < 0 else 1.0
             side = -1
-    return phi - phi0 + _work(work, t), t
+    return phi - phi0 + before + _work(b, path, start, t, held)[0], t

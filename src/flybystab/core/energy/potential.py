@@ -21,6 +21,8 @@ The six components of ``D`` are ``xx, yy, zz, xy, xz, yz``.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -35,6 +37,23 @@ MASS = 4.0 * np.pi / 3.0
 
 #: ``(3/10) G m^2``: the self-gravity energy is ``-GRAVITY int du/Delta = -2 GRAVITY R_F``.
 GRAVITY = 8.0 * np.pi / 15.0
+
+
+class PrincipalAxes(NamedTuple):
+    """The body at one instant of a path, and scratch space: written by :func:`energy_along`."""
+
+    squares: Array  # squared semi-axes, 3
+    vectors: Array  # principal axes as columns, 3 x 3
+    rd: Array  # R_D with the axis k last: A_k = (2/3) a1 a2 a3 rd[k]
+    spin: Array  # angular velocity, 3
+    shape: Array  # S, 6
+    rate: Array  # dS/dt, 6
+
+
+@kernel
+def principal_axes() -> PrincipalAxes:
+    """Empty :class:`PrincipalAxes`."""
+    return PrincipalAxes(np.empty(3), np.empty((3, 3)), np.empty(3), np.empty(3), np.empty(6), np.empty(6))
 
 
 @kernel
@@ -167,18 +186,21 @@ def path_frame(s1: float, s2: float, s3: float, d: Array, rates: Array, frame: A
 
 @kernel
 def energy_along(
-    rates: Array, frame: Array, momentum: Array, t: float, shape: Array, rate: Array
+    rates: Array, frame: Array, momentum: Array, t: float, volume: float, growth: float, axes: PrincipalAxes
 ) -> tuple[float, float, float]:
-    """``Phi``, ``dPhi/dt`` and the squared axis ratio at time `t` on a path of :func:`path_frame`.
+    """``Phi``, ``dPhi/dt`` and the squared axis ratio at time `t` on a path of :func:`path_frame`; writes `axes`.
 
-    Writes ``S[6]`` into `shape`; `rate` is scratch space of six numbers (it holds ``dS/dt``).
+    On top of that path the body swells evenly: to `volume` times its volume by now, at the rate ``d ln V/dt`` =
+    `growth`.
     """
+    shape, rate = axes.shape, axes.rate
+    swollen = np.cbrt(volume * volume)
     for i in range(6):
         shape[i] = 0.0
         rate[i] = 0.0
     for k in range(3):
-        g = np.exp(2.0 * rates[k] * t)
-        h = 2.0 * rates[k] * g
+        g = swollen * np.exp(2.0 * rates[k] * t)
+        h = 2.0 * (rates[k] + growth / 3.0) * g
         x = frame[0, k]
         y = frame[1, k]
         z = frame[2, k]
@@ -194,15 +216,15 @@ def energy_along(
         rate[3] += h * x * y
         rate[4] += h * x * z
         rate[5] += h * y * z
-    values = np.empty(3)
-    vectors = np.empty((3, 3))
+    values, vectors = axes.squares, axes.vectors
     eigensystem(shape, values, vectors)
     rf, d1, d2, d3 = carlson_fd(values[0], values[1], values[2])
     trace = values[0] + values[1] + values[2]
     turning = rate[0] + rate[1] + rate[2]
     phi = -2.0 * GRAVITY * rf
     phi_t = 0.0
-    w = np.zeros(3)
+    w = axes.spin
+    w[:] = 0.0
     for k in range(3):
         x = vectors[0, k]
         y = vectors[1, k]
@@ -215,6 +237,7 @@ def energy_along(
         )
         # dR_F/dx = -R_D(y, z, x)/6
         rd = d1 if k == 0 else (d2 if k == 1 else d3)
+        axes.rd[k] = rd
         phi_t += GRAVITY / 3.0 * rd * grown
         h = x * momentum[0] + y * momentum[1] + z * momentum[2]
         u = 5.0 / MASS * h / (trace - values[k])

@@ -24,13 +24,17 @@ from flybystab.core.energy.direction_search import (
     YIELD,
     least,
 )
+from flybystab.core.energy.flow_work import volume_at
 from flybystab.core.energy.perturbation import (
     Pile,
     direction,
+    flow_along,
+    path_along,
     pile,
     powers,
     rate_of_strain,
     slope_of_flow,
+    state_at,
 )
 from flybystab.core.energy.potential import MASS, energy_derivatives
 from flybystab.core.energy.trust_region import curvature_form, least_second_order, trust_region
@@ -66,10 +70,19 @@ ON_YIELD = 1e-9
 
 
 @kernel
+def _certified(b: Pile) -> bool:
+    """Whether ``P1`` is linear and ``P2`` quadratic in the direction: not with a reaction pressure."""
+    return is_circular(b.code) and (b.associative or b.kappa > 0.0 or b.sin <= 0.0)
+
+
+@kernel
 def first_to_flow(b: Pile, x: Array) -> float:
-    """Greatest ``P1/V`` over all directions and the unit direction ``x[5]`` that has it."""
+    """``P1/V`` in the direction ``x[5]`` in which the body flows first: the greatest of all for associative flow.
+
+    With less dilatancy it flows along the stress deviator.
+    """
     size = np.sqrt(np.sum(b.stress * b.stress))
-    if is_circular(b.code):
+    if is_circular(b.code) or not b.associative:
         if size > 0.0:
             x[:] = b.stress / size
         else:
@@ -85,6 +98,36 @@ def first_to_flow(b: Pile, x: Array) -> float:
         x /= np.sqrt(np.sum(x * x))
     p1, _, _ = powers(b, x)
     return p1 / MASS
+
+
+@kernel
+def overload_rate(b: Pile, x: Array) -> float:
+    """Rate at which the overload of the rigid body grows along the flow ``x[5]``, at fixed angular momentum.
+
+    For a body at yield whose flow is not associative this decides on stability to infinitesimal perturbations, not
+    ``P2``. The direction of a slow flow relaxes at once to the one that goes on without a jump of the stress, along
+    the deviator of the rigid stress, and turns with it as the shape changes; for associative flow the power is
+    stationary in the direction and the turn does not count, for ``beta < k`` it does. Slow flow goes on where the
+    changed body is overloaded at rest, and stops where it is not.
+    """
+    h = 1e-4
+    phi = np.arcsin(b.sin)
+    flow = flow_along(b, x)
+    path = path_along(b, x)
+    stress = np.empty(6)
+    spin = np.empty(3)
+    ends = np.empty(2)
+    for i in range(2):
+        t = h if i == 1 else -h
+        volume = volume_at(flow.trace, t)
+        state_at(b, path, t)
+        axes = path.axes
+        for k in range(3):
+            spin[k] = np.sum(axes.vectors[:, k] * axes.spin)
+        q = axes.squares
+        rigid_stress(q[0], q[1], q[2], 1.0 / volume, 1.0 / volume, spin, np.zeros(6), stress)
+        ends[i] = overload(b.code, phi, b.cohesion / np.cos(phi), stress)
+    return (ends[1] - ends[0]) / (2.0 * h)
 
 
 @kernel
@@ -142,6 +185,7 @@ def classify(
     code: int,
     phi: float,
     cohesion: float,
+    flow_cohesion: float,
     dilatancy: float,
     kappa: float,
     depth: int,
@@ -152,6 +196,7 @@ def classify(
 
     `depth` 0 stops at the required friction, 1 at infinitesimal stability, 2 at the second order, 3 at the third,
     4 goes on to the barrier, 5 also minimises the strains of third order on their own. What is not reached is nan.
+    `flow_cohesion` is the cohesion while the body flows: zero where it is brittle, since a deforming body is at yield.
     """
     row[:] = np.nan
     directions[:] = np.nan
@@ -176,7 +221,7 @@ def classify(
         for i in range(ENERGY_2, STRAIN_B + 1):
             row[i] = 0.0
         return
-    b = pile(s[0], s[1], s[2], spin, code, phi, cohesion, dilatancy, kappa)
+    b = pile(s[0], s[1], s[2], spin, code, phi, flow_cohesion, dilatancy, kappa)
     x = np.empty(5)
     push = first_to_flow(b, x)
     _, p2, _ = powers(b, x)
@@ -199,15 +244,17 @@ def classify(
     elif size <= ON_YIELD * abs(p) and k * p <= tolerance:
         # neither deviator nor friction: a fluid, to be tested in every direction that keeps the volume
         stable = trust_region(f[:5, :5].copy(), np.zeros(5), False, y) > 0.0
-    else:
+    elif b.associative or b.kappa > 0.0 or b.sin <= 0.0:
         stable = push <= tolerance and p2 < 0.0
+    else:
+        stable = push <= tolerance and overload_rate(b, x) < 0.0
     if stable:
         row[LEVEL] = 2.0
     if depth < 2:
         return
     seeds = np.zeros((3, 5))
     xs = np.empty(5)
-    if is_circular(code):
+    if _certified(b):
         xe = x.copy()
         row[ENERGY_2], row[STRAIN_2], most = least_second_order(b, xe, xs)
         row[SOFTEST] = most / MASS
@@ -248,6 +295,7 @@ def classify_many(
     code: int,
     phi: Array,
     cohesion: Array,
+    flow_cohesion: Array,
     dilatancy: float,
     kappa: Array,
     depth: int,
@@ -268,6 +316,7 @@ def classify_many(
                 code,
                 phi[i],
                 cohesion[i],
+                flow_cohesion[i],
                 dilatancy,
                 kappa[i],
                 depth,

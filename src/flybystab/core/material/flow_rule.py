@@ -33,22 +33,28 @@ def fade(par: Array) -> float:
 
 
 @kernel
-def dilatancy(volume: float, par: Array) -> tuple[float, float]:
-    """``beta`` and ``d beta/dV`` at ``V/V0``: constant, then faded to zero where the material is loosest.
+def fade_share(volume: float, end: float) -> tuple[float, float]:
+    """Share of the dilatancy left at ``V/V0``, and its derivative: a cubic over the last tenth of the expansion.
 
-    Where NORMAL is on, the share of the dilation ``m(D')`` of the normal.
-
-    The fade is a cubic over the last tenth of the allowed expansion: a critical state reached smoothly.
+    `end` is the ``V/V0`` at which dilation has ended: a critical state reached smoothly.
     """
-    beta = par[BETA]
-    end = par[EXPANSION]
-    begin = fade(par)
-    if beta == 0.0 or volume <= begin:
-        return beta, 0.0
+    begin = end - 0.1 * (end - 1.0)
+    if volume <= begin:
+        return 1.0, 0.0
     if volume >= end:
         return 0.0, 0.0
     x = (volume - begin) / (end - begin)
-    return beta * (1.0 - x * x * (3.0 - 2.0 * x)), -beta * 6.0 * x * (1.0 - x) / (end - begin)
+    return 1.0 - x * x * (3.0 - 2.0 * x), -6.0 * x * (1.0 - x) / (end - begin)
+
+
+@kernel
+def dilatancy(volume: float, par: Array) -> tuple[float, float]:
+    """``beta`` and ``d beta/dV`` at ``V/V0``: constant, then faded to zero where the material is loosest.
+
+    Where NORMAL is on, the share of the dilation ``m(D')`` of the normal. The fade is that of :func:`fade_share`.
+    """
+    share, slope = fade_share(volume, par[EXPANSION])
+    return par[BETA] * share, par[BETA] * slope
 
 
 @kernel
