@@ -29,6 +29,14 @@ def test_equilibrium(body):
     assert e.admissible
 
 
+def test_recovery(body):
+    r = fs.recovery(body, directions=4, refinements=2, searches=2)
+    assert r.energy.unit.is_equivalent(u.J)
+    assert r.direction.shape == (3, 3)
+    assert r.error >= 0.0
+    assert r.searches.shape == (2,)
+
+
 def test_stability(body):
     s = fs.stability(body)
     assert s.stable_infinitesimal

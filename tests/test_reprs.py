@@ -68,7 +68,7 @@ def test_they_name_what_matters(things):
         ],
         "FlybyTable": ["2 rows", f"2 {things['FlybyResult'].verdict}"],
         "Orbit": ["Apophis", "AU from sun", "with covariance"],
-        "Stability": ["stable to infinitesimal pushes"],
+        "Stability": ["stable to infinitesimal perturbations"],
         "Equilibrium": ["admissible", "deg"],
         "tension": ["not admissible", "no friction suffices", "tension"],
         "Requirements": ["10 samples", "probability 1"],

@@ -94,7 +94,7 @@ class Stability:
     dilatancy : float
         ``beta/min k`` of the test; 1 is associative flow.
     level : int
-        0 inadmissible, 1 admissible, 2 stable to infinitesimal pushes, 3 stable to finite ones of any direction
+        0 inadmissible, 1 admissible, 2 stable to infinitesimal perturbations, 3 to finite ones of any direction
         at second order; :data:`LEVELS` names them.
     admissible, stable_infinitesimal : bool
         The first two levels. Strictly inside the yield surface friction stops any small enough perturbation. On it

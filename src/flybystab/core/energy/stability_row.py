@@ -49,7 +49,7 @@ Array = NDArray[np.float64]
     PRESSURE,
     COHESION,  # required at the given friction angle
     OVERLOAD,  # |s| sin/k - p sin - Y cos: the body is admissible where it is not positive
-    LEVEL,  # 0 inadmissible, 1 admissible, 2 stable to infinitesimal pushes, 3 to any push at second order
+    LEVEL,  # 0 inadmissible, 1 admissible, 2 stable to infinitesimal perturbations, 3 to any at second order
     CURVATURE,  # Phi''/(p V) along D* with the required friction mobilised
     ENERGY_2,
     STRAIN_2,
@@ -161,7 +161,7 @@ def mobilised_curvature(
 ) -> float:
     """``Phi''/(p V)`` along the associative ``D*`` when exactly the `friction` that is required is there.
 
-    Positive: the body is stable to infinitesimal pushes even with its friction fully mobilised. nan where
+    Positive: the body is stable to infinitesimal perturbations even with its friction fully mobilised. nan where
     there is no deviator (``D*`` is undefined), no pressure or no sufficient friction.
     """
     b = pile(s[0], s[1], s[2], spin, code, friction, cohesion, 1.0, 0.0)
