@@ -232,13 +232,13 @@ def recovery(
     beta = _dilatancy(body, dilatancy)
     if not equilibrium(body).admissible:
         raise InvalidInput("body", body, "a body in admissible equilibrium")
-    for name, value, least in (
+    for name, value, fewest in (
         ("directions", directions, 1),
         ("refinements", refinements, 0),
         ("searches", searches, 2),
     ):
-        if not (isinstance(value, int | np.integer) and value >= least):
-            raise InvalidInput(name, value, f"an integer of at least {least}")
+        if not (isinstance(value, int | np.integer) and value >= fewest):
+            raise InvalidInput(name, value, f"an integer of at least {fewest}")
     if not 0.0 < precision < 1.0:
         raise InvalidInput("precision", precision, "a number between 0 and 1")
     if not 0.0 < low < high:
@@ -333,7 +333,8 @@ def _push(body: Body, direction: Any, energy: float, dilatancy: float, tolerance
     d = unit_deviator(direction)
     m = body.material
     squares = body.axes**2
-    scene = pile(*squares, np.zeros(3), m.surface_code, m.phi, 0.0, dilatancy, 0.0)
+    arguments: Any = (*squares, np.zeros(3), m.surface_code, m.phi, 0.0, dilatancy, 0.0)
+    scene = pile(*arguments)
     x = np.empty(5)
     strain_direction(components(d), x)
     _, beta = slope_of_flow(scene, x)  # tr D of the flow rule at |D'| = 1

@@ -47,6 +47,9 @@ from flybystab.units import to_si
 
 Array = NDArray[np.float64]
 
+#: numpy's, as all flags of the kernels.
+WITH_INERTIA: Any = np.bool_(False)
+
 LEVELS = (
     "inadmissible",
     "admissible",
@@ -210,8 +213,10 @@ def stability(body: Body, *, dilatancy: float | None = 1.0) -> Stability:
     shape: Any = (*(body.axes**2), body.omega * units.time, m.surface_code, m.phi)
     flow: Any = (flow_cohesion(body) / units.stress, beta, kappa / units.stress)
     out: Any = (5, row, found)
-    classify(*shape, m.c_pa / units.stress, *flow, *out)
-    scene = pile(*shape, *flow)
+    arguments: Any = (*shape, m.c_pa / units.stress, *flow, *out)
+    classify(*arguments)
+    arguments = (*shape, *flow)
+    scene = pile(*arguments)
     e = equilibrium(body)
     energies = Orders(
         *(row[i] * units.energy * u.J for i in (columns.ENERGY_2, columns.ENERGY_3, columns.ENERGY_B))
@@ -346,7 +351,7 @@ def _kind(scene: Any, x: Array, row: Array) -> str:
 
 def _loss(scene: Any, x: Array, t: float) -> float:
     """Energy that the push has lost at strain `t`, in the units of the kernels."""
-    return float(loss_at(scene, x, t, np.bool_(False)))
+    return float(loss_at(scene, x, t, WITH_INERTIA))
 
 
 def _strain_rate(scene: Any, x: Array) -> tuple[Array, bool]:
