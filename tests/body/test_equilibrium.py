@@ -187,3 +187,23 @@ def test_stress_scales_as_density_squared_and_size_squared():
     b = body((1, 0.8, 0.7), w2=0.2)
     big = Body(3 * b.semi_axes, 2 * b.density, spin=np.sqrt(2) * b.spin)
     assert stress_components(big) == pytest.approx(36 * stress_components(b), rel=1e-12)
+
+
+def test_required_friction_is_given_on_the_default_surface_and_the_compression_cone():
+
+    prolate = Body(
+        [1400, 850, 750] * u.m,
+        2000 * u.kg / u.m**3,
+        spin_period=4 * u.h,
+        material=Material(yield_surface="mohr-coulomb"),
+    )
+    e = equilibrium(prolate)
+    cone = equilibrium(prolate.with_(material=Material(yield_surface="drucker-prager")))
+    assert e.required_by_surface["mohr-coulomb"] == e.required_friction_angle
+    assert e.required_by_surface["drucker-prager"] == cone.required_friction_angle
+    assert cone.required_friction_angle < e.required_friction_angle - 0.1 * u.deg
+    assert "drucker-prager" in e.other_surfaces()
+    assert "drucker-prager" in repr(e)
+    assert "mohr-coulomb" in cone.other_surfaces()
+    sphere = prolate.with_(semi_axes=[1000, 1000, 1000] * u.m)  # triaxial compression
+    assert equilibrium(sphere).other_surfaces() == ""

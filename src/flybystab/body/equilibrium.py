@@ -18,7 +18,7 @@ import numpy as np
 from astropy.units import Quantity
 from numpy.typing import NDArray
 
-from flybystab.body.body import Body, check_body
+from flybystab.body.body import DEFAULT_SURFACE, YIELD_SURFACES, Body, check_body
 from flybystab.constants import G
 from flybystab.core.ellipsoid.rigid_stress import demand, invariants, load_interval, overload, rigid_stress
 from flybystab.core.ellipsoid.tide import components, tensor
@@ -66,12 +66,38 @@ class Equilibrium:
     margin: Quantity
     in_tension: bool
 
+    @property
+    def required_by_surface(self) -> dict[str, Quantity]:
+        """Required friction angle, deg, on the default yield surface and on the compression cone, by name."""
+        c = components(self.stress.to_value(u.Pa))
+        m = self.body.material
+        names = dict.fromkeys((DEFAULT_SURFACE, "drucker-prager"))
+        return {
+            name: np.rad2deg(demand(YIELD_SURFACES.index(name), m.phi, m.c_pa, c)[0]) * u.deg
+            for name in names
+        }
+
+    def other_surfaces(self, resolution: Quantity = 0.05 * u.deg) -> str:
+        """Required friction on the default surface or the compression cone where it differs from the body's, as text.
+
+        Empty where it does not, by more than `resolution`.
+        """
+        own = self.required_friction_angle
+        said = []
+        for name, angle in self.required_by_surface.items():
+            differs = angle != own if np.isinf(angle) or np.isinf(own) else abs(angle - own) > resolution
+            if name != self.body.material.yield_surface and differs:
+                need = brief(angle) if np.isfinite(angle) else "no friction suffices"
+                said.append(f"{name} {need}")
+        return ", ".join(said)
+
     def __repr__(self) -> str:
         phi = self.required_friction_angle
         need = f"needs {brief(phi)}" if np.isfinite(phi) else "no friction suffices"
         state = "tension" if self.in_tension else "compression"
+        others = f" ({other})" if (other := self.other_surfaces()) else ""
         return (
-            f"<Equilibrium {'' if self.admissible else 'not '}admissible: {need}, required cohesion "
+            f"<Equilibrium {'' if self.admissible else 'not '}admissible: {need}{others}, required cohesion "
             f"{brief(self.required_cohesion)}, mean {state} {brief(abs(self.mean_pressure))}>"
         )
 

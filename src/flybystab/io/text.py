@@ -190,7 +190,8 @@ def equilibrium_lines(name: str, e: Equilibrium) -> list[str]:
     out = [
         f"{name}: {'in equilibrium' if e.admissible else 'not in equilibrium'} with "
         f"{m.friction_angle.to_value(u.deg):g} deg and {m.cohesion.to_value(u.Pa):g} Pa ({m.yield_surface})",
-        f"required friction angle   {angle(e.required_friction_angle)}",
+        f"required friction angle   {angle(e.required_friction_angle)}"
+        + (f" ({other})" if (other := e.other_surfaces()) else ""),
         f"required cohesion         {e.required_cohesion.to_value(u.Pa):.4g} Pa",
         f"mean pressure             {e.mean_pressure.to_value(u.Pa):.4g} Pa"
         + (" (tension)" if e.in_tension else ""),
