@@ -46,7 +46,7 @@ _JSON_STRING = re.compile(r'"(?:[^"\\]|\\.)*"')
 _KEY = re.compile(rf"(?<![\w-])(?:[\w-]++|~)(?:[ \t]*+\.[ \t]*+(?:[\w-]++|~)){{{DEPTH_LIMIT},}}")
 
 
-def read_bytes(path: str | Path, what: str, limit: int = TEXT_LIMIT) -> bytes:
+def read_bytes(path: str | Path, what: str, limit: int = TEXT_LIMIT, kind: str = "file") -> bytes:
     """Content of a file, decompressed if it is gzipped.
 
     Parameters
@@ -57,12 +57,16 @@ def read_bytes(path: str | Path, what: str, limit: int = TEXT_LIMIT) -> bytes:
         What the file is, for the message: "catalogue file".
     limit : int
         Largest size after decompression, bytes.
+    kind : str
+        What is expected, for the message: "CSV file".
 
     Raises
     ------
     InvalidInput
         The file cannot be read or decompressed, or is larger than `limit`.
     """
+    if not isinstance(path, str | Path):
+        raise InvalidInput(what, path, "a path")
     file = Path(path)
     try:
         if not stat.S_ISREG(file.stat().st_mode):
@@ -81,16 +85,16 @@ def read_bytes(path: str | Path, what: str, limit: int = TEXT_LIMIT) -> bytes:
         raise
     except (OSError, EOFError, zlib.error, ValueError) as error:  # ValueError: a null byte in the path
         reason = getattr(error, "strerror", None) or str(error)
-        raise InvalidInput(what, path, f"a readable file ({reason})") from None
+        raise InvalidInput(what, path, f"a readable {kind} ({reason})") from None
     return b"".join(parts)
 
 
-def read_text(path: str | Path, what: str, limit: int = TEXT_LIMIT) -> str:
+def read_text(path: str | Path, what: str, limit: int = TEXT_LIMIT, kind: str = "file") -> str:
     """UTF-8 text of a file, with or without a byte-order mark (arguments and errors of :func:`read_bytes`)."""
     try:
-        return read_bytes(path, what, limit).decode("utf-8-sig")
+        return read_bytes(path, what, limit, kind).decode("utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InvalidInput(what, path, f"a readable file in UTF-8 ({error})") from None
+        raise InvalidInput(what, path, f"a readable {kind} in UTF-8 ({error})") from None
 
 
 def parse_json(text: str, what: str, path: str | Path) -> Any:
@@ -106,7 +110,7 @@ def parse_json(text: str, what: str, path: str | Path) -> Any:
     try:
         return json.loads(text)
     except ValueError as error:
-        raise InvalidInput(what, path, f"valid JSON ({error})") from None
+        raise InvalidInput(what, path, f"a JSON document ({error})") from None
 
 
 def parse_toml(text: str, what: str, path: str | Path) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from typing import Any
 
 import astropy.units as u
 import numpy as np
+from astropy.time import Time
 from astropy.units import Quantity
 
 from flybystab.constants import R_EARTH
@@ -91,6 +92,23 @@ def whole(value: Any, name: str, least: int) -> int:
     if isinstance(value, bool) or not isinstance(value, int | np.integer) or value < least:
         raise InvalidInput(name, value, f"a whole number, {least} or more")
     return int(value)
+
+
+def checked_time(value: Any, name: str) -> Time:
+    """One astropy Time that converts to TDB without tables of the Earth's rotation.
+
+    Raises
+    ------
+    InvalidInput
+        Not one Time, of a local scale or UT1, or not within the Julian dates -1e7 and 1e7.
+    """
+    if not isinstance(value, Time) or value.shape != ():
+        raise InvalidInput(name, value, "one astropy Time")
+    if value.scale in ("local", "ut1"):
+        raise InvalidInput(name, f"a Time of scale {value.scale}", "the scale tdb, tt, tai or utc")
+    if not abs(value.jd) <= 1e7:
+        raise InvalidInput(name, f"JD {value.jd:g}", "a Julian date within 1e7 days of zero")
+    return value
 
 
 def brief(value: Any, unit: u.UnitBase | None = None) -> str:

@@ -77,7 +77,7 @@ LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType(
     dict.fromkeys(_LENGTH, (0.05, 5e6))
     | dict.fromkeys(_HOURS, (1e-4, 1e5))
     | {c: (0.0, np.inf) for c in UNITS if "sigma" in c}
-    | {"density_kg_m3": DENSITY_RANGE, "e": (0.0, 1e3), "amplitude_mag": (0.0, 5.0)}
+    | {"density_kg_m3": DENSITY_RANGE, "e": (0.0, np.inf), "amplitude_mag": (0.0, 5.0)}
     | {"i_deg": (0.0, 180.0), "pole_ecl_lat_deg": (-90.0, 90.0)}
     | {"H_mag": (-5.0, 45.0), "a_au": (-1e6, 1e6), "epoch_jd_tdb": (0.0, 1e7)}
     # A third of the Sun's gravity at 1 au; the largest accelerations of comets are 1e-6 au/d2.

@@ -36,14 +36,6 @@ def _result(path: str | None) -> Any:
         from flybystab.screening.results import read_results
 
         return read_results(path)
-    import json
-    from pathlib import Path
+    from flybystab.files import DOCUMENT_LIMIT, parse_json, read_text
 
-    from flybystab.errors import InvalidInput
-
-    try:
-        return json.loads(Path(path).read_text(encoding="utf-8-sig"))
-    except OSError as reason:
-        raise InvalidInput("file", path, f"a readable JSON document ({reason.strerror})") from None
-    except ValueError as reason:
-        raise InvalidInput("file", path, f"a JSON document ({reason})") from None
+    return parse_json(read_text(path, "file", DOCUMENT_LIMIT, "JSON document"), "file", path)

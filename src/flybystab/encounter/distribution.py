@@ -26,7 +26,7 @@ from flybystab.orbit.ephemeris import Ephemeris
 from flybystab.orbit.orbit import Orbit, later
 from flybystab.orbit.planets import Planet, planet
 from flybystab.orbit.search.encounter_finder import find_encounters
-from flybystab.units import brief, to_si
+from flybystab.units import brief, checked_time, to_si
 
 Array = NDArray[np.float64]
 
@@ -166,8 +166,7 @@ def encounter_distribution(
     InvalidInput, UnitMismatch, UnknownName
     """
     path = _path(orbit)
-    if not isinstance(time, Time) or time.shape != ():
-        raise InvalidInput("time", time, "one astropy Time")
+    checked_time(time, "time")
     body = _planet(planet)
     reach = to_si(search, u.s, "search", low=0.0, open_low=True)
     largest = far_enough(body) if within is None else to_si(within, u.m, "within", low=0.0, open_low=True)

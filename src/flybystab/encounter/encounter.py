@@ -22,7 +22,7 @@ from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.planets import Planet, planet
 from flybystab.orbit.predictability import Predictability
 from flybystab.orbit.target_plane import NORTH, checked, target_plane
-from flybystab.units import brief, to_si
+from flybystab.units import brief, checked_time, to_si
 
 Array = NDArray[np.float64]
 
@@ -369,8 +369,7 @@ class Encounter:
         path = getattr(orbit, "orbit", orbit)
         if not isinstance(path, Orbit):
             raise InvalidInput("orbit", orbit, "an Orbit, or an object with one as its attribute 'orbit'")
-        if not isinstance(time, Time) or time.shape != ():
-            raise InvalidInput("time", time, "one astropy Time")
+        checked_time(time, "time")
         body = _planet(planet)
         if body.name not in BODIES or body.name == "sun":
             raise InvalidInput("planet", body.name, f"one of {', '.join(BODIES[1:])}")

@@ -84,6 +84,11 @@ def flyby(
     check_settled(body)
     if not isinstance(encounter, Encounter):
         raise InvalidInput("encounter", encounter, "a flybystab.Encounter")
+    if not isinstance(surfaces, str | Sequence):
+        raise InvalidInput("surfaces", surfaces, "a name or a sequence of names")
+    for name, value in (("error", error), ("history", history)):
+        if not isinstance(value, bool):
+            raise InvalidInput(name, value, "True or False")
     tolerance, max_axis_ratio = step_tolerance(tolerance), axis_ratio(max_axis_ratio)
     asked, phases = request(grains, seeds, model), phases_of(robustness)
     rotation = encounter.periapsis_axes.T @ attitude_matrix(attitude)

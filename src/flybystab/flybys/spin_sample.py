@@ -105,6 +105,10 @@ def spin_sample(
     InvalidInput
         If `n` is not a positive whole number, or `seed` a negative one.
     """
+    if not isinstance(encounter, Encounter):
+        raise InvalidInput("encounter", encounter, "an Encounter")
+    if not isinstance(asteroid, Body) and not hasattr(asteroid, "pole"):
+        raise InvalidInput("asteroid", asteroid, "an Asteroid or a Body")
     known = not isinstance(asteroid, Body) and asteroid.pole is not None and encounter.frame == "ICRF"
     bodies, rotations = spin_states(asteroid, n, seed, material, use_pole=known)
     frame = periapsis_axes(encounter)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -19,6 +18,7 @@ from flybystab.catalogues.asteroid import Asteroid
 from flybystab.encounter.attitude import periapsis_axes
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput, UnknownName
+from flybystab.files import DOCUMENT_LIMIT, parse_toml, read_text
 from flybystab.orbit.planets import planet
 from flybystab.plots.formats import FIGURES, FILMS
 from flybystab.units import to_si
@@ -68,12 +68,7 @@ def scenario(path: str | Path) -> Scenario:
         A value has the wrong unit or no unit.
     """
     path = Path(path)
-    try:
-        content = tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except (OSError, UnicodeDecodeError) as reason:
-        raise InvalidInput("scenario file", path, f"a readable file ({reason})") from None
-    except tomllib.TOMLDecodeError as reason:
-        raise InvalidInput("scenario file", path, f"valid TOML ({reason})") from None
+    content = parse_toml(read_text(path, "scenario file", DOCUMENT_LIMIT), "scenario file", path)
     _check(content, "")
     for table in (t for t in KEYS if t):
         section = content.setdefault(table, {})

@@ -22,7 +22,7 @@ from flybystab.orbit.ephemeris import BELT, BODIES, EPHEMERIDES, N_BODIES, Ephem
 from flybystab.orbit.forces import FORCES, NonGravitational, model
 from flybystab.orbit.ias15 import EPSILON, TIGHT, Flight
 from flybystab.orbit.planets import PLANETS
-from flybystab.units import brief, to_si
+from flybystab.units import brief, checked_time, to_si, whole
 
 if TYPE_CHECKING:
     from flybystab.orbit.vector_function import OrbitVector
@@ -183,10 +183,10 @@ class Orbit:
         where = str(centre).lower()
         if where not in ("ssb", *BODIES):
             raise UnknownName("centre", str(centre), [], known=f"(known: ssb, {', '.join(BODIES)})")
-        if frame.lower() == "ecliptic":
+        if str(frame).lower() == "ecliptic":
             r, v = ecliptic_to_icrf() @ r, ecliptic_to_icrf() @ v
-        elif frame.upper() != "ICRF":
-            raise UnknownName("frame", frame, [], known="(known: ICRF, ecliptic)")
+        elif str(frame).upper() != "ICRF":
+            raise UnknownName("frame", str(frame), [], known="(known: ICRF, ecliptic)")
         return cls(_epoch(epoch), r * u.m, v * u.m / u.s, where, _nongrav(A1, A2, A3, law), name, covariance)
 
     def barycentric(self, window: Window) -> Array:
@@ -330,7 +330,7 @@ class Orbit:
             The ephemeris does not cover the epoch of the covariance.
         """
         covariance = self._known("clones")
-        parameters, _ = covariance.samples(_count(n), seed)
+        parameters, _ = covariance.samples(_count(n), whole(seed, "seed", 0))
         found = covariance.deviations(parameters[first:last])
         return deviated(self, covariance.epoch, *found, "clone", ephemeris, first)
 
@@ -468,8 +468,7 @@ def _ephemeris(name: str | Ephemeris | None) -> Ephemeris:
 
 
 def _epoch(epoch: Any) -> Time:
-    if not isinstance(epoch, Time) or epoch.shape != () or not np.isfinite(epoch.jd):
-        raise InvalidInput("epoch", epoch, "one astropy Time")
+    checked_time(epoch, "epoch")
     return epoch.tdb
 
 

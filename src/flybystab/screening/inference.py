@@ -10,7 +10,7 @@ shape.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import astropy.units as u
@@ -84,6 +84,9 @@ def infer(
     if np.any(rho <= 0.0):
         raise InvalidInput("densities", densities, "positive values")
     whole(attitudes, "attitudes", 1)
+    whole(seed, "seed", 0)
+    if not isinstance(encounters, Iterable) or not all(isinstance(e, Encounter) for e in encounters):
+        raise InvalidInput("encounters", encounters, "a sequence of Encounter")
     if not isinstance(asteroid, Asteroid | Body):
         raise InvalidInput(
             "asteroid", asteroid, "an Asteroid (Asteroid.from_catalogue finds a name) or a Body"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
@@ -13,6 +12,7 @@ import numpy as np
 
 from flybystab.body.body import DENSITY_RANGE
 from flybystab.errors import InvalidInput, UnknownName
+from flybystab.files import DOCUMENT_LIMIT, parse_toml, read_text
 from flybystab.screening.distributions import Distribution, distribution_of
 
 #: What a value must lie within, whatever its distribution.
@@ -130,13 +130,8 @@ class Population:
     @classmethod
     def from_file(cls, path: str | Path) -> Population:
         """From a TOML file, as :meth:`toml` writes it; what it leaves out keeps its default."""
-        try:
-            data = tomllib.loads(Path(path).read_text(encoding="utf-8-sig"))
-        except (OSError, UnicodeDecodeError) as error:
-            raise InvalidInput("population file", path, f"a readable file ({error})") from None
-        except tomllib.TOMLDecodeError as error:
-            raise InvalidInput("population file", path, f"valid TOML ({error})") from None
-        return cls.from_mapping(data)
+        what = "population file"
+        return cls.from_mapping(parse_toml(read_text(path, what, DOCUMENT_LIMIT), what, path))
 
     def toml(self) -> str:
         """The population as a TOML file."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from flybystab.catalogues.asteroid import identity
@@ -20,6 +20,8 @@ def listed(asteroids: str | Path | Sequence[Asteroid | str | int | Path] | None)
         path = Path(asteroids)
         named = isinstance(asteroids, str) and not path.suffix and not path.exists()
         asteroids = [str(asteroids) if named else path]
+    if not isinstance(asteroids, Iterable) or isinstance(asteroids, bytes):
+        raise InvalidInput("asteroids", asteroids, "asteroids, names, or paths of catalogue files")
     found: list[Asteroid] = []
     for a in asteroids:
         if isinstance(a, Asteroid):

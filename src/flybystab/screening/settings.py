@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from numbers import Real
 from typing import Any
@@ -19,7 +19,7 @@ from flybystab.errors import InvalidInput
 from flybystab.orbit.ephemeris import ephemeris
 from flybystab.orbit.planets import planet
 from flybystab.screening.priors import Population
-from flybystab.units import to_si, whole
+from flybystab.units import checked_time, to_si, whole
 
 #: Time that one asteroid may take before its row fails, s: ten thousand times the median.
 TIME_LIMIT = 600.0
@@ -102,7 +102,10 @@ def settings(
     dates = []
     for name, date in (("start", start), ("stop", stop)):
         try:
-            dates.append(float(Time(date, scale="tdb").jd if isinstance(date, str) else date.tdb.jd))
+            when = Time(date, scale="tdb") if isinstance(date, str) else date
+            dates.append(float(checked_time(when, name).tdb.jd))
+        except InvalidInput:
+            raise
         except (ValueError, AttributeError, TypeError):
             raise InvalidInput(
                 name, date, "an astropy Time or an ISO date such as 2029-04-13 (TDB)"
@@ -110,8 +113,15 @@ def settings(
     if not dates[0] < dates[1]:
         raise InvalidInput("stop", stop, f"a date after start = {start}")
     for name, number, least in (("samples", samples, 1), ("seed", seed, 0)):
-        whole(number, name, least)
+        if whole(number, name, least) >= 2**62:
+            raise InvalidInput(name, number, "a whole number below 2^62")
     ephemeris().check(*(Time(d, format="jd", scale="tdb") for d in dates))
+    if not isinstance(material, Material | None):
+        raise InvalidInput("material", material, "a Material, or None")
+    if not isinstance(population, Population | None):
+        raise InvalidInput("population", population, "a Population, or None")
+    if not isinstance(planets, Iterable):
+        raise InvalidInput("planets", planets, "a name or a sequence of names")
     names = (planets,) if isinstance(planets, str) else tuple(planets)
     if not names:
         raise InvalidInput("planets", planets, "at least one planet")

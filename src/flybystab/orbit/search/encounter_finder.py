@@ -43,7 +43,7 @@ from flybystab.orbit.search.force_selection import N_SHARES, NAMES, reduced
 from flybystab.orbit.search.minima import WIDTH
 from flybystab.orbit.search.track import EXHAUSTED, INSIDE, MAX_STEPS, STALLED, search
 from flybystab.orbit.target_plane import target_plane
-from flybystab.units import to_si
+from flybystab.units import checked_time, to_si
 
 Array = NDArray[np.float64]
 
@@ -136,8 +136,7 @@ def find_encounters(
     """
     rows = _objects(objects)
     for name, value in (("start", start), ("stop", stop)):
-        if not isinstance(value, Time) or value.shape != ():
-            raise InvalidInput(name, value, "one astropy Time")
+        checked_time(value, name)
     if not start < stop:
         raise InvalidInput("stop", stop.iso, f"a time after start, {start.iso}")
     if not isinstance(planets, Iterable):
@@ -149,9 +148,10 @@ def find_encounters(
     for body in found:
         if body.name == "sun":
             raise InvalidInput("planets", body.name, f"one of {', '.join(BODIES[1:])}")
-    reach = np.broadcast_to(
-        to_si(within, u.m, "within", shape=None, low=0.0, open_low=True), (len(found),)
-    ).astype(float)
+    reach = to_si(within, u.m, "within", shape=None, low=0.0, open_low=True)
+    if reach.shape not in ((), (1,), (len(found),)):
+        raise InvalidInput("within", within, "one distance, or one per planet")
+    reach = np.broadcast_to(reach, (len(found),)).astype(float)
     if tolerance is not None and not (isinstance(tolerance, Real) and 1e-16 <= tolerance <= 1e-4):
         raise InvalidInput("tolerance", tolerance, "a number in [1e-16, 1e-4]")
     accuracy = to_si(error, u.m, "error", low=0.0)
