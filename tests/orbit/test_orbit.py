@@ -128,7 +128,7 @@ def aimed(q, v_inf=10.0, days=3.0, sign=-1.0):
     """A state `days` before a passage at distance q (Earth radii), two-body, on a geocentric hyperbola."""
     enc = Encounter.hyperbolic("earth", q * EARTH.radius * u.m, v_inf * u.km / u.s, start_distance=1e10 * u.m)
     t = sign * days * 86400.0
-    return Orbit.from_state(EPOCH, enc.position(t)[0] * u.m, enc.velocity(t)[0] * u.m / u.s, centre="earth")
+    return Orbit.from_state(EPOCH, enc.position(t * u.s), enc.velocity(t * u.s), centre="earth")
 
 
 @pytest.mark.parametrize("q", [0.2, 0.9])
@@ -140,7 +140,7 @@ def test_impact_is_found_by_both_ways(q):
     assert enc.impact_level == "surface"
     assert enc.t_start < enc.impact_time < 0
     assert enc.t_stop == enc.impact_time
-    assert enc.radius(enc.impact_time)[0] == pytest.approx(EARTH.impact_distance, abs=200.0)
+    assert enc.radius(enc.impact_time * u.s).value == pytest.approx(EARTH.impact_distance, abs=200.0)
     table = find_encounters(orbit, later(EPOCH, -1.0), later(near, 86400.0 * 20), ephemeris="de421")
     assert list(table["impact"]) == [True]
     assert table["distance"][0].to_value(u.m) == pytest.approx(enc.distance.to_value(u.m), rel=0.01)
@@ -201,7 +201,7 @@ def test_both_reach_the_moon_as_a_planet():
     window = ephemeris("de421").window(EPOCH, -10.0, 6e5)
     moon, earth = (window.states(BODIES.index(n), np.array([3e5]))[0] for n in ("moon", "earth"))
     flyby = Encounter.hyperbolic("moon", 3000 * u.km, 5 * u.km / u.s, start_distance=1e9 * u.m)
-    state = moon + np.concatenate([flyby.position(-5e4)[0], flyby.velocity(-5e4)[0]])
+    state = moon + np.concatenate([flyby.position(-5e4 * u.s).value, flyby.velocity(-5e4 * u.s).value])
     orbit = Orbit.from_state(later(EPOCH, 3e5), state[:3] * u.m, state[3:] * u.m / u.s, centre="ssb")
     enc = Encounter.from_orbit(orbit, "moon", later(EPOCH, 3.5e5), ephemeris="de421")
     table = find_encounters(orbit, EPOCH, later(EPOCH, 6e5), ["moon"], ephemeris="de421", tolerance=1e-13)

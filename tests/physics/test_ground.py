@@ -124,8 +124,8 @@ def test_path_into_the_planet_is_told_from_a_touch():
     assert table.contact.tolist() == ["path", "body", ""]
     # the body touches before its centre is down
     assert deep.end_time.value + deep.encounter.t_start < deep.encounter.impact_time
-    assert "on a path into the surface" in "\n".join(flyby_lines(deep))
-    assert "its centre would pass 1 km above the ground, but its side touches it" in "\n".join(
+    assert "the path enters the surface" in "\n".join(flyby_lines(deep))
+    assert "the centre would pass 1 km above the ground, but the body touches it" in "\n".join(
         flyby_lines(graze)
     )
 
