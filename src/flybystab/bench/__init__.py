@@ -12,5 +12,6 @@ BENCHES = {
     "flyby": "integrators of one flyby",
     "many": "rate of many encounters by threads",
     "screen": "bound and dynamics of a screening",
+    "grains": "piles of grains: cost, numerical error, reference data",
     "sky": "close approaches against JPL, search against ASSIST",
 }

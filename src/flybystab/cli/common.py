@@ -151,9 +151,24 @@ def check_table(path: str | None) -> None:
     check_output(path)
 
 
+def grains_arguments(sub: argparse.ArgumentParser) -> None:
+    """Add the number of grains and of piles."""
+    sub.add_argument(
+        "--grains", type=int, metavar="N", help="follow piles of N grains where the ellipsoid ends (500)"
+    )
+    sub.add_argument("--piles", type=int, default=8, metavar="N", help="piles of grains (8)")
+
+
 def write_picture(result: Any, title: str, path: str) -> None:
-    """Write the panels of a flyby, or its animation, depending on the suffix."""
-    if path.lower().endswith(FILMS):
+    """Write the panels of a flyby, or its animation, depending on the suffix; those of the grains where there are any."""
+    if result.grains is not None:
+        from flybystab.plots.grains import grains_animation, grains_figure
+
+        if path.lower().endswith(FILMS):
+            grains_animation(result, path, title)
+        else:
+            grains_figure(result, title, path)
+    elif path.lower().endswith(FILMS):
         from flybystab.plots.scene import animation
 
         animation(result, path, title)

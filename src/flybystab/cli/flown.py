@@ -68,6 +68,13 @@ def flown(options: argparse.Namespace) -> tuple[Any, Any, Any]:
         import astropy.units as u
 
         attitude = periapsis_axes(encounter) @ asteroid.attitude(0 * u.deg)
-    result = flyby(asteroid.body, encounter, attitude, surfaces=SURFACES)
+    result = flyby(
+        asteroid.body,
+        encounter,
+        attitude,
+        surfaces=SURFACES,
+        grains=getattr(options, "grains", None),
+        seeds=getattr(options, "piles", 1),
+    )
     sample = spin_sample(asteroid, encounter, n=options.attitudes, seed=options.seed)
     return asteroid, result, sample

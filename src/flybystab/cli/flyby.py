@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from flybystab.cli.common import check_picture, figure_argument, show, write_picture
+from flybystab.cli.common import check_picture, figure_argument, grains_arguments, show, write_picture
 from flybystab.cli.flown import attitude_words, flown, passage_arguments
 from flybystab.plots.formats import FIGURES, FILMS
 
@@ -15,12 +15,14 @@ EXAMPLE = "flybystab flyby Apophis --output apophis.png"
 def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     passage_arguments(sub)
+    grains_arguments(sub)
     figure_argument(sub, films=True)
 
 
 def run(options: argparse.Namespace) -> None:
     """Execute the command."""
     from flybystab.io import document, text
+    from flybystab.io.grains_text import grains_lines
 
     check_picture(options.output, FIGURES + FILMS)
     asteroid, result, sample = flown(options)
@@ -47,6 +49,7 @@ def run(options: argparse.Namespace) -> None:
             *text.encounter_lines(encounter),
             f"attitude   {attitude_words(asteroid)}",
             *text.flyby_lines(result),
+            *grains_lines(result),
             *text.sample_lines(sample),
             *text.model_lines(result, asteroid.assumptions),
             *([f"figure     {options.output}"] if options.output else []),

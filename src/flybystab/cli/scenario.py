@@ -27,13 +27,21 @@ def run(options: argparse.Namespace) -> None:
     """Execute the command."""
     from flybystab.flybys.flyby import flyby
     from flybystab.io import document, text
+    from flybystab.io.grains_text import grains_lines
     from flybystab.io.scenario import scenario
 
     check_picture(options.output, FIGURES + FILMS)
     script = scenario(options.file)
     figure = options.output or script.figure
     check_picture(figure, FIGURES + FILMS)
-    result = flyby(script.body, script.encounter, script.attitude, surfaces=SURFACES)
+    result = flyby(
+        script.body,
+        script.encounter,
+        script.attitude,
+        surfaces=SURFACES,
+        grains=script.grains,
+        seeds=script.piles,
+    )
     if figure:
         write_picture(result, script.title, figure)
     show(
@@ -43,6 +51,7 @@ def run(options: argparse.Namespace) -> None:
             f"scenario   {script.title}",
             *text.encounter_lines(script.encounter),
             *text.flyby_lines(result),
+            *grains_lines(result),
             *text.model_lines(result),
             *([f"figure     {figure}"] if figure else []),
         ],

@@ -16,6 +16,7 @@ from astropy.time import Time
 
 from flybystab._version import __version__
 from flybystab.encounter.encounter import Encounter
+from flybystab.flybys.grains_document import grains_document
 from flybystab.flybys.result import FlybyResult
 from flybystab.flybys.spin_sample import SpinSample
 from flybystab.tabular import with_unit
@@ -122,6 +123,7 @@ def flyby_document(result: FlybyResult, sample: SpinSample | None = None, **abou
             "event_times_s": error.event_times.to_value(u.s),
             "verdict_agrees": error.verdict_agrees,
         },
+        "grains": grains_document(result.grains),
         "modelled": result.modelled,
         "left_out": [{"what": name, "share": share} for name, share in result.left_out],
     }

@@ -3,6 +3,9 @@
 Every seed is another pile with the body's shape, density, spin and friction angle; outcomes scatter from pile to pile,
 so that a result is a distribution. A run goes on after the encounter until its clumps have not changed for
 :data:`QUIET` (every clump of at least :data:`SMALLEST` of the mass has kept its mass to that share) or to a limit.
+
+The class (Richardson et al. 1998) is that of the largest clump at the end: S up to half of the mass, B up to 0.9, M
+above if mass escapes. What is bound to it but apart, as satellites are, counts in the bound share only.
 """
 
 from __future__ import annotations
@@ -47,6 +50,9 @@ SMALLEST = 0.01
 #: Time without a change of clumps after which a run ends, in units of ``sqrt(R^3/(G M))`` (1.5 h at 2000 kg/m3), and
 #: the longest time after the end of the encounter.
 QUIET, LONGEST = 4.0, 40.0
+#: A pile of which nothing escapes is whole if its largest clump has more than this share of the mass: the rest are
+#: loose grains and small satellites.
+WHOLE = 0.9
 #: Change of a semi-axis of the remnant below which nothing has moved.
 UNMOVED = 0.01
 #: Rows of the course of a run.
@@ -179,8 +185,8 @@ class GrainsOutcome:
 
     @property
     def median(self) -> GrainsRun:
-        """The run with the median bound fraction (the lower one of two)."""
-        ordered = sorted(self.runs, key=lambda r: (r.bound_fraction, r.largest_fraction, r.stretch))
+        """The run with the median mass of the largest clump, the lower one of two."""
+        ordered = sorted(self.runs, key=lambda r: (r.largest_fraction, r.bound_fraction, -r.stretch))
         return ordered[(len(ordered) - 1) // 2]
 
     @property
@@ -191,12 +197,12 @@ class GrainsOutcome:
             return Verdict.IMPACT
         if self.median.verdict != Verdict.IMPACT:
             return self.median.verdict
-        return classed(self.median.bound_fraction)[0]
+        return classed(self.median.largest_fraction)[0]
 
     @property
     def largest_fraction(self) -> float:
-        """Median over the seeds of the mass of the largest clump, over that of the body."""
-        return float(np.median([r.largest_fraction for r in self.runs]))
+        """Of the median run: mass of the largest clump over that of the body."""
+        return self.median.largest_fraction
 
     @property
     def bound_fraction(self) -> float:
@@ -354,8 +360,8 @@ def one_pile(pile: Pile, body: Body, encounter: Encounter, rotation: Array, seed
     course = np.array(rows)
     if sim.counts[1] > 0:
         verdict = Verdict.IMPACT
-    elif last[2] < 1.0 - 1e-9:
-        verdict, _ = classed(last[2])
+    elif last[2] < 1.0 or last[1] <= WHOLE:
+        verdict, _ = classed(last[1])
     else:
         moved = np.abs(axes / pile.axes - 1.0).max()
         verdict = Verdict.INTACT if moved < UNMOVED else Verdict.RESHAPED
@@ -578,7 +584,7 @@ def handed_on(
     run, verdict = outcome.median, outcome.verdict
     return result.with_(
         verdict=verdict,
-        verdict_class=letter_of(verdict, outcome.bound_fraction),
+        verdict_class=letter_of(verdict, outcome.largest_fraction),
         bound_fraction=outcome.bound_fraction,
         semi_axes=run.semi_axes,
         spin=run.spin,

@@ -25,7 +25,7 @@ from flybystab.units import to_si
 
 #: Allowed keys of each table.
 KEYS: dict[str, tuple[str, ...]] = {
-    "": ("title", "body", "material", "encounter", "attitude", "output"),
+    "": ("title", "body", "material", "encounter", "attitude", "grains", "output"),
     "body": ("asteroid", "semi_axes", "density", "spin_period", "spin", "phase"),
     "material": ("friction_angle", "cohesion", "dilatancy", "yield_surface", "brittle"),
     "encounter": (
@@ -40,6 +40,7 @@ KEYS: dict[str, tuple[str, ...]] = {
         "ephemeris",
     ),
     "attitude": ("euler_zxz", "turn"),
+    "grains": ("number", "piles"),
     "output": ("figure",),
 }
 
@@ -53,6 +54,8 @@ class Scenario:
     encounter: Encounter
     attitude: np.ndarray
     figure: str | None = None
+    grains: int | None = None
+    piles: int = 8
 
 
 def scenario(path: str | Path) -> Scenario:
@@ -83,7 +86,9 @@ def scenario(path: str | Path) -> Scenario:
     figure = _typed(content["output"], "output", "figure", str, None)
     if figure is not None and Path(figure).suffix.lower() not in FIGURES + FILMS:
         raise InvalidInput("output.figure", figure, f"a file that ends in {' or '.join(FIGURES + FILMS)}")
-    return Scenario(title, body, encounter, attitude, figure)
+    number = _typed(content["grains"], "grains", "number", int, 500 if content["grains"] else None)
+    piles = _typed(content["grains"], "grains", "piles", int, 8)
+    return Scenario(title, body, encounter, attitude, figure, number, piles)
 
 
 def quantity(value: Any, name: str) -> Quantity:
@@ -130,7 +135,12 @@ def _typed(section: dict[str, Any], table: str, key: str, kind: type, default: A
     if kind is float and isinstance(value, int) and not isinstance(value, bool):
         value = float(value)
     if not isinstance(value, kind):
-        words = {bool: "true or false, without quotes", float: "a number, without quotes", str: "text"}
+        words = {
+            bool: "true or false, without quotes",
+            float: "a number, without quotes",
+            int: "a whole number, without quotes",
+            str: "text",
+        }
         raise InvalidInput(f"{table}.{key}" if table else key, value, words[kind])
     return value
 

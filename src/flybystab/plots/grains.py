@@ -1,0 +1,131 @@
+"""A pile of grains through an encounter: stills, the largest clump against time, an animation.
+
+Grains are drawn to scale in the plane of the orbit, seen from the side of its angular momentum, in the colour of the
+clump that they belong to at the end; grey ones are loose.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import astropy.units as u
+import numpy as np
+from matplotlib.collections import EllipseCollection
+from numpy.typing import NDArray
+
+from flybystab.encounter.attitude import periapsis_axes
+from flybystab.errors import InvalidInput
+from flybystab.flybys.grains_flyby import GrainsOutcome, GrainsRun
+from flybystab.flybys.result import FlybyResult
+from flybystab.plots.flyby import BLACK
+
+Array = NDArray[np.float64]
+
+#: Colours of clumps, the most massive first; then they repeat.
+COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#f0e442", "#7f3c8d")
+LOOSE = "0.7"
+
+
+def grains_plot(
+    axes: Any, run: GrainsRun, row: int, turn: Array | None = None, reach: float | None = None
+) -> Any:
+    """Grains of a run at one row of its course, km.
+
+    Parameters
+    ----------
+    axes : matplotlib Axes
+    run : GrainsRun
+    row : int
+    turn : ndarray (3, 3), optional
+        Frame of the encounter -> frame of the picture.
+    reach : float, optional
+        Half of the picture's width, km; by default all clumps are in it.
+    """
+    x = run.course.positions[row].to_value(u.km) @ (np.eye(3) if turn is None else turn).T
+    r = run.radius.to_value(u.km)
+    held = np.isfinite(x).all(axis=1)
+    biggest = held & (run.label == 0)
+    centre = x[biggest].mean(axis=0) if biggest.any() else np.zeros(3)
+    order = np.flatnonzero(held)[np.argsort(x[held, 2])]
+    place = x[order, :2] - centre[:2]
+    colours = [COLOURS[k % len(COLOURS)] if k >= 0 else LOOSE for k in run.label[order]]
+    size = 2.0 * r[order]
+    axes.add_collection(
+        EllipseCollection(
+            size, size, np.zeros(len(size)), units="xy", offsets=place, offset_transform=axes.transData,
+            facecolors=colours, edgecolors=BLACK, linewidths=0.15,
+        )
+    )  # fmt: skip
+    if reach is None:
+        inside = run.label[order] >= 0
+        reach = 1.1 * float(np.abs(place[inside] if inside.any() else place).max() + r.max())
+    axes.set(aspect="equal", xlim=(-reach, reach), ylim=(-reach, reach), xlabel="x (km)")
+    axes.locator_params(nbins=5)
+    return axes
+
+
+def grains_figure(result: FlybyResult, title: str = "", path: str | Path | None = None) -> Any:
+    """Four stills of the pile with the median outcome, and the largest clump of all piles against time."""
+    from matplotlib.figure import Figure
+
+    outcome = _outcome(result)
+    run, turn = outcome.median, periapsis_axes(result.encounter)
+    hours = run.course.time.to_value(u.h)
+    rows = [0, *(int(np.abs(hours - h).argmin()) for h in (0.7, 1.8)), len(hours) - 1]
+    figure = Figure(figsize=(11.0, 5.6), layout="constrained")
+    grid = figure.add_gridspec(2, 4, height_ratios=(1.4, 1.0))
+    for k, row in enumerate(rows):
+        axes = figure.add_subplot(grid[0, k])
+        grains_plot(axes, run, row, turn)
+        axes.set_title(f"{hours[row]:+.2f} h", fontsize=10)
+        if k == 0:
+            axes.set_ylabel("y (km)")
+    share, spin = figure.add_subplot(grid[1, :2]), figure.add_subplot(grid[1, 2:])
+    for one in outcome.runs:
+        t = one.course.time.to_value(u.h)
+        own: dict[str, Any] = {"color": COLOURS[0] if one is run else "0.7", "lw": 1.5 if one is run else 0.8}
+        share.plot(t, one.course.largest_fraction, zorder=3 if one is run else 2, **own)
+        spin.plot(t, one.course.semi_axes[:, 0].to_value(u.m), zorder=3 if one is run else 2, **own)
+    share.set(xlabel="time from closest approach (h)", ylabel="largest clump / mass", ylim=(0.0, 1.05))
+    spin.set(xlabel="time from closest approach (h)", ylabel="its long semi-axis (m)")
+    figure.suptitle(
+        f"{title + ': ' if title else ''}{result.verdict}, {len(outcome.runs)} piles, blue: the median one",
+        fontsize=10,
+    )
+    if path is not None:
+        figure.savefig(path, dpi=150)
+    return figure
+
+
+def grains_animation(result: FlybyResult, path: str | Path, title: str = "", rate: int = 8) -> Path:
+    """An animation of the pile with the median outcome, as GIF or MP4."""
+    from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    target = Path(path)
+    run, turn = _outcome(result).median, periapsis_axes(result.encounter)
+    figure = Figure(figsize=(5.0, 5.2), layout="constrained", dpi=80)
+    FigureCanvasAgg(figure)
+    axes: Any = figure.add_subplot()
+
+    def draw(k: int) -> list[Any]:
+        axes.clear()
+        grains_plot(axes, run, k, turn)
+        axes.set_title(f"{run.course.time[k].to_value(u.h):+.2f} h", fontsize=10)
+        axes.set_ylabel("y (km)")
+        return []
+
+    figure.suptitle(title, fontsize=10)
+    film = FuncAnimation(figure, draw, frames=len(run.course))
+    film.save(
+        target, writer=PillowWriter(fps=rate) if target.suffix.lower() == ".gif" else FFMpegWriter(fps=rate)
+    )
+    return target
+
+
+def _outcome(result: FlybyResult) -> GrainsOutcome:
+    if result.grains is None:
+        raise InvalidInput("result", result.rung, "the result of flyby(..., grains=) that grains have given")
+    return result.grains
