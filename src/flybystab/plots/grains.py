@@ -106,9 +106,9 @@ def grains_animation(result: FlybyResult, path: str | Path, title: str = "", rat
 
     target = Path(path)
     run, turn = _outcome(result).median, periapsis_axes(result.encounter)
-    figure = Figure(figsize=(5.0, 5.2), layout="constrained", dpi=80)
+    figure = Figure(figsize=(5.0, 5.2), dpi=80)
     FigureCanvasAgg(figure)
-    axes: Any = figure.add_subplot()
+    axes: Any = figure.add_axes((0.16, 0.1, 0.8, 0.8))
 
     def draw(k: int) -> list[Any]:
         axes.clear()
