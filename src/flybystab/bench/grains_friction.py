@@ -11,7 +11,6 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.body.pile import settled_pile
 from flybystab.core.ellipsoid.rigid_stress import demand, rigid_stress
@@ -19,8 +18,7 @@ from flybystab.core.grains.clumps import moments, semi_axes, spin_of
 from flybystab.core.grains.simulation import Simulation
 from flybystab.core.material.surfaces import code_of
 from flybystab.core.numerics.threads import in_order
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Contact friction of the table: sliding, then the size of the contact patch.
 POINTS = (

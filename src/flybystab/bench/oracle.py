@@ -13,7 +13,6 @@ from typing import Any
 
 import numpy as np
 from astropy.time import Time
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from flybystab.constants import AU, DAY
@@ -21,8 +20,7 @@ from flybystab.errors import MissingExtra
 from flybystab.orbit.ephemeris import ephemeris
 from flybystab.orbit.ias15 import set_step_control
 from flybystab.orbit.orbit import Orbit
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: How far from the ends of a step it is looked at, d.
 _AFTER = 1e-6

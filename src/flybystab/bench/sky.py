@@ -17,7 +17,6 @@ from typing import Any
 import astropy.units as u
 import numpy as np
 from astropy.time import Time
-from numpy.typing import NDArray
 
 from flybystab.bench import oracle
 from flybystab.bench.jpl import SPAN, approaches, orbits
@@ -28,8 +27,7 @@ from flybystab.orbit.forces import FORCES
 from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.search.encounter_finder import find_encounters
 from flybystab.plots.style import save
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 WITHIN = 0.5
 #: Errors asked of the search, km (its default is 0.1), and tolerances of ASSIST.

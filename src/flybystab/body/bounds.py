@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
-from numpy.typing import NDArray
 
 from flybystab.body.body import DENSITY_RANGE, Body
 from flybystab.body.equilibrium import stress_components, tide_components
@@ -15,9 +14,8 @@ from flybystab.constants import G
 from flybystab.core.ellipsoid.rigid_stress import demand, overload, rigid_stress, spin_interval
 from flybystab.core.numerics.jit import kernel
 from flybystab.errors import InvalidInput
+from flybystab.typing import Array
 from flybystab.units import brief, to_si
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -16,7 +16,6 @@ from typing import Any
 import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
-from numpy.typing import NDArray
 
 from flybystab.body.body import DEFAULT_SURFACE, YIELD_SURFACES, Body, check_body
 from flybystab.constants import G
@@ -24,9 +23,8 @@ from flybystab.core.ellipsoid.rigid_stress import demand, invariants, load_inter
 from flybystab.core.ellipsoid.tide import components, tensor
 from flybystab.core.material.yield_surface import lode_angle
 from flybystab.errors import InvalidInput
+from flybystab.typing import Array
 from flybystab.units import brief, to_si
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
 from flybystab.errors import InvalidInput
+from flybystab.typing import Array
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 

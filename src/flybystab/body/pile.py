@@ -32,8 +32,7 @@ from flybystab.core.grains.neighbours import Pairs, empty_pairs
 from flybystab.core.grains.simulation import Simulation
 from flybystab.core.grains.state import Grains, contact_parameters
 from flybystab.errors import InvalidInput
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Changes with the recipe, so that piles made by an older one are not taken for new ones.
 RECIPE = 1

@@ -14,7 +14,6 @@ from typing import Any
 import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
-from numpy.typing import NDArray
 
 from flybystab.body.body import Body, check_body
 from flybystab.body.equilibrium import equilibrium
@@ -26,9 +25,8 @@ from flybystab.core.energy.perturbation import EDGE, pile, rate_of_strain, slope
 from flybystab.core.energy.perturbation import direction as strain_direction
 from flybystab.core.energy.potential import velocity_gradient
 from flybystab.errors import InvalidInput, NotConverged
+from flybystab.typing import Array
 from flybystab.units import to_si
-
-Array = NDArray[np.float64]
 
 #: How long a perturbed body is followed, in dynamical times: a body at rest may tumble and yield anew.
 PATIENCE = 100.0

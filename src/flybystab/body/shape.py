@@ -18,9 +18,9 @@ from flybystab.body.shape_files import read_mesh, write_vtk
 from flybystab.constants import G
 from flybystab.core.polyhedron.gravity import polyhedron_gravity
 from flybystab.errors import InvalidInput
+from flybystab.typing import Array
 from flybystab.units import brief, frozen, to_si, whole
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 #: Facets of shapes that are made in code, by default.

@@ -27,8 +27,8 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.errors import InvalidInput, MissingExtra
+from flybystab.typing import Array
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Mesh = tuple[Array, Integers]
 

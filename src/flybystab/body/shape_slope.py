@@ -10,7 +10,6 @@ from __future__ import annotations
 import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
-from numpy.typing import NDArray
 
 from flybystab.body.body import Body
 from flybystab.body.equilibrium import tide_components
@@ -18,9 +17,8 @@ from flybystab.body.shape import Shape
 from flybystab.body.surface_slope import SlopeChange, SurfaceSlopes
 from flybystab.core.ellipsoid.surface_slope import effective_field
 from flybystab.errors import InvalidInput
+from flybystab.typing import Array
 from flybystab.units import to_si
-
-Array = NDArray[np.float64]
 
 
 def shape_slopes(shape: Shape, body: Body, tide: Quantity | None = None) -> SurfaceSlopes:

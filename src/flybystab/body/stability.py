@@ -30,7 +30,6 @@ from typing import Any, NamedTuple
 import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
-from numpy.typing import NDArray
 
 from flybystab.body.body import Body, check_body
 from flybystab.body.equilibrium import Equilibrium, equilibrium, spin_limits
@@ -43,9 +42,8 @@ from flybystab.core.energy.perturbation import loss_at, loss_rate, pile, powers,
 from flybystab.core.energy.potential import MASS
 from flybystab.core.energy.stability_row import classify
 from flybystab.errors import InvalidInput
+from flybystab.typing import Array
 from flybystab.units import to_si
-
-Array = NDArray[np.float64]
 
 #: numpy's, as all flags of the kernels.
 WITH_INERTIA: Any = np.bool_(False)

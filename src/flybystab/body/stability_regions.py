@@ -25,9 +25,8 @@ from flybystab.core.energy import stability_row as columns
 from flybystab.core.energy.potential import GRAVITY
 from flybystab.core.energy.stability_row import classify_many
 from flybystab.errors import InvalidInput, UnknownName
+from flybystab.typing import Array
 from flybystab.units import to_si
-
-Array = NDArray[np.float64]
 
 #: How far a batch goes: each step costs about ten times the one before.
 DEPTHS = ("friction", "infinitesimal", "second", "third", "barrier")

@@ -19,9 +19,8 @@ from flybystab.body.equilibrium import tide_components
 from flybystab.constants import G
 from flybystab.core.ellipsoid.surface_slope import effective_field, slopes, slopes_through
 from flybystab.errors import InvalidInput
+from flybystab.typing import Array
 from flybystab.units import brief, to_si
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

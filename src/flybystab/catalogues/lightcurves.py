@@ -8,9 +8,8 @@ from functools import lru_cache
 from importlib import resources
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Bodies of like size among which a period is drawn.
 NEIGHBOURS = 200

@@ -15,14 +15,12 @@ from collections.abc import Mapping
 
 import numpy as np
 from astropy.time import Time
-from numpy.typing import NDArray
 
 from flybystab.constants import AU, DAY, YEAR
 from flybystab.orbit.covariance import SETS, Covariance
 from flybystab.orbit.elements import GM_SUN, state_from_elements
 from flybystab.orbit.kepler import two_body
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Half a unit in the last decimal of MPCORB: a (by way of the mean motion, deg/d), e, i, node, peri, M (deg).
 _HALF_UNITS = {"n": 5e-9, "e": 5e-8, "angle": 5e-6}

@@ -15,14 +15,12 @@ periods (``P_psi`` and ``P_phi``); with the inertia ratios they fix ``L`` and ``
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import ellipj, ellipk
 
 from flybystab.constants import OBLIQUITY_J2000
 from flybystab.errors import InvalidInput, UnknownName
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 MODES = ("SAM", "LAM")
 

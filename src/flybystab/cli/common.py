@@ -160,7 +160,7 @@ def grains_arguments(sub: argparse.ArgumentParser) -> None:
 
 
 def write_picture(result: Any, title: str, path: str) -> None:
-    """Write the panels of a flyby, or its animation, depending on the suffix; those of the grains where there are any."""
+    """Write the panels of a flyby or of its grains, or the animation, depending on the suffix."""
     if result.grains is not None:
         from flybystab.plots.grains import grains_animation, grains_figure
 

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: How far ``A A^T`` of an attitude may be from 1.
 ORTHOGONAL = 1e-8

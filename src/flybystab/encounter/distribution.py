@@ -26,9 +26,8 @@ from flybystab.orbit.ephemeris import Ephemeris
 from flybystab.orbit.orbit import Orbit, later
 from flybystab.orbit.planets import Planet, planet
 from flybystab.orbit.search.encounter_finder import find_encounters
+from flybystab.typing import Array
 from flybystab.units import brief, checked_time, to_si
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

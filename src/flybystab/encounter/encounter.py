@@ -11,7 +11,6 @@ import astropy.units as u
 import numpy as np
 from astropy.time import Time
 from astropy.units import Quantity
-from numpy.typing import NDArray
 
 from flybystab.core.dynamics.ground import Ground
 from flybystab.core.ellipsoid.tide import TidePanels, tide_panels
@@ -22,9 +21,8 @@ from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.planets import Planet, planet
 from flybystab.orbit.predictability import Predictability
 from flybystab.orbit.target_plane import NORTH, checked, target_plane
+from flybystab.typing import Array
 from flybystab.units import brief, checked_time, to_si
-
-Array = NDArray[np.float64]
 
 
 class Track(Protocol):

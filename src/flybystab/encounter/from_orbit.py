@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import astropy.units as u
 import numpy as np
 from astropy.time import Time
-from numpy.typing import NDArray
 
 from flybystab.constants import AU, DAY, HOUR
 from flybystab.core.ellipsoid.tide import tide_panels
@@ -39,8 +38,7 @@ from flybystab.orbit.predictability import (
     predictability,
 )
 from flybystab.orbit.search.encounter_finder import starts_inside
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Crossings of the surface within this time of a closest approach belong to it, s.
 _OWN = 2.0 * HOUR

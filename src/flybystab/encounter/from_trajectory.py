@@ -9,7 +9,6 @@ import astropy.units as u
 import numpy as np
 from astropy.time import Time
 from astropy.units import Quantity
-from numpy.typing import NDArray
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
@@ -22,9 +21,8 @@ from flybystab.encounter.tide_sources import planet_tide
 from flybystab.errors import InvalidInput, NoEncounter
 from flybystab.orbit.kepler import two_body
 from flybystab.orbit.planets import Planet
+from flybystab.typing import Array
 from flybystab.units import to_si
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import astropy.units as u
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.ellipsoid.tide import tide_panels
 from flybystab.encounter.encounter import Encounter
@@ -14,8 +13,7 @@ from flybystab.encounter.reach import TAIL
 from flybystab.encounter.tide_sources import planet_tide
 from flybystab.orbit.kepler import states_at_times, time_at_distance
 from flybystab.orbit.planets import PLANETS, Planet
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 
 @dataclass(frozen=True)

@@ -8,14 +8,12 @@ from typing import Any
 import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
-from numpy.typing import NDArray
 from scipy.integrate import quad
 from scipy.stats import norm
 
 from flybystab.orbit.planets import Planet
 from flybystab.orbit.target_plane import capture_radius
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.ellipsoid.tide import tide_j2, tide_point
 from flybystab.core.numerics.jit import kernel
 from flybystab.orbit.closest_approach import PanelTrack
 from flybystab.orbit.ephemeris import BODIES, Window
 from flybystab.orbit.planets import Planet
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 
 @kernel

@@ -18,9 +18,8 @@ from flybystab.encounter.encounter import Encounter
 from flybystab.encounter.reach import TAIL
 from flybystab.errors import InvalidInput
 from flybystab.flybys.verdict import Verdict, verdict_of
+from flybystab.typing import Array
 from flybystab.units import to_si
-
-Array = NDArray[np.float64]
 
 #: :func:`flybystab.core.dynamics.verdict_row.judge_rows`, to be called with the arrays of `one_row`.
 judge_rows: Any = judgement.judge_rows

@@ -95,6 +95,7 @@ def flyby_document(result: FlybyResult, sample: SpinSample | None = None, **abou
         **about,
         "encounter": encounter_document(result.encounter),
         "verdict": str(result.verdict),
+        "rung": result.rung,
         "verdict_class": result.verdict_class,
         "verdict_by_surface": {k: str(v) for k, v in result.verdict_by_surface.items()},
         "robust": result.robust,

@@ -5,7 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import astropy.units as u
-import numpy as np
 
 from flybystab.flybys.grains_flyby import GrainsOutcome
 

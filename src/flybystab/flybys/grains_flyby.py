@@ -37,9 +37,8 @@ from flybystab.flybys.batch import ground_near, span_of
 from flybystab.flybys.remnant import final_attitude
 from flybystab.flybys.result import FlybyResult
 from flybystab.flybys.verdict import Verdict, classed, letter_of
+from flybystab.typing import Array
 from flybystab.units import brief
-
-Array = NDArray[np.float64]
 
 #: Piles whose distribution is a result.
 SEEDS = 8

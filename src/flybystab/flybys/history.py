@@ -14,9 +14,9 @@ from flybystab.core.material.yield_surface import required_frictions
 from flybystab.flybys.batch import Judged
 from flybystab.flybys.inputs import FlybyInputs
 from flybystab.tabular import Tabular
+from flybystab.typing import Array
 from flybystab.units import brief
 
-Array = NDArray[np.float64]
 _Events = list[tuple[str, float, float]]
 
 

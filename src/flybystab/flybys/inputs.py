@@ -5,14 +5,12 @@ from __future__ import annotations
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.body.body import Body
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import NotConverged
 from flybystab.flybys.batch import Judged, judged
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 
 class FlybyInputs(NamedTuple):

@@ -14,7 +14,6 @@ from typing import Any
 import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
-from numpy.typing import NDArray
 
 from flybystab.body.body import Body
 from flybystab.body.stability import body_units
@@ -26,9 +25,8 @@ from flybystab.core.energy.potential import MASS, velocity_gradient
 from flybystab.core.energy.stability_row import first_to_flow
 from flybystab.encounter.encounter import Encounter
 from flybystab.flybys.rigid_course import Course, rigid_course
+from flybystab.typing import Array
 from flybystab.units import brief, to_si
-
-Array = NDArray[np.float64]
 
 #: Predicted outcomes.
 HOLDS, RECOVERS, RUNS_AWAY = "holds", "recovers", "runs away"

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 import astropy.units as u
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.body.body import DENSITY_RANGE, Body
 from flybystab.core.ellipsoid.bound_mass import principal_axes
 from flybystab.flybys.batch import Judged
 from flybystab.flybys.verdict import Verdict
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 
 def final_attitude(shape: Array, spin: Array, along: float) -> Array:

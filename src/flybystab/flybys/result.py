@@ -11,7 +11,6 @@ import astropy.units as u
 import numpy as np
 from astropy.table import QTable
 from astropy.units import Quantity
-from numpy.typing import NDArray
 
 from flybystab.body.body import Body
 from flybystab.body.surface_slope import SlopeChange
@@ -24,12 +23,11 @@ from flybystab.flybys.robustness import Robustness, surface_verdicts
 from flybystab.flybys.surface_change import slopes_on_the_way
 from flybystab.flybys.verdict import Verdict, letter_of
 from flybystab.flybys.verdict_margins import VerdictMargins, verdict_margins
+from flybystab.typing import Array
 from flybystab.units import brief
 
 if TYPE_CHECKING:
     from flybystab.flybys.grains_flyby import GrainsOutcome
-
-Array = NDArray[np.float64]
 
 #: Composing it anew costs ten times as much.
 RAD_S = u.rad / u.s

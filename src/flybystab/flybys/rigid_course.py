@@ -11,7 +11,6 @@ from typing import Any
 import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
-from numpy.typing import NDArray
 
 from flybystab.body.body import Body, check_settled
 from flybystab.core.dynamics.run import passage
@@ -22,9 +21,8 @@ from flybystab.encounter.attitude import attitude_matrix, periapsis_axes
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput, NotConverged
 from flybystab.flybys.batch import ground_near, span_of
+from flybystab.typing import Array
 from flybystab.units import brief
-
-Array = NDArray[np.float64]
 
 #: Rows kept at most.
 ROWS = 20_000

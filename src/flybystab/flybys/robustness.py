@@ -16,9 +16,8 @@ from flybystab.flybys.batch import Judged
 from flybystab.flybys.flyby_many import flyby_many
 from flybystab.flybys.inputs import FlybyInputs
 from flybystab.flybys.verdict import Verdict
+from flybystab.typing import Array
 from flybystab.units import whole
-
-Array = NDArray[np.float64]
 
 #: Spin phases unless a number is given.
 PHASES = 8

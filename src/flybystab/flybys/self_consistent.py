@@ -10,8 +10,7 @@ from flybystab.constants import G
 from flybystab.core.ellipsoid.bound_mass import principal_axes
 from flybystab.core.ellipsoid.potential import gravity_coefficients, potential_coefficient
 from flybystab.core.numerics.jit import kernel
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Points at which the ellipsoid is sampled.
 POINTS = 4096

@@ -17,9 +17,8 @@ from flybystab.errors import InvalidInput
 from flybystab.flybys.batch import TOLERANCE
 from flybystab.flybys.flyby_many import flyby_many
 from flybystab.tabular import Tabular
+from flybystab.typing import Array
 from flybystab.units import counted, whole
-
-Array = NDArray[np.float64]
 
 
 class SpinStates(Protocol):

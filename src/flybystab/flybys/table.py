@@ -9,9 +9,8 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.tabular import Tabular
+from flybystab.typing import Array
 from flybystab.units import counted
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,12 +6,10 @@ from enum import StrEnum
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core import verdict_codes as codes
 from flybystab.core.ellipsoid.bound_mass import bound_share
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 
 class Verdict(StrEnum):

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
-from numpy.typing import NDArray
 
 from flybystab.errors import NotConverged
 from flybystab.flybys.batch import Judged
@@ -15,8 +14,6 @@ from flybystab.flybys.history import axes_of
 from flybystab.flybys.inputs import FlybyInputs
 from flybystab.flybys.self_consistent import self_consistent_bound_fraction
 from flybystab.flybys.verdict import CLASSES, Verdict
-
-Array = NDArray[np.float64]
 
 #: A run that passes the largest axis ratio is followed to this multiple of it, to see how far beyond it gets.
 FOLLOWED = 5.0

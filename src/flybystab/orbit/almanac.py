@@ -15,14 +15,12 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 
 from flybystab.constants import AU, DAY
 from flybystab.core.numerics.jit import pasted_kernel
 from flybystab.orbit.ephemeris import BELT, BODIES, EARTH, MOON, N_BODIES, SUN, Window
 from flybystab.orbit.planets import PLANETS
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Bodies of the two planetary grids, in the order of their slots.
 FAST = tuple(name for name in BODIES if 0.0 < PLANETS[name].orbit_radius < 1.2 * AU)

@@ -17,8 +17,7 @@ from numpy.typing import NDArray
 from flybystab.core.numerics.jit import kernel
 from flybystab.errors import NotConverged
 from flybystab.orbit.ephemeris import Window, body_states
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 
 @kernel

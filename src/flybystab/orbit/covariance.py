@@ -18,9 +18,8 @@ from numpy.typing import NDArray
 
 from flybystab.errors import InvalidInput
 from flybystab.orbit.elements import GM_SUN, state_from_elements
+from flybystab.typing import Array
 from flybystab.units import to_si
-
-Array = NDArray[np.float64]
 
 #: The sets of elements: cometary (JPL), Keplerian (NEOCC and catalogues), or a state with ICRF axes. ``tp`` is
 #: the time of perihelion less the epoch.

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.constants import OBLIQUITY_J2000
 from flybystab.orbit.kepler import states_at_times
 from flybystab.orbit.planets import PLANETS
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Sun's GM behind the osculating elements of JPL (DE440/441), m3/s2.
 GM_SUN = PLANETS["sun"].gm

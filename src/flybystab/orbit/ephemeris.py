@@ -21,14 +21,12 @@ from typing import Any
 
 import numpy as np
 from astropy.time import Time
-from numpy.typing import NDArray
 
 from flybystab.constants import DAY
 from flybystab.core.numerics.jit import kernel
 from flybystab.errors import InvalidInput, MissingExtra, OutOfSpan, UnknownName
 from flybystab.orbit.planets import PLANETS
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: The bodies with a place in an ephemeris, in the order of every array over bodies: from the table of planets.
 BODIES = tuple(name for name, body in PLANETS.items() if body.series is not None)

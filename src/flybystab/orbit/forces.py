@@ -17,7 +17,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.constants import AU, DAY
 from flybystab.core.numerics.jit import kernel
@@ -37,8 +36,7 @@ from flybystab.orbit.ephemeris import (
 )
 from flybystab.orbit.planets import PLANETS
 from flybystab.orbit.relativity import IS_SOURCE, one_pn
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Every force the package knows, in the order in which their accelerations are reported.
 FORCES = (

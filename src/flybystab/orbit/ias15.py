@@ -15,13 +15,11 @@ import rebound
 from numba import carray, cfunc, types
 from numba.core import cgutils
 from numba.extending import intrinsic
-from numpy.typing import NDArray
 
 from flybystab.core.numerics.jit import CACHE
 from flybystab.errors import NotConverged
 from flybystab.orbit.forces import LOG_ADDRESS, LOG_COUNT, LOG_ROWS, acceleration
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Columns of a log: time, position, velocity, acceleration.
 LOG_WIDTH = 10

@@ -14,11 +14,9 @@ in m3/s2; any consistent units will do.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.numerics.jit import kernel
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 
 @kernel

@@ -13,15 +13,13 @@ import astropy.units as u
 import numpy as np
 from astropy.table import QTable
 from astropy.time import Time
-from numpy.typing import NDArray
 from skyfield.api import load, wgs84
 
 from flybystab.orbit.ephemeris import Ephemeris, ephemeris
 from flybystab.orbit.observatories import Observer
 from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.vector_function import ephemeris_file
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Half of the interval over which the rate of motion is taken, d.
 _HALF = 30.0 / 86400.0

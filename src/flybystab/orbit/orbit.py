@@ -11,7 +11,6 @@ import astropy.units as u
 import numpy as np
 from astropy.time import Time
 from astropy.units import Quantity
-from numpy.typing import NDArray
 
 from flybystab.constants import DAY
 from flybystab.errors import FlybystabWarning, Impact, InaccurateOrbit, InvalidInput, UnknownName
@@ -22,12 +21,11 @@ from flybystab.orbit.ephemeris import BELT, BODIES, EPHEMERIDES, N_BODIES, Ephem
 from flybystab.orbit.forces import FORCES, NonGravitational, model
 from flybystab.orbit.ias15 import EPSILON, TIGHT, Flight
 from flybystab.orbit.planets import PLANETS
+from flybystab.typing import Array
 from flybystab.units import brief, checked_time, to_si, whole
 
 if TYPE_CHECKING:
     from flybystab.orbit.vector_function import OrbitVector
-
-Array = NDArray[np.float64]
 
 _AU_D2 = u.au / u.d**2
 _SPEED = u.m / u.s

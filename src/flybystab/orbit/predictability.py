@@ -15,7 +15,6 @@ from enum import StrEnum
 import astropy.units as u
 import numpy as np
 from astropy.time import Time
-from numpy.typing import NDArray
 
 from flybystab.constants import AU
 from flybystab.orbit.covariance import Covariance
@@ -23,8 +22,7 @@ from flybystab.orbit.elements import GM_SUN
 from flybystab.orbit.ephemeris import Ephemeris, Window
 from flybystab.orbit.kepler import two_body
 from flybystab.orbit.orbit import Orbit, deviated, heliocentric, seconds
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Error of the model before any encounter, m: the median against JPL's approaches of 2020 (``flybystab bench sky``).
 MODEL_ERROR = 100.0

@@ -14,14 +14,12 @@ and what they themselves do cancel in part.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.constants import C_LIGHT
 from flybystab.core.numerics.jit import kernel, pasted_kernel
 from flybystab.orbit.ephemeris import BODIES, N_BODIES
 from flybystab.orbit.planets import PLANETS
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: The bodies whose part counts: what the others do moves an asteroid by a metre in four years (median of 19).
 IS_SOURCE = np.array([PLANETS[name].relativity for name in BODIES])

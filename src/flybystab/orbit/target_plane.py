@@ -11,11 +11,9 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.errors import InvalidInput
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: North of every target plane unless another is asked for: +z of the frame, the Earth's equator in ICRF.
 NORTH = (0.0, 0.0, 1.0)

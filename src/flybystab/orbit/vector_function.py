@@ -10,7 +10,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from skyfield.api import load_file
 from skyfield.vectorlib import VectorFunction
 
@@ -20,8 +19,7 @@ from flybystab.orbit.ephemeris import BODIES, SUN, Ephemeris, Window, ephemeris
 from flybystab.orbit.forces import model
 from flybystab.orbit.ias15 import TIGHT, Flight
 from flybystab.orbit.orbit import Orbit, default_forces, without_itself
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: NAIF numbers of the centres that a path can be given from.
 CENTRES = {"sun": 10, "ssb": 0}

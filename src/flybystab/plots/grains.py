@@ -12,15 +12,13 @@ from typing import Any
 import astropy.units as u
 import numpy as np
 from matplotlib.collections import EllipseCollection
-from numpy.typing import NDArray
 
 from flybystab.encounter.attitude import periapsis_axes
 from flybystab.errors import InvalidInput
 from flybystab.flybys.grains_flyby import GrainsOutcome, GrainsRun
 from flybystab.flybys.result import FlybyResult
 from flybystab.plots.flyby import BLACK
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Colours of clumps, the most massive first; then they repeat.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#f0e442", "#7f3c8d")

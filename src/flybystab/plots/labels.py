@@ -10,9 +10,8 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Directions of a name from its point, in order of preference, and how far it is tried, in points.
 _SIDES = ((1, 0.3), (1, -0.3), (-1, 0.3), (-1, -0.3), (0.5, 1), (0.5, -1), (-0.5, 1), (-0.5, -1))

@@ -23,9 +23,8 @@ from flybystab.flybys.flyby_many import flyby_many
 from flybystab.flybys.verdict import Verdict
 from flybystab.orbit.planets import Planet, planet
 from flybystab.orbit.target_plane import capture_radius
+from flybystab.typing import Array
 from flybystab.units import to_si
-
-Array = NDArray[np.float64]
 
 #: Verdicts from the least to the most damage, with the letter and the shade of a map. The lightness falls from
 #: entry to entry; the hues are those of the colour map cividis.

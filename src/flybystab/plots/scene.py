@@ -12,14 +12,12 @@ from typing import Any
 import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
-from numpy.typing import NDArray
 
 from flybystab.encounter.attitude import periapsis_axes
 from flybystab.errors import InvalidInput
 from flybystab.flybys.result import FlybyResult, History
 from flybystab.plots.flyby import BLACK, BLUE, ORANGE, RED
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Colour of the body by regime; light comes from the planet's side, so that shape shows in greyscale.
 REGIMES = {"rigid": "0.75", "flowing": ORANGE, "dispersed": RED}

@@ -15,7 +15,6 @@ import astropy.units as u
 import numpy as np
 from astropy.table import QTable, vstack
 from astropy.units import Quantity
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from flybystab.body.body import Body, Material
@@ -30,8 +29,6 @@ from flybystab.population.rates import EncounterRates, encounter_rates
 from flybystab.screening.draws import draws
 from flybystab.screening.priors import Population
 from flybystab.units import to_si, whole
-
-Array = NDArray[np.float64]
 
 #: Planets that near-Earth asteroids meet.
 PLANETS = ("mercury", "venus", "earth", "mars")

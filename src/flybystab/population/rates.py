@@ -11,7 +11,6 @@ import astropy.units as u
 import numpy as np
 from astropy.table import QTable, Table
 from astropy.units import Quantity
-from numpy.typing import NDArray
 
 from flybystab.constants import AU
 from flybystab.core.numerics.threads import in_order
@@ -21,9 +20,8 @@ from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.planets import Planet, planet
 from flybystab.population.mean_orbits import mean_orbit
 from flybystab.population.wetherill import NODES_R, NODES_S, encounter_rates_of, rate_at_speeds
+from flybystab.typing import Array
 from flybystab.units import to_si, whole
-
-Array = NDArray[np.float64]
 
 #: Julian year, s.
 YEAR = 365.25 * 86400.0

@@ -19,11 +19,9 @@ common ranges of ``r`` and ``s`` are the weight of Gauss-Chebyshev quadrature.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.numerics.jit import kernel
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Nodes in distance and in latitude.
 NODES_R = 48

@@ -13,7 +13,6 @@ from typing import NamedTuple
 import astropy.units as u
 import numpy as np
 from astropy.time import Time
-from numpy.typing import NDArray
 
 from flybystab.catalogues.asteroid import identity
 from flybystab.encounter.distribution import clone_passages, encounter_distribution
@@ -23,8 +22,7 @@ from flybystab.orbit.orbit import later
 from flybystab.orbit.planets import planet
 from flybystab.screening.draws import stream
 from flybystab.screening.encounters import Passage
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Five sigma of the distance matter beyond this share of it: the tide then changes by three times as much.
 MATTERS = 1e-3

@@ -8,12 +8,10 @@ from difflib import get_close_matches
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
 from flybystab.errors import InvalidInput, UnknownName
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 _KINDS = {
     "fixed": ("value",),

@@ -14,7 +14,6 @@ from typing import NamedTuple
 
 import astropy.units as u
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.body.body import DENSITY_RANGE, Body, Material
 from flybystab.catalogues.asteroid import Asteroid, identity
@@ -24,8 +23,7 @@ from flybystab.catalogues.tumbling import attitude_matrix, free_spin, isotropic_
 from flybystab.errors import InvalidInput
 from flybystab.screening.distributions import truncated_normal
 from flybystab.screening.priors import Population
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 
 @lru_cache(maxsize=1)

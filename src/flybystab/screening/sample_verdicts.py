@@ -20,8 +20,7 @@ from flybystab.flybys.flyby_many import flyby_many
 from flybystab.flybys.verdict import Verdict
 from flybystab.screening.draws import Attitudes, Draws
 from flybystab.screening.encounters import Passage
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 
 def _quick(draw: Draws, code: int, size: tuple[float, float]) -> tuple[Array, NDArray[np.int64]]:

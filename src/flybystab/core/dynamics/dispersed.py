@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.dynamics.flow_events import axis_ratio2
 from flybystab.core.dynamics.ground import Ground, touches
@@ -25,8 +24,7 @@ from flybystab.core.dynamics.workspace import (
 from flybystab.core.ellipsoid.tide import TidePanels
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import determinant
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 
 @kernel

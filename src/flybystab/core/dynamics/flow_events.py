@@ -7,7 +7,6 @@ sample is negative, a dip between them is looked for.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.dynamics.rates import rate
 from flybystab.core.dynamics.state import (
@@ -46,8 +45,7 @@ from flybystab.core.ellipsoid.self_gravity import spread
 from flybystab.core.ellipsoid.tide import TidePanels
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import eigensystem
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 
 @kernel

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.dynamics.flow_events import (
     first_end,
@@ -42,8 +41,7 @@ from flybystab.core.ellipsoid.tide import TidePanels
 from flybystab.core.material.flow_rule import fade
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import determinant, deviator
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Longest explicit step, times the rate of relaxation of ``D``: DOP853 is stable to 6 on the axis.
 _STABLE = 5.0

@@ -13,15 +13,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.dynamics.state import N_FULL, N_RIGID, RIGID, S1, S2, S3, W_SCRATCH, rotation_matrix
 from flybystab.core.dynamics.steppers import explicit_at, implicit_at
 from flybystab.core.dynamics.workspace import Workspace
 from flybystab.core.ellipsoid.tide import panel_at
 from flybystab.core.numerics.jit import kernel
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 #: Samples a radian that the body turns or deforms, and at least.

@@ -41,16 +41,15 @@ from flybystab.core.dynamics.workspace import copy
 from flybystab.core.ellipsoid.tide import COMPONENTS
 from flybystab.core.material.flow_rule import dilatancy, dilation, flow_stress, isotropic
 from flybystab.core.material.yield_surface import (
-    MOHR_COULOMB,
     beyond_face,
     corner,
     flow_direction,
+    is_hexagon,
     slope_over_sine,
 )
 from flybystab.core.numerics.jit import code, kernel
 from flybystab.core.numerics.tensors import determinant, deviator, inverse, multiply, pack, unpack
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 # What an impulse did.
 FREE = code(0)
@@ -175,7 +174,7 @@ def friction_impulse(
     mean, start, _ = deviator(d_star, work.c[2])
     scale = start + abs(mean) + abs(p) * trace_sinv
     excess = (norm - g * (p * par[SIN_PHI] + cos_c)) * trace_sinv / 3.0
-    hexagon = par[NORMAL] > 0.0 and surface == MOHR_COULOMB
+    hexagon = par[NORMAL] > 0.0 and is_hexagon(surface)
     if hexagon and int(par[PART]) == SMOOTH:
         par[PART] = EXTENSION_CORNER
     found = False

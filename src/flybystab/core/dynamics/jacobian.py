@@ -15,7 +15,6 @@ obeys the same small system once more:
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.dynamics.state import (
     COHESION,
@@ -53,8 +52,7 @@ from flybystab.core.material.flow_rule import dilatancy, flow_coefficients, isot
 from flybystab.core.material.yield_surface import corner
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import contract, deviator, multiply, unpack
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Step of the difference quotients in ``det u``, over its largest value.
 _STEP = 1e-7

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.dynamics.rates import rate
 from flybystab.core.dynamics.state import (
@@ -24,11 +23,10 @@ from flybystab.core.dynamics.state import (
 from flybystab.core.dynamics.workspace import Workspace
 from flybystab.core.ellipsoid.tide import TidePanels
 from flybystab.core.material.flow_rule import dilatancy, dilation, flow_stress, isotropic
-from flybystab.core.material.yield_surface import MOHR_COULOMB, corner, onto_face
+from flybystab.core.material.yield_surface import corner, is_hexagon, onto_face
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import determinant, deviator, pack
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Lode angle, rad, by which `D` may be past the fan of a corner, and share of a face that counts as its end: the switch
 #: is located no better, and it is far below any other error.
@@ -43,7 +41,7 @@ def choose_part(t: float, y: Array, par: Array, tide: TidePanels, near: float, w
     stress while `D` is in its fan, or no further out of it than now and `SLACK`.
     """
     par[PART] = SMOOTH
-    if par[NORMAL] == 0.0 or int(par[SURFACE]) != MOHR_COULOMB:
+    if par[NORMAL] == 0.0 or not is_hexagon(int(par[SURFACE])):
         return
     par[PART] = FACE
     rate(FLOWING, t, y, ws.spare[:15], par, tide, ws.work)

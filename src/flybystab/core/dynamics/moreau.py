@@ -12,7 +12,6 @@ It shares the self-gravity, the tide and the yield surfaces with :mod:`flybystab
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.dynamics.impulse import FAILED, FREE, REST, SLIDING, friction_impulse
 from flybystab.core.dynamics.rates import field
@@ -37,8 +36,7 @@ from flybystab.core.material.flow_rule import dilatancy, dilation
 from flybystab.core.material.yield_surface import normal
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import determinant, deviator, multiply, pack, unpack
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 
 @kernel

@@ -7,7 +7,6 @@ A(S)``.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.dynamics.state import (
     COHESION,
@@ -58,8 +57,7 @@ from flybystab.core.material.flow_rule import dilatancy, dilation, flow_stress, 
 from flybystab.core.material.yield_surface import beyond_face, corner, slope_over_sine
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import contract, determinant, deviator, inverse, multiply, pack, unpack
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 
 @kernel

@@ -23,7 +23,6 @@ strain at which flow starts and ends, is 1e-10 of the dynamical rate: its share 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.dynamics.dispersed import follow_free
 from flybystab.core.dynamics.flowing import follow_flow
@@ -70,8 +69,7 @@ from flybystab.core.material.flow_rule import dilatancy
 from flybystab.core.material.yield_surface import flow_direction
 from flybystab.core.numerics.jit import borrowed, kernel
 from flybystab.core.numerics.tensors import determinant, deviator, eigensystem
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 
 @kernel

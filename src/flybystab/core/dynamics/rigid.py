@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.dynamics.ground import Ground, touches
 from flybystab.core.dynamics.rates import rate, rigid_excess
@@ -24,8 +23,7 @@ from flybystab.core.ellipsoid.tide import TidePanels
 from flybystab.core.material.flow_rule import dilatancy
 from flybystab.core.material.yield_surface import required_friction, slope
 from flybystab.core.numerics.jit import code, kernel
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 # What `_rigid_values` returns.
 _ONSET = code(0)

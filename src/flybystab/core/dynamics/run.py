@@ -9,7 +9,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.constants import G
 from flybystab.core.dynamics import rates as motion
@@ -20,8 +19,7 @@ from flybystab.core.ellipsoid.tide import TidePanels
 from flybystab.core.material.yield_surface import is_circular, least_slope
 from flybystab.core.numerics.jit import inlined, kernel
 from flybystab.core.numerics.tensors import determinant, multiply, pack, unpack
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 REGIMES = ("rigid", "flowing", "dispersed", "fluid")
 EVENTS = (

@@ -14,13 +14,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.ellipsoid.tide import COMPONENTS
 from flybystab.core.numerics.jit import code, kernel
 from flybystab.core.numerics.tensors import multiply, pack, unpack
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 RIGID = code(0)
 FLOWING = code(1)

@@ -18,8 +18,7 @@ from flybystab.core.dynamics.rates import rate
 from flybystab.core.dynamics.state import FLOWING, Buffers
 from flybystab.core.ellipsoid.tide import TidePanels
 from flybystab.core.numerics.jit import kernel
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 _S = _dop853.N_STAGES  # 12, and one more for the end point, and three for the dense output
 _SX = _dop853.N_STAGES_EXTENDED

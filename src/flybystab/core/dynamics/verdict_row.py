@@ -21,8 +21,7 @@ from flybystab.core.ellipsoid.rigid_stress import demand, overload, rigid_stress
 from flybystab.core.ellipsoid.tide import TidePanels
 from flybystab.core.numerics.jit import inlined, kernel
 from flybystab.core.verdict_codes import BEYOND_MODEL, FAILED, FLOWED, IMPACT, INTACT, NOT_IN_EQUILIBRIUM
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 # Columns of a body's material.
 PHI = 0  # rad
@@ -30,13 +29,11 @@ COHESION = 1  # Pa
 DILATANCY = 2
 SURFACE = 3  # code
 BRITTLE = 4  # 0 or 1
-N_MATERIAL = 5
 
 # Columns of an encounter: times (s).
 START = 0
 REST = 1  # a body that is rigid after this ends the run
 STOP = 2
-N_SPAN = 3
 
 #: A body whose centre stays higher than this many long semi-axes is not looked at for touching the ground.
 NEAR_GROUND = 100.0

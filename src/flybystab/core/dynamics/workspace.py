@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from flybystab.core.dynamics.state import RIGID, W_SCRATCH, Buffers, empty_buffers, to_fixed_frame
 from flybystab.core.dynamics.steppers import N_STAGES
 from flybystab.core.numerics.jit import borrowed, code, kernel
+from flybystab.typing import Array
 
-Array = NDArray[np.float64]
 Counts = NDArray[np.int64]
 
 # Why a regime (or the run) ended; the same codes head the rows of the event log.

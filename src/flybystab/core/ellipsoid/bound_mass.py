@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.constants import G
 from flybystab.core.ellipsoid.potential import gravity_coefficients, potential_coefficient
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import eigensystem, inverse, multiply, pack
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 # Gauss-Legendre in the cosine of the polar angle, trapezoid in longitude.
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(128)

@@ -11,11 +11,9 @@ With semi-axes ``a_i`` and density ``rho`` the internal acceleration is ``-2 pi 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.numerics.jit import kernel
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 # 24 Gauss-Legendre nodes on [0, 1]: index symbols to 1e-14 for axis ratios up to 10, 2e-11 up to 100.
 _X, _WEIGHTS = np.polynomial.legendre.leggauss(24)

@@ -12,14 +12,12 @@ in principal axes, with ``S = 5 I/m``,
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.ellipsoid.potential import gravity_coefficients
 from flybystab.core.material.yield_surface import required_cohesion, required_friction, slope_over_sine
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import deviator
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 
 @kernel

@@ -23,14 +23,12 @@ depends on ``I1 I2/I3`` alone, to a few per cent (9 for a sphere).
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import roots_legendre
 
 from flybystab.core.ellipsoid.potential import gravity_coefficients
 from flybystab.core.numerics.jit import kernel, summing_kernel
 from flybystab.core.numerics.tensors import eigensystem
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Nodes of the rules, and the largest ``I1 I2/I3`` at which each keeps 7e-15: axis ratios of 2, 4, 9 and 20 at least.
 NODES = (12, 20, 32, 48)

@@ -11,12 +11,10 @@ At a point ``x`` of the surface, in the body frame, loose material feels
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.ellipsoid.potential import gravity_coefficients
 from flybystab.core.numerics.jit import kernel
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 
 @kernel

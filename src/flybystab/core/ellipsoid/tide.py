@@ -17,11 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
-from numpy.typing import NDArray
 
 from flybystab.core.numerics.jit import kernel
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Row and column of each stored component of a symmetric tensor.
 COMPONENTS = ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))

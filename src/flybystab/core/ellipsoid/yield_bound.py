@@ -35,8 +35,7 @@ from flybystab.core.ellipsoid.tide import TidePanels, tide_at
 from flybystab.core.material.yield_surface import least_slope, required_friction, slope_over_sine
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.verdict_codes import FAILED, INTACT, NOT_IN_EQUILIBRIUM
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Verdicts of the quick test.
 UNDECIDED = FAILED

@@ -7,7 +7,6 @@ a yield surface that is not circular.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.energy.perturbation import (
     LONGEST,
@@ -21,11 +20,10 @@ from flybystab.core.energy.perturbation import (
     third_order,
 )
 from flybystab.core.energy.potential import MASS
-from flybystab.core.material.yield_surface import MOHR_COULOMB
+from flybystab.core.material.yield_surface import is_hexagon
 from flybystab.core.numerics.jit import code, kernel
 from flybystab.core.numerics.tensors import eigensystem
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 # Flags are numpy's (:func:`flybystab.core.numerics.jit.code`): one compilation serves all orders.
 
@@ -274,7 +272,7 @@ def least(
     The best `tries` of the `seeds` and of a lattice of directions each start a descent; `fine` polishes the best.
     """
     ball = b.associative and b.sin > 0.0
-    edged = ball and b.code == MOHR_COULOMB
+    edged = ball and is_hexagon(b.code)
     lattice = starts(n_angles, ball)
     n = seeds.shape[0] + lattice.shape[0]
     values = np.empty(n)

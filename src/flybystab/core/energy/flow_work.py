@@ -23,14 +23,12 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.energy.potential import MASS, PrincipalAxes, velocity_gradient
 from flybystab.core.material.flow_rule import fade_share
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import multiply
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: ``V/V0`` at which dilation ends, as in :func:`flybystab.core.dynamics.run.passage`, and where its fade begins.
 LARGEST_VOLUME = 1.5

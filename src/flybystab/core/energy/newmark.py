@@ -14,13 +14,11 @@ Units as in :mod:`flybystab.core.energy.potential`.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.ellipsoid.rigid_stress import overload, rigid_stress
 from flybystab.core.energy.perturbation import LONGEST, direction
 from flybystab.core.numerics.jit import kernel
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Steps between two instants.
 STEPS = 24

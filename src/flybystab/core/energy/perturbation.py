@@ -22,7 +22,6 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.ellipsoid.potential import index_symbols
 from flybystab.core.ellipsoid.rigid_stress import rigid_stress
@@ -55,8 +54,7 @@ from flybystab.core.material.yield_surface import (
     slope_over_sine,
 )
 from flybystab.core.numerics.jit import kernel
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 SQRT2 = np.sqrt(2.0)
 

@@ -24,13 +24,11 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.ellipsoid.potential import carlson_fd
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import eigensystem, multiply, unpack
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Mass, and volume before the strain, in the units of this module.
 MASS = 4.0 * np.pi / 3.0

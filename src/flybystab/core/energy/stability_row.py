@@ -6,7 +6,6 @@ Columns are named by the constants below. Units as in :mod:`flybystab.core.energ
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.ellipsoid.rigid_stress import demand, invariants, overload, rigid_stress
 from flybystab.core.energy.direction_search import (
@@ -41,8 +40,7 @@ from flybystab.core.energy.trust_region import curvature_form, least_second_orde
 from flybystab.core.material.yield_surface import is_circular
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import eigensystem
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 (
     FRICTION,  # required friction angle, rad

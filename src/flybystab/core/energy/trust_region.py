@@ -10,13 +10,11 @@ one scalar root (Moré & Sorensen 1983): nothing is searched, so that no directi
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.energy.perturbation import Pile, rate_of_strain, slope_of_flow
 from flybystab.core.energy.potential import MASS, energy_derivatives
 from flybystab.core.numerics.jit import kernel
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 
 @kernel

@@ -7,8 +7,7 @@ from numpy.typing import NDArray
 
 from flybystab.core.grains.state import Grains
 from flybystab.core.numerics.jit import kernel
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Grains nearer than this many sums of their radii belong to one clump.
 LINK = 1.15

@@ -17,13 +17,11 @@ The springs turn with the pair: about ``n`` at the mean spin of the two grains, 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.grains.neighbours import Pairs
 from flybystab.core.grains.state import Contact, Grains
 from flybystab.core.numerics.jit import kernel
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 
 @kernel

@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.numerics.jit import kernel, summing_kernel
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 
 @summing_kernel

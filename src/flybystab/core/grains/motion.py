@@ -17,8 +17,7 @@ from flybystab.core.grains.gravity import direct_sum
 from flybystab.core.grains.neighbours import MOVED, Pairs, find_pairs
 from flybystab.core.grains.state import Contact, Grains
 from flybystab.core.numerics.jit import kernel
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Outcome of :func:`advance`.
 DONE, NO_ROOM, NOT_FINITE = 0, 1, 2

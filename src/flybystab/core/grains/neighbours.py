@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from flybystab.core.grains.state import Grains
 from flybystab.core.numerics.jit import kernel
+from flybystab.typing import Array
 
-Array = NDArray[np.float64]
 Index = NDArray[np.int64]
 
 #: History of a contact: tangential spring (3), rolling spring (3), twist.

@@ -14,8 +14,7 @@ from flybystab.core.grains.motion import DONE, NO_ROOM, advance
 from flybystab.core.grains.neighbours import SKIN, Pairs, empty_pairs
 from flybystab.core.grains.state import STEPS_PER_CONTACT, Contact, Grains, time_step
 from flybystab.errors import NotConverged
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Time between evaluations of gravity, scaled: 10 s at 2000 kg/m3.
 GRAVITY_INTERVAL = 0.0075

@@ -11,9 +11,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Ratio of tangential to normal stiffness (Schwartz et al. 2012).
 SHEAR_STIFFNESS = 2.0 / 7.0

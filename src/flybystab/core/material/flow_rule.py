@@ -6,9 +6,6 @@ The stress deviator over ``p sin(phi) + c cos(phi)`` is an isotropic function of
 
 from __future__ import annotations
 
-import numpy as np
-from numpy.typing import NDArray
-
 from flybystab.core.dynamics.state import (
     BETA,
     COMPRESSION_CORNER,
@@ -22,8 +19,7 @@ from flybystab.core.dynamics.state import (
 from flybystab.core.material.yield_surface import corner, normal, slope_over_sine
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import deviator, unpack
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 
 @kernel

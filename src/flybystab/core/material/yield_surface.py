@@ -23,12 +23,10 @@ section. Both are written with the gauge ``gamma = sin(phi)/k``: the section is 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.material import surfaces
 from flybystab.core.numerics.jit import code, kernel
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 SQRT2 = np.sqrt(2.0)
 SQRT3 = np.sqrt(3.0)
@@ -48,6 +46,12 @@ def family(surface: int) -> int:
     if surface < 0 or surface >= _FAMILY.size:
         raise ValueError("unknown code of a yield surface")
     return _FAMILY[surface]
+
+
+@kernel
+def is_hexagon(surface: int) -> bool:
+    """Whether the yield section is a hexagon, whose associative flow has faces and corners."""
+    return family(surface) == HEXAGON
 
 
 @kernel
@@ -255,7 +259,7 @@ def required_friction(surface: int, cohesion: float, s: float, p: float, det: fl
 
     Notes
     -----
-    The first three surfaces read ``A sin(phi) + B cos(phi) = C``; Matsuoka-Nakai without cohesion is
+    Cones and Mohr-Coulomb read ``A sin(phi) + B cos(phi) = C``; Matsuoka-Nakai without cohesion is
     ``tan^2(phi) = (I1 I2/I3 - 9)/8`` and is bisected with it.
     """
     if s == 0.0:

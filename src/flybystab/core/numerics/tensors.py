@@ -7,11 +7,9 @@ in place on buffers of the caller, so that the loops allocate nothing.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.numerics.jit import kernel
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 
 @kernel

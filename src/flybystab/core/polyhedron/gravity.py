@@ -17,8 +17,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.core.numerics.jit import kernel
+from flybystab.typing import Array
 
-Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 
 

@@ -10,7 +10,6 @@ from collections.abc import Iterable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.constants import C_LIGHT
 from flybystab.core.numerics.jit import borrowed, kernel, pasted_kernel
@@ -36,8 +35,7 @@ from flybystab.orbit.almanac import (
 from flybystab.orbit.ephemeris import BODIES, SUN, Window
 from flybystab.orbit.forces import core, fade, model, push
 from flybystab.orbit.relativity import of_source
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 _SUN = int(SLOT[SUN])
 

@@ -5,15 +5,13 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.integrate import DOP853
 
 from flybystab.constants import DAY
 from flybystab.core.numerics.jit import borrowed, kernel, pasted_kernel, summing_kernel
 from flybystab.orbit.almanac import Places
 from flybystab.orbit.search.acceleration import Field, empty_places, rate
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 # Rows of the tableau without their zeros (a third of it): stage s combines entries _FROM[s] to _FROM[s + 1].
 _ROWS = [*(DOP853.A[s, :s] for s in range(12)), DOP853.B]

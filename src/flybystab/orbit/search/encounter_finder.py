@@ -43,9 +43,8 @@ from flybystab.orbit.search.force_selection import N_SHARES, NAMES, reduced
 from flybystab.orbit.search.minima import WIDTH
 from flybystab.orbit.search.track import EXHAUSTED, INSIDE, MAX_STEPS, STALLED, search
 from flybystab.orbit.target_plane import target_plane
+from flybystab.typing import Array
 from flybystab.units import checked_time, to_si
-
-Array = NDArray[np.float64]
 
 _SPEED = u.m / u.s
 

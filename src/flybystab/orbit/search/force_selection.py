@@ -7,7 +7,6 @@ orbit around the Sun and with the bodies of the almanac: some microseconds an as
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.constants import C_LIGHT
 from flybystab.core.numerics.jit import kernel
@@ -15,8 +14,7 @@ from flybystab.orbit.almanac import FAST, N_BELT, N_FAST, N_SLOW, SLOT, SLOW, Al
 from flybystab.orbit.ephemeris import BELT, SUN
 from flybystab.orbit.kepler import two_body
 from flybystab.orbit.search.acceleration import Field
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 N_SHARES = N_FAST + N_SLOW + N_BELT + 1
 #: The forces with a share, in its order: slots of the three grids (None where one is empty), then 1PN.

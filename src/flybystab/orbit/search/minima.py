@@ -8,7 +8,6 @@ the ends; a change of sign of ``r.v`` is refined on the integrator's own traject
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.core.numerics.jit import kernel
 from flybystab.orbit.almanac import Places
@@ -18,8 +17,7 @@ from flybystab.orbit.kepler import time_at_distance
 from flybystab.orbit.planets import PLANETS
 from flybystab.orbit.search.acceleration import Field
 from flybystab.orbit.search.dop853 import step
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: Columns of a raw result: body, time (s), state relative to the body (6; m, m/s), distance (m), v_inf^2
 #: (m2/s2), impact (0, 1), asteroid.

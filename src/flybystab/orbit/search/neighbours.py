@@ -7,7 +7,6 @@ from collections.abc import Callable, Mapping
 import astropy.units as u
 import numpy as np
 from astropy.table import QTable
-from numpy.typing import NDArray
 
 from flybystab.constants import DAY
 from flybystab.core.numerics.jit import kernel
@@ -18,8 +17,7 @@ from flybystab.orbit.planets import planet
 from flybystab.orbit.predictability import Neighbour, predictability
 from flybystab.orbit.search.acceleration import Field, borrowed_field, rate
 from flybystab.orbit.search.dop853 import Room, advance, borrowed_room, empty_room
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 
 @kernel

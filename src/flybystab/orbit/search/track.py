@@ -8,7 +8,6 @@ whichever body, is reported and ends that track.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from flybystab.constants import DAY
 from flybystab.core.numerics.jit import kernel
@@ -18,8 +17,7 @@ from flybystab.orbit.search.acceleration import Field, borrowed_field, empty_pla
 from flybystab.orbit.search.dop853 import Room, advance, borrowed_room, empty_room
 from flybystab.orbit.search.force_selection import reduced, shares_along
 from flybystab.orbit.search.minima import BENDING, FINE, chord_distance, crash, look
-
-Array = NDArray[np.float64]
+from flybystab.typing import Array
 
 #: How a search ends: ``out`` too small, step size collapsed, start below the surface or atmosphere of a body.
 FULL, STALLED, INSIDE, EXHAUSTED = 1, 2, 3, 4
