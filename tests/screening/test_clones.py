@@ -104,10 +104,11 @@ def test_what_is_not_known_of_an_orbit_is_said():
     assert np.isnan(row["distance_sigma"])
     row = {k: v for k, v in bare.row.items() if not k.startswith("sigma_")}
     (row_by_u,) = screen([Asteroid(row, file="mine.csv")], *SPAN, within=0.01 * u.au, samples=4)
-    assert "by the U of its elements" in row_by_u["assumed"]
+    assert "U of its elements" in row_by_u["assumed"]
     none = Asteroid(row | {"condition_code": ""}, file="mine.csv")
     (row,) = screen([none], *SPAN, within=0.01 * u.au, samples=4)
-    assert "no covariance" in row["assumed"]
+    # the printed digits of the elements count where there is no U
+    assert "known only by the digits" in row["assumed"]
 
 
 def test_a_clone_that_stays_away_is_judged_without_following_it():

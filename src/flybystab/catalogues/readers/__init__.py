@@ -6,11 +6,9 @@ A module of this package registers a function with :func:`reader`; nothing else 
 from __future__ import annotations
 
 import csv
-import gzip
 import importlib
 import io
 import pkgutil
-import zlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -18,6 +16,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flybystab.errors import InvalidInput
+from flybystab.files import read_bytes
 
 if TYPE_CHECKING:
     from flybystab.orbit.covariance import Covariance
@@ -83,16 +82,16 @@ def text_of(path: str | Path) -> str:
     InvalidInput
         The file cannot be read, or is a binary SPK kernel.
     """
+    raw = read_bytes(path, "catalogue file")
+    if raw[:4] == b"DAF/":
+        raise InvalidInput(
+            "catalogue file",
+            path,
+            "a text file: SPK kernels are not read here; give one state to fs.Orbit.from_state",
+        )
     try:
-        raw = Path(path).read_bytes()
-        if raw[:4] == b"DAF/":
-            raise InvalidInput(
-                "catalogue file",
-                path,
-                "a text file: SPK kernels are not read here; give one state to fs.Orbit.from_state",
-            )
-        return (gzip.decompress(raw) if raw[:2] == b"\x1f\x8b" else raw).decode("utf-8-sig")
-    except (OSError, EOFError, zlib.error, UnicodeDecodeError) as error:
+        return raw.decode("utf-8-sig")
+    except UnicodeDecodeError as error:
         raise InvalidInput("catalogue file", path, f"a readable CSV file ({error})") from None
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
@@ -11,6 +10,7 @@ from flybystab.catalogues.designations import names_of
 from flybystab.catalogues.readers import FRAME, header_of, reader, rows_of
 from flybystab.catalogues.readers.parameters import NOT_MODELLED, check_parameters
 from flybystab.errors import InvalidInput
+from flybystab.files import parse_json
 
 if TYPE_CHECKING:
     from flybystab.catalogues.readers import Entry
@@ -88,7 +88,7 @@ def from_sbdb_answer(text: str, file: str) -> tuple[dict[str, str], Covariance |
     InvalidInput
     """
     try:
-        record: dict[str, Any] = json.loads(text)
+        record: dict[str, Any] = parse_json(text, "orbit file", file)
         orbit, thing = record["orbit"], record["object"]
         elements = {item["name"]: item for item in orbit["elements"]}
         pushes = {p["name"]: p for p in orbit.get("model_pars") or [] if p["name"] in ("A1", "A2", "A3")}
@@ -102,7 +102,7 @@ def from_sbdb_answer(text: str, file: str) -> tuple[dict[str, str], Covariance |
         row["epoch_jd_tdb"] = str(orbit["epoch"])
         full = str(thing["fullname"])
         key = str(thing["des"])
-    except (json.JSONDecodeError, KeyError, TypeError) as error:
+    except (KeyError, TypeError) as error:
         raise InvalidInput(
             "orbit file", file, f"an answer of the SBDB API with full precision ({error})"
         ) from None
@@ -264,7 +264,7 @@ def read_query_json(text: str, file: str) -> list[Entry]:
     InvalidInput
     """
     try:
-        answer = json.loads(text)
+        answer = parse_json(text, "catalogue file", file)
         fields = [str(f) for f in answer["fields"]]
         rows = [
             {f: "" if v is None else str(v) for f, v in zip(fields, row, strict=True)}
