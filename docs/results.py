@@ -268,7 +268,7 @@ JD 2461200.5) and the embedded catalogue, ephemeris {full["ephemeris"][0]}. Each
 - *P(yield)*: share of the samples that can exist and then flow or hit the planet, with its Wilson interval;
 - *follows most*: inputs whose ranks the margin follows, with rank correlations.
 
-What is not known is drawn from these laws ([what is drawn](screening.md#what-is-drawn)):
+What is not known is drawn from these laws ([sampled inputs](screening.md#sampled-inputs)):
 
 {laws()}
 
