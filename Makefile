@@ -39,7 +39,7 @@ docs: .venv/.docs
 
 # Wheel and sdist, installed in clean environments and tried outside the repository.
 dist: .venv/.test
-	rm -rf dist
+	rm -rf dist build
 	$(PY) -m build --outdir dist . > /dev/null
 	$(PY) scripts/smoke_test.py dist
 
