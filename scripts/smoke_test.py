@@ -15,7 +15,7 @@ from pathlib import Path
 FIVE_LINES = """
 import astropy.units as u, flybystab as fs
 pile = fs.Body(semi_axes=[1400, 850, 750] * u.m, density=2 * u.g / u.cm**3, spin_period=6 * u.h)
-passage = fs.Encounter.hyperbolic("earth", periapsis=2.0 * fs.R_earth, v_inf=5 * u.km / u.s)
+passage = fs.Encounter.hyperbolic("earth", periapsis=2.2 * fs.R_earth, v_inf=5 * u.km / u.s)
 print(fs.flyby(pile, passage).verdict)
 """
 
