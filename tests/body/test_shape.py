@@ -209,7 +209,7 @@ def test_files_that_are_no_mesh(tmp_path, text):
     path.write_text(text)
     with pytest.raises(InvalidInput):
         fs.Shape.read(path, unit=u.m)
-    with pytest.raises(InvalidInput, match="can be read"):
+    with pytest.raises(InvalidInput, match="a readable file"):
         fs.Shape.read(tmp_path / "absent", unit=u.m)
 
 

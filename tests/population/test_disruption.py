@@ -72,6 +72,14 @@ def test_lifetime_and_change_of_spin(earth):
     assert earth.spin_change_rate(0.5) <= earth.spin_change_rate(0.1)
 
 
+def test_a_population_out_of_reach_has_no_verdicts():
+    far = QTable({"a": [3.0], "e": [0.1], "i": [5.0]})
+    rates = fs.disruption_rates(far, ["earth"], samples=8)
+    assert len(rates.samples) == 0
+    assert rates.rate("INTACT").value == 0.0
+    assert rates.spin_change_rate(0.1).value == 0.0
+
+
 def test_bad_input_is_named():
     with pytest.raises(UnitMismatch):
         fs.disruption_rates(ORBITS, ["earth"], diameter=1000.0)

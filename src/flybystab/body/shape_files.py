@@ -17,7 +17,6 @@ icq     implicitly connected quadrilaterals: ``q``, then six grids of ``(q + 1)^
 
 from __future__ import annotations
 
-import gzip
 import io
 from collections.abc import Callable, Mapping
 from pathlib import Path
@@ -27,13 +26,11 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.errors import InvalidInput, MissingExtra
+from flybystab.files import read_bytes
 from flybystab.typing import Array
 
 Integers = NDArray[np.int64]
 Mesh = tuple[Array, Integers]
-
-#: Largest file that is read, bytes.
-MAX_BYTES = 512 * 2**20
 
 
 def read_mesh(path: Path) -> Mesh:
@@ -44,17 +41,7 @@ def read_mesh(path: Path) -> Mesh:
     InvalidInput
         If the file is missing, too large, or in none of the formats.
     """
-    try:
-        if path.stat().st_size > MAX_BYTES:
-            raise InvalidInput("path", path, f"a file of at most {MAX_BYTES} bytes")
-        data = path.read_bytes()
-    except OSError as error:
-        raise InvalidInput("path", path, f"a file that can be read ({error.strerror})") from None
-    if data[:2] == b"\x1f\x8b":
-        with gzip.open(io.BytesIO(data)) as packed:
-            data = packed.read(MAX_BYTES + 1)
-        if len(data) > MAX_BYTES:
-            raise InvalidInput("path", path, f"a file of at most {MAX_BYTES} bytes when unpacked")
+    data = read_bytes(path, "shape file")
     for recognised, read in FORMATS.values():
         if recognised(data):
             try:

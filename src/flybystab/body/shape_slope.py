@@ -14,11 +14,9 @@ from astropy.units import Quantity
 from flybystab.body.body import Body
 from flybystab.body.equilibrium import tide_components
 from flybystab.body.shape import Shape
-from flybystab.body.surface_slope import SlopeChange, SurfaceSlopes
+from flybystab.body.surface_slope import SlopeChange, SurfaceSlopes, spin_and_tide
 from flybystab.core.ellipsoid.surface_slope import effective_field
-from flybystab.errors import InvalidInput
 from flybystab.typing import Array
-from flybystab.units import to_si
 
 
 def shape_slopes(shape: Shape, body: Body, tide: Quantity | None = None) -> SurfaceSlopes:
@@ -51,22 +49,16 @@ def shape_slope_change(shape: Shape, body: Body, spin: Quantity, tide: Quantity)
         As in :func:`shape_slopes`; the spin of the body is not used.
     spin : Quantity, shape (m, 3)
         Angular velocity at ``m`` instants, principal frame.
-    tide : Quantity, shape (m, 6)
-        Tidal tensors ``xx, yy, zz, xy, xz, yz`` at the same instants, principal frame, s^-2. The first instant is
-        "before".
+    tide : Quantity, shape (m, 3, 3) or (m, 6)
+        Tidal tensors, or their components ``xx, yy, zz, xy, xz, yz``, at the same instants, principal frame, s^-2.
+        The first instant is "before".
 
     Returns
     -------
     SlopeChange
         At the centroids of the facets.
     """
-    with u.set_enabled_equivalencies(u.dimensionless_angles()):
-        w = to_si(spin, u.rad / u.s, "spin", shape=None)
-    k = to_si(tide, u.s**-2, "tide", shape=None)
-    if w.ndim != 2 or w.shape[1] != 3 or len(w) < 1:
-        raise InvalidInput("spin", np.shape(w), "shape (m, 3)")
-    if k.shape != (len(w), 6):
-        raise InvalidInput("tide", np.shape(k), f"shape ({len(w)}, 6)")
+    w, k = spin_and_tide(spin, tide)
     gravity = _gravity(shape, body)
     before = _slopes(shape, gravity, _field(body, w[0], k[0]))
     least, greatest = before.copy(), before.copy()

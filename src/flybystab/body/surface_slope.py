@@ -133,6 +133,20 @@ def surface_slopes(body: Body, tide: Quantity | None = None, *, count: int = 400
     return SurfaceSlopes(points * u.m, area * u.m**2, np.rad2deg(out) * u.deg)
 
 
+def spin_and_tide(spin: Quantity, tide: Quantity) -> tuple[Array, Array]:
+    """Angular velocities (m, 3), rad/s, and tidal tensors (m, 6), s^-2, at the same instants, checked."""
+    with u.set_enabled_equivalencies(u.dimensionless_angles()):
+        w = to_si(spin, u.rad / u.s, "spin", shape=None)
+    k = to_si(tide, u.s**-2, "tide", shape=None)
+    if w.ndim != 2 or w.shape[1] != 3 or len(w) < 1:
+        raise InvalidInput("spin", np.shape(w), "shape (m, 3)")
+    if k.shape == (len(w), 3, 3):
+        k = np.stack([k[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))], axis=-1)
+    if k.shape != (len(w), 6):
+        raise InvalidInput("tide", np.shape(tide), f"shape ({len(w)}, 3, 3) or ({len(w)}, 6)")
+    return w, k
+
+
 def slope_change(body: Body, spin: Quantity, tide: Quantity, *, count: int = 4000) -> SlopeChange:
     """Slopes over the surface of a rigid body through an encounter.
 
@@ -152,15 +166,7 @@ def slope_change(body: Body, spin: Quantity, tide: Quantity, *, count: int = 400
     -------
     SlopeChange
     """
-    with u.set_enabled_equivalencies(u.dimensionless_angles()):
-        w = to_si(spin, u.rad / u.s, "spin", shape=None)
-    k = to_si(tide, u.s**-2, "tide", shape=None)
-    if w.ndim != 2 or w.shape[1] != 3 or len(w) < 1:
-        raise InvalidInput("spin", np.shape(w), "shape (m, 3)")
-    if k.shape == (len(w), 3, 3):
-        k = np.stack([k[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))], axis=-1)
-    if k.shape != (len(w), 6):
-        raise InvalidInput("tide", np.shape(tide), f"shape ({len(w)}, 3, 3) or ({len(w)}, 6)")
+    w, k = spin_and_tide(spin, tide)
     points, area = surface_points(body, count)
     s = body.axes**2
     rate = np.pi * G * body.rho

@@ -100,19 +100,14 @@ def _interval(rate: float) -> str:
 def _orbits(path: str | None) -> Any:
     """Orbits of a file: a table with columns a, e, i, or any catalogue; the embedded catalogue without a file."""
     from flybystab.catalogues.catalogue import catalogue
-    from flybystab.errors import InvalidInput
 
     if path is None:
         return catalogue()
     from astropy.table import QTable
 
-    try:
-        table = QTable.read(path, format="ascii.ecsv" if path.endswith(".ecsv") else "ascii.csv")
-    except Exception:  # astropy raises many kinds: it is not such a table, but may be a catalogue
-        return catalogue(path)
-    if {"a", "e", "i"} <= set(table.colnames):
-        return table
-    asteroids = catalogue(path)
-    if not asteroids:
-        raise InvalidInput("file", path, "a catalogue, or a table with columns a, e, i")
-    return asteroids
+    from flybystab.files import read_text
+
+    lines = [line for line in read_text(path, "population file").splitlines() if not line.startswith("#")]
+    if lines and {"a", "e", "i"} <= set(lines[0].replace(",", " ").split()) and "pdes" not in lines[0]:
+        return QTable.read(path, format="ascii.ecsv" if path.endswith(".ecsv") else "ascii.csv")
+    return catalogue(path)

@@ -1,4 +1,4 @@
-"""What encounters do to a population: rates of every verdict, by planet.
+"""Rates of the verdicts of encounters in a population, by planet.
 
 The rate of a verdict is the encounter rate times the probability of the verdict, integrated over periapsis, hyperbolic
 excess speed, attitude and the uncertain properties of the bodies. The periapsis is stratified: each stratum gets the
@@ -25,7 +25,7 @@ from flybystab.errors import InvalidInput
 from flybystab.flybys.flyby_many import flyby_many
 from flybystab.flybys.verdict import Verdict
 from flybystab.orbit.planets import planet
-from flybystab.population.rates import EncounterRates, encounter_rates
+from flybystab.population.rates import EncounterRates, elements_table, encounter_rates
 from flybystab.screening.draws import draws
 from flybystab.screening.priors import Population
 from flybystab.units import to_si, whole
@@ -36,6 +36,19 @@ PLANETS = ("mercury", "venus", "earth", "mars")
 STRATA = 8
 #: Geometric albedo behind the absolute magnitude that selects spin periods of bodies of like size.
 ALBEDO = 0.14
+
+
+_NO_SAMPLES = QTable(
+    {
+        "orbit": np.empty(0, dtype=int),
+        "v_inf": np.empty(0) * u.km / u.s,
+        "periapsis": np.empty(0) * u.km,
+        "planet": np.empty(0, dtype="U16"),
+        "verdict": np.empty(0, dtype="U20"),
+        "spin_ratio": np.empty(0),
+        "weight": np.empty(0) / u.yr,
+    }
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -137,14 +150,14 @@ def disruption_rates(
         {"name": "sample", "diameter_m": f"{size!r}", "H_mag": f"{magnitude:.4f}"}, file="population"
     )
     matter = material or Material()
-    tables, rows, orbits = [], [], 0
+    tables, rows = [], []
+    orbits = elements_table(population)
     for k, name in enumerate(planets):
         body = planet(name)
         edges = body.impact_distance + (limit * body.radius - body.impact_distance) * np.linspace(
             0.0, 1.0, STRATA + 1
         )
-        within = [encounter_rates(population, body, edge * u.m, workers=workers) for edge in edges]
-        orbits = len(within[0].rate)
+        within = [encounter_rates(orbits, body, edge * u.m, workers=workers) for edge in edges]
         rows.append((body.name, str(Verdict.IMPACT), within[0].total.value, 0.0))
         if not within[-1].total.value > 0.0:
             continue
@@ -166,8 +179,8 @@ def disruption_rates(
             "rate_error": np.array(errors) / u.yr,
         }
     )
-    empty = QTable(names=("planet", "orbit"), dtype=("U16", int))
-    return DisruptionRates(table, vstack(tables) if tables else empty, orbits, (size * u.m).to(u.km))
+    samples_table = vstack(tables) if tables else _NO_SAMPLES.copy()
+    return DisruptionRates(table, samples_table, len(orbits), (size * u.m).to(u.km))
 
 
 def _bodies(

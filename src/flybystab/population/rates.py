@@ -1,4 +1,4 @@
-"""How often the asteroids of a population pass a planet within a distance."""
+"""Rates of encounters of a population with a planet within a periapsis distance."""
 
 from __future__ import annotations
 
@@ -187,6 +187,12 @@ def rates_within(
 
     list(in_order(part, range(0, len(elements), BLOCK), workers))
     return rate, moments
+
+
+def elements_table(orbits: Any) -> QTable:
+    """Orbits as a table of ``a``, ``e`` and ``i``, which :func:`encounter_rates` does not convert again."""
+    a, e, i = _elements(orbits).T
+    return QTable({"a": a * u.m, "e": e, "i": i * u.rad})
 
 
 def _elements(orbits: Any) -> Array:
