@@ -4,7 +4,7 @@ import astropy.units as u
 import numpy as np
 from astropy.table import QTable
 
-from flybystab.io.document import plain, table_document
+from flybystab.flybys.document import plain, table_document
 
 
 def test_what_is_not_finite_is_null_with_a_reason():

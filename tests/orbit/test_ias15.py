@@ -7,7 +7,7 @@ import astropy.units as u
 import numpy as np
 import pytest
 from astropy.time import Time
-from reference import need_ephemeris
+from reference import need_ephemeris, sbdb_orbit
 
 from flybystab.constants import DAY
 from flybystab.encounter.encounter import Encounter
@@ -54,13 +54,7 @@ def known(shared):
     with gzip.open(shared / "nea_sbdb_fullprec_2020-09.csv.gz", "rt") as file:
         for row in csv.DictReader(file):
             if row["pdes"] in ("2014 TT35", "2017 UP7", "2013 VY13"):
-                out[row["pdes"]] = Orbit.from_elements(
-                    Time(float(row["epoch"]), format="jd", scale="tdb"),
-                    float(row["a"]) * u.au,
-                    float(row["e"]),
-                    *(float(row[k]) * u.deg for k in ("i", "om", "w", "ma")),
-                    name=row["pdes"],
-                )
+                out[row["pdes"]] = sbdb_orbit(row)
     return out
 
 

@@ -1,7 +1,5 @@
 """Orbits in skyfield: against points of Horizons, and apparent places against astropy (ERFA)."""
 
-import csv
-
 import astropy.units as u
 import numpy as np
 import pytest
@@ -16,7 +14,7 @@ from astropy.coordinates import (
 )
 from astropy.time import Time
 from astropy.utils import iers
-from reference import need_ephemeris
+from reference import horizons_track, need_ephemeris
 
 import flybystab as fs
 from flybystab.cli.main import main
@@ -24,7 +22,6 @@ from flybystab.constants import C_LIGHT
 from flybystab.errors import InvalidInput, UnknownName
 from flybystab.orbit.observation import phase_function, sky_positions, skyfield_times
 from flybystab.orbit.observatories import CODES, observer
-from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.vector_function import ephemeris_file
 
 J2000 = Time(2451545.0, format="jd", scale="tdb")
@@ -33,18 +30,8 @@ TRACKS = [("toutatis-2004", 0.005), ("2005-yu55-2011", 0.01), ("2012-tc4-2017", 
 
 def track(shared, slug):
     """Orbit before a flyby; times and geocentric places (km, ICRF) of Horizons."""
-    with (shared / "preflyby_states_fitted.csv").open() as file:
-        (state,) = (r for r in csv.DictReader(file) if r["slug"] == slug)
-    whole, _, rest = state["epoch_jd_tdb"].partition(".")
-    orbit = Orbit.from_state(
-        Time(float(whole), float("0." + rest), format="jd", scale="tdb"),
-        [float(state[c]) for c in ("x_au_helio_icrf", "y_au", "z_au")] * u.au,
-        [float(state[c]) for c in ("vx_au_d", "vy_au_d", "vz_au_d")] * u.au / u.d,
-    )
-    with (shared / "horizons_geocentric_tracks.csv").open() as file:
-        points = [r for r in csv.DictReader(file) if r["slug"] == slug]
-    times = J2000 + np.array([float(r["tdb_s_past_j2000"]) for r in points]) * u.s
-    return orbit, times, np.array([[float(r[c]) for c in ("x_km", "y_km", "z_km")] for r in points])
+    orbit, seconds, places = horizons_track(shared, slug)
+    return orbit, J2000 + seconds * u.s, places
 
 
 @pytest.mark.parametrize(("slug", "km"), TRACKS)

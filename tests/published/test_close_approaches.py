@@ -7,10 +7,9 @@ import astropy.units as u
 import numpy as np
 import pytest
 from astropy.time import Time
-from reference import need_ephemeris
+from reference import need_ephemeris, sbdb_orbit
 
 from flybystab.encounter.encounter import Encounter
-from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.search.encounter_finder import find_encounters
 
 #: Passages so slow that the Sun decides when they are closest.
@@ -29,19 +28,10 @@ def events(shared):
 def orbits(shared, events):
     want = {e["des"] for e in events}
     out = {}
-    unit = u.au / u.d**2
     with gzip.open(shared / "nea_sbdb_fullprec_2020-09.csv.gz", "rt") as file:
         for row in csv.DictReader(file):
             if row["pdes"] in want:
-                push = {k: float(row[k] or 0) * unit for k in ("A1", "A2", "A3")}
-                out[row["pdes"]] = Orbit.from_elements(
-                    Time(float(row["epoch"]), format="jd", scale="tdb"),
-                    float(row["a"]) * u.au,
-                    float(row["e"]),
-                    *(float(row[k]) * u.deg for k in ("i", "om", "w", "ma")),
-                    **push,
-                    name=row["pdes"],
-                )
+                out[row["pdes"]] = sbdb_orbit(row)
     return out
 
 

@@ -1,14 +1,12 @@
 """Geocentric points of Horizons through three flybys, from the state before each."""
 
-import csv
-
 import astropy.units as u
 import numpy as np
 import pytest
 from astropy.time import Time
-from reference import need_ephemeris
+from reference import horizons_track, need_ephemeris
 
-from flybystab.orbit.orbit import Orbit, later
+from flybystab.orbit.orbit import later
 
 J2000 = Time(2451545.0, format="jd", scale="tdb")
 
@@ -19,19 +17,10 @@ J2000 = Time(2451545.0, format="jd", scale="tdb")
 )
 def test_every_point(shared, slug, largest):
     need_ephemeris("de440")
-    with (shared / "preflyby_states_fitted.csv").open() as file:
-        (state,) = (r for r in csv.DictReader(file) if r["slug"] == slug)
-    whole, _, rest = state["epoch_jd_tdb"].partition(".")
-    orbit = Orbit.from_state(
-        Time(float(whole), float("0." + rest), format="jd", scale="tdb"),
-        [float(state[c]) for c in ("x_au_helio_icrf", "y_au", "z_au")] * u.au,
-        [float(state[c]) for c in ("vx_au_d", "vy_au_d", "vz_au_d")] * u.au / u.d,
-    )
-    with (shared / "horizons_geocentric_tracks.csv").open() as file:
-        points = [r for r in csv.DictReader(file) if r["slug"] == slug]
-    assert len(points) > 20
-    for row in points:
-        time = later(J2000, float(row["tdb_s_past_j2000"]))
-        want = np.array([float(row[c]) for c in ("x_km", "y_km", "z_km")]) * 1e3
+    orbit, seconds, places = horizons_track(shared, slug)
+    assert len(places) > 20
+    for second, place in zip(seconds, places, strict=True):
+        time = later(J2000, float(second))
+        want = place * 1e3
         ours = orbit.at(time, "earth", "de440")[0].to_value(u.m)
         assert np.linalg.norm(ours - want) < largest
