@@ -119,7 +119,7 @@ def brief(value: Any, unit: u.UnitBase | None = None) -> str:
 
 
 def counted(names: Any) -> str:
-    """How often each name occurs, most frequent first: ``12 INTACT, 3 RESHAPED``."""
+    """Number of occurrences of each name, most frequent first: ``12 INTACT, 3 RESHAPED``."""
     kinds, counts = np.unique(np.asarray(names), return_counts=True)
     return ", ".join(f"{counts[k]} {kinds[k]}" for k in np.argsort(-counts, kind="stable"))
 

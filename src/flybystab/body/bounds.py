@@ -20,7 +20,7 @@ from flybystab.units import brief, to_si
 
 @dataclass(frozen=True)
 class Requirements:
-    """What a body demands of its material, as samples over its uncertain shape, spin and density.
+    """Requirements on the material, sampled over the uncertain shape, spin and density.
 
     Attributes
     ----------

@@ -272,7 +272,7 @@ def _carved(g: Grains, shape: Array, count: int) -> NDArray[np.int64]:
 
 
 def cache_folder() -> Path:
-    """Where piles are kept: ``$FLYBYSTAB_CACHE``, or ``flybystab`` in the user's cache folder."""
+    """Folder of the stored piles: ``$FLYBYSTAB_CACHE``, or ``flybystab`` in the user's cache folder."""
     own = os.environ.get("FLYBYSTAB_CACHE")
     if own:
         return Path(own) / "piles"

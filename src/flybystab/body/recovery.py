@@ -28,7 +28,7 @@ from flybystab.errors import InvalidInput, NotConverged
 from flybystab.typing import Array
 from flybystab.units import to_si
 
-#: How long a perturbed body is followed, in dynamical times: a body at rest may tumble and yield anew.
+#: Duration of the integration of a perturbed body, in dynamical times: at rest it may tumble and yield again.
 PATIENCE = 100.0
 
 

@@ -338,7 +338,7 @@ def push(body: Body, direction: Any, strain: Any, *, dilatancy: float = 1.0) -> 
 
 
 def _kind(scene: Any, x: Array, row: Array) -> str:
-    """What ends the least barrier."""
+    """End of the path of the least barrier."""
     if row[columns.LEVEL] < 1:
         return "inadmissible"
     energy, strain = row[columns.ENERGY_B], row[columns.STRAIN_B]

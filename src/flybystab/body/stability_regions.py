@@ -28,7 +28,7 @@ from flybystab.errors import InvalidInput, UnknownName
 from flybystab.typing import Array
 from flybystab.units import to_si
 
-#: How far a batch goes: each step costs about ten times the one before.
+#: Levels of a batch; each costs about ten times the one before.
 DEPTHS = ("friction", "infinitesimal", "second", "third", "barrier")
 
 

@@ -245,7 +245,7 @@ class Asteroid(Record):
 
     @property
     def assumptions(self) -> tuple[str, ...]:
-        """What a reader must know before taking the body for measured, in words."""
+        """Description of the assumed values of the body."""
         out = []
         if any(c in self.assumed for c in SHAPE):
             out.append("shape from size and lightcurve amplitude")

@@ -1,4 +1,4 @@
-"""How well an orbit is known where no covariance is published: the digits of its elements, and its parameter U.
+"""Uncertainty of an orbit without a published covariance: the digits of its elements, and its parameter U.
 
 The Minor Planet Center prints elements to the decimals of MPCORB and no errors. What it says of them is U, a class
 of the runoff in longitude after ten years (https://minorplanetcenter.net/iau/info/UValue.html), which it does not

@@ -148,7 +148,7 @@ class Record:
 
     @cached_property
     def sources(self) -> Mapping[str, str]:
-        """Where each group of values comes from, e.g. ``sources["density"]``."""
+        """Source of each group of values, e.g. ``sources["density"]``."""
         found = {c.removesuffix("_source"): v for c, v in self.row.items() if c.endswith("_source") and v}
         return MappingProxyType(found)
 

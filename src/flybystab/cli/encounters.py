@@ -43,7 +43,7 @@ def run(options: argparse.Namespace) -> None:
     import astropy.units as u
 
     from flybystab.catalogues.catalogue import catalogue
-    from flybystab.io.document import table_document
+    from flybystab.flybys.document import table_document
     from flybystab.orbit.search.encounter_finder import find_encounters
     from flybystab.screening.progress import Progress, ProgressBar
     from flybystab.screening.tables import write_table

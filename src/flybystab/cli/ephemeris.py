@@ -34,7 +34,7 @@ def run(options: argparse.Namespace) -> None:
     """Answer the command."""
     from flybystab.catalogues.asteroid import Asteroid
     from flybystab.cli.common import check_table
-    from flybystab.io.document import table_document
+    from flybystab.flybys.document import table_document
     from flybystab.orbit.observation import sky_positions
     from flybystab.orbit.observatories import observer
     from flybystab.screening.tables import write_table

@@ -21,7 +21,8 @@ def arguments(sub: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Execute the command."""
-    from flybystab.io import document, text
+    from flybystab.flybys import document
+    from flybystab.io import text
     from flybystab.io.grains_text import grains_lines
 
     check_picture(options.output, FIGURES + FILMS)

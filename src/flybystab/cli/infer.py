@@ -41,7 +41,7 @@ def run(options: argparse.Namespace) -> None:
     """Execute the command."""
     import astropy.units as u
 
-    from flybystab.io.document import table_document
+    from flybystab.flybys.document import table_document
     from flybystab.plots.screening import inference_figure
     from flybystab.screening.inference import infer, survived
 

@@ -30,7 +30,7 @@ def run(options: argparse.Namespace) -> None:
 
     import astropy.units as u
 
-    from flybystab.io import document
+    from flybystab.flybys import document
     from flybystab.io.report import report
     from flybystab.screening.screening import screen
 

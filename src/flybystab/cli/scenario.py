@@ -25,8 +25,9 @@ def arguments(sub: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Execute the command."""
+    from flybystab.flybys import document
     from flybystab.flybys.flyby import flyby
-    from flybystab.io import document, text
+    from flybystab.io import text
     from flybystab.io.grains_text import grains_lines
     from flybystab.io.scenario import scenario
 

@@ -65,7 +65,7 @@ def run(options: argparse.Namespace) -> None:
 
     import astropy.units as u
 
-    from flybystab.io.document import table_document
+    from flybystab.flybys.document import table_document
     from flybystab.screening.executors import open_executor
     from flybystab.screening.priors import Population
     from flybystab.screening.progress import ProgressBar

@@ -18,7 +18,7 @@ def arguments(sub: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Execute the command."""
-    from flybystab.io.document import table_document
+    from flybystab.flybys.document import table_document
     from flybystab.plots.screening import results_figure
     from flybystab.screening.results import read_results
     from flybystab.screening.summary import summary

@@ -57,7 +57,7 @@ def _catalogue(options: argparse.Namespace) -> None:
 
     import astropy.units as u
 
-    from flybystab.io.document import table_document
+    from flybystab.flybys.document import table_document
     from flybystab.screening.classification import COLUMNS, classification, counts
     from flybystab.screening.table_files import write_rows
 
@@ -102,7 +102,7 @@ def _asteroid(options: argparse.Namespace) -> None:
 
     from flybystab.body.equilibrium import spin_limits
     from flybystab.body.stability import stability
-    from flybystab.io.document import plain
+    from flybystab.flybys.document import plain
     from flybystab.io.text import equilibrium_lines
 
     asteroid = asteroid_of(options)

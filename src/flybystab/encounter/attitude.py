@@ -12,7 +12,7 @@ from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
 from flybystab.typing import Array
 
-#: How far ``A A^T`` of an attitude may be from 1.
+#: Largest departure of ``A A^T`` of an attitude from 1.
 ORTHOGONAL = 1e-8
 
 

@@ -186,7 +186,7 @@ def _check_way(orbit: Orbit, body: Planet, window: Window, passage: _Passage, ep
 
 @dataclass(frozen=True)
 class _Growth:
-    """What other runs made of a closest approach: distance (m), time (s), displacement of the neighbour (m)."""
+    """Closest approach in other runs: distance (m), time (s), displacement of the neighbour (m)."""
 
     distance: float
     time: float
@@ -195,7 +195,7 @@ class _Growth:
 
 
 def _horizon(orbit: Orbit, beside: Neighbour, window: Window, forces: tuple[str, ...], largest: float) -> str:
-    """What to add to "no encounter" where the orbit cannot be followed that far, else nothing."""
+    """Addition to "no encounter" where the orbit cannot be integrated that far; empty otherwise."""
     places = [o.flight(window, forces).to(0.0)[:3] for o in (orbit, beside.orbit)]
     gap = float(np.linalg.norm(places[0] - places[1]))
     if predictability(largest, gap) is Predictability.DETERMINED:

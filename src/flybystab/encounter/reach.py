@@ -1,4 +1,4 @@
-"""How far an encounter reaches, in space and in time."""
+"""Extent of an encounter in space and time."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ def axis_ratio(value: Any) -> float:
 
 
 class Judged(NamedTuple):
-    """What :func:`flybystab.core.dynamics.verdict_row.judge` says of a body, in SI units."""
+    """Result of :func:`flybystab.core.dynamics.verdict_row.judge` for a body, in SI units."""
 
     verdict: Verdict
     bound: float
@@ -141,7 +141,7 @@ def columns(bodies: Sequence[Body], rotations: Array, encounters: Sequence[Encou
 
 
 def _joined(series: Sequence[Array]) -> tuple[NDArray[np.int64], Array]:
-    """Where each of the series begins in one array of them all, and the array; one of lower degree ends in zeros."""
+    """Offsets of the series in one joined array, and the array; series of lower degree are padded with zeros."""
     first = np.concatenate([[0], np.cumsum([len(s) for s in series])]).astype(np.int64)
     out = np.zeros((first[-1], max(s.shape[1] for s in series), series[0].shape[2]))
     for s, k in zip(series, first, strict=False):
@@ -168,7 +168,7 @@ def span_of(encounter: Encounter) -> Array:
 
 
 def failure_of(out: Array, encounter: Encounter, tolerance: float) -> str:
-    """Why a row has no verdict; empty if it has one."""
+    """Reason that a row has no verdict; empty if it has one."""
     if out[judgement.VERDICT] != judgement.FAILED:
         return ""
     return (

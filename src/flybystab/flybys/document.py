@@ -51,7 +51,7 @@ def _reason(key: str, value: float) -> str:
     return next((text for part, text in _INFINITE.items() if part in key), "infinite")
 
 
-#: What an infinite value means, by part of its key.
+#: Reasons for infinite values, by part of the key.
 _INFINITE = {
     "friction": "no friction angle suffices",
     "margin": "no friction angle suffices",

@@ -1,4 +1,4 @@
-"""What a flyby was run with."""
+"""Inputs of a flyby."""
 
 from __future__ import annotations
 

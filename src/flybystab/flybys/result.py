@@ -29,7 +29,7 @@ from flybystab.units import brief
 if TYPE_CHECKING:
     from flybystab.flybys.grains_flyby import GrainsOutcome
 
-#: Composing it anew costs ten times as much.
+#: Kept, because composing the unit takes ten times as long.
 RAD_S = u.rad / u.s
 
 
@@ -228,12 +228,12 @@ class FlybyResult:
 
     @cached_property
     def modelled(self) -> tuple[str, ...]:
-        """What the encounter and the body model contain."""
+        """Effects that are modelled, of the encounter and of the body."""
         return (*self.inputs.encounter.forces, *modelled(self.inputs.body))
 
     @property
     def left_out(self) -> tuple[tuple[str, float], ...]:
-        """What the encounter leaves out, with its estimated share."""
+        """Effects that are neglected, each with its estimated share."""
         return self.inputs.encounter.left_out
 
     @property
@@ -248,7 +248,7 @@ class FlybyResult:
 
     @property
     def contact(self) -> str | None:
-        """What reaches the ground on an IMPACT, None otherwise.
+        """Part that reaches the ground on an IMPACT: the path or the body; None otherwise.
 
         ``"path"``: the closest approach lies below the top of the atmosphere (the surface, if there is none);
         ``"body"``: the centre would pass above it, but the body is large enough there, towards the planet, to touch it.

@@ -1,4 +1,4 @@
-"""How an encounter changes the spin when the attitude of the body at encounter is not known."""
+"""Change of spin in an encounter, sampled over the unknown attitude of the body."""
 
 from __future__ import annotations
 

@@ -10,8 +10,8 @@ from astropy.table import QTable
 
 from flybystab.core.material.surfaces import SURFACES
 from flybystab.errors import InvalidInput
+from flybystab.flybys.document import flyby_document, table_document
 from flybystab.flybys.result import FlybyResult
-from flybystab.io.document import flyby_document, table_document
 
 
 def _entries_of(text: str) -> dict[str, str]:

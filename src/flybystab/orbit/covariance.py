@@ -1,4 +1,4 @@
-"""How well an orbit is known: the covariance of its elements, and samples of it.
+"""Covariance of the elements of an orbit, and samples drawn from it.
 
 A covariance belongs to a set of elements at an epoch of its own, which need not be that of the orbit (JPL's
 differ by years). Only deviations from its own mean are used: they are added to the orbit's state at that

@@ -1,4 +1,4 @@
-"""Where an asteroid is seen: apparent place, distance, motion, brightness, height above the horizon.
+"""Apparent place of an asteroid: direction, distance, rate of motion, magnitude, altitude and azimuth.
 
 Light time, aberration, deflection of light, precession, nutation and the Earth's rotation are skyfield's, with its
 built-in tables (nothing is downloaded); the path is that of :mod:`flybystab.orbit.vector_function`.

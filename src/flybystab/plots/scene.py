@@ -175,7 +175,7 @@ def animation(
     left.plot(places[:, 0], places[:, 1], color="0.6", lw=0.8)
     (dot,) = left.plot([], [], "o", color=BLACK, ms=5)
     left.set(aspect="equal", xlabel="x, towards periapsis (km)", ylabel="y (km)")
-    # What the body does while it settles, far out, is in the other panel.
+    # The motion far from the planet, while the body settles, is in the other panel.
     far = encounter.start_distance.to_value(u.km)
     near = np.linalg.norm(places, axis=1) <= far
     left.set_ylim(1.1 * places[near, 1].min(), 1.1 * places[near, 1].max())

@@ -149,7 +149,7 @@ def classification(
 
 
 def counts(table: QTable) -> dict[str, dict[str, int]]:
-    """How many bodies are at each level, by friction angle."""
+    """Number of bodies at each level of stability, by friction angle."""
     good = np.asarray(table["error"]) == ""
     return {
         f"{angle:g} deg": {

@@ -1,4 +1,4 @@
-"""How the uncertainty of an orbit enters the samples of a passage: each sample on a clone of its own.
+"""Orbital uncertainty in the samples of an encounter: each sample is on a clone of its own.
 
 Where the covariance with its correlations is known and the distance is uncertain enough to matter, sample k
 meets the planet on clone k, followed with all forces: no linearisation. Elsewhere all samples share the
@@ -30,7 +30,7 @@ MATTERS = 1e-3
 LINEAR = 0.1
 #: Clones that tell the sigma where the map is not linear.
 _PROBES = 16
-#: How far from the nominal passage those of the clones are looked for.
+#: Largest difference in time between the encounter of a clone and the nominal one.
 _SEARCH = 30.0 * u.d
 
 

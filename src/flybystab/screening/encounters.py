@@ -58,7 +58,7 @@ class Passage:
 
     @property
     def key(self) -> tuple[str, str]:
-        """What names the passage in the random streams."""
+        """Key of the encounter in the random streams."""
         return self.planet, f"{self.time.tdb.jd:.1f}"
 
     def bounds(self) -> tuple[float, float]:
@@ -143,5 +143,5 @@ def passages(asteroid: Asteroid, settings: Settings) -> list[Passage]:
     return sorted(found, key=lambda p: (p.time.tdb.jd, p.planet))
 
 
-#: What finds the passages of an asteroid: a function that workers can import.
+#: Function that finds the encounters of an asteroid; workers must be able to import it.
 Finder = Callable[[Asteroid, Settings], list[Passage]]

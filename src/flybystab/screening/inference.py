@@ -1,4 +1,4 @@
-"""What shape, spin and survived passages say about the material of a body.
+"""Bounds on the material of a body from its shape, its spin and the encounters that it survived.
 
 For each density and cohesion there is a least friction angle that carries the body as it is (theory,
 section 4) and one that carries it through a passage without yielding. The second depends on the attitude,

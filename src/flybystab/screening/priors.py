@@ -1,4 +1,4 @@
-"""What a screening draws: the distributions of what no catalogue knows, and of what this one does not."""
+"""Priors of a screening: distributions of the quantities that are not measured."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from flybystab.errors import InvalidInput, UnknownName
 from flybystab.files import DOCUMENT_LIMIT, parse_toml, read_text
 from flybystab.screening.distributions import Distribution, distribution_of
 
-#: What a value must lie within, whatever its distribution.
+#: Ranges that every distribution must keep.
 _LIMITS = {
     "friction_angle_deg": (0.0, 89.0),
     "cohesion_Pa": (0.0, np.inf),
@@ -41,7 +41,7 @@ _CARBONACEOUS = Distribution("normal", mean=1300.0, sd=300.0, low=325.0, high=52
 
 @dataclass(frozen=True)
 class Population:
-    """What is drawn where the catalogue is silent, and the material, which no catalogue knows.
+    """Distributions of the material and of the quantities that a catalogue lacks.
 
     Units are in the names. `friction_angle_deg` and `cohesion_Pa` apply to every body, the others only where the
     catalogue has no value, or also to its assumed values with `replace_assumed`. `density_by_class_kg_m3` goes

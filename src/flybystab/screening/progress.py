@@ -18,7 +18,7 @@ FRAME = 0.1
 
 @dataclass(frozen=True)
 class Progress:
-    """How far a run is.
+    """Progress of a run.
 
     Attributes
     ----------

@@ -102,7 +102,7 @@ def sampled_row(row: Row, orbits: Spread, draw: Draws, result: Judged) -> Row:
 
 
 def _rise(most: float, rest: float) -> float:
-    """What a passage adds to the mobilised friction; inf beyond any friction, nan if rest needs that, too."""
+    """Mobilised friction added by an encounter; inf if no friction suffices, nan if none does at rest either."""
     return most - rest if np.isfinite(rest) else np.nan
 
 

@@ -40,7 +40,7 @@ class _Asteroid:
 
 
 class _Piece(NamedTuple):
-    """Where the answer of a call for a part belongs."""
+    """Place of the result of a part."""
 
     asteroid: _Asteroid
     number: int

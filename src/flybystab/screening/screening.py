@@ -81,7 +81,7 @@ class Screening:
         }
 
     def fingerprint(self) -> dict[str, Any]:
-        """What must agree for two runs to share a journal."""
+        """Settings that must agree for two runs to share a journal."""
         digest = hashlib.sha256()
         for a in self.asteroids:
             digest.update(json.dumps(sorted(a.row.items())).encode())
@@ -297,7 +297,7 @@ def screen(
     progress: Callable[[Progress], None] | None = None,
     finder: Finder = passages,
 ) -> QTable:
-    """What the encounters of asteroids do to them as rubble piles.
+    """Verdicts of the encounters of asteroids, treated as rubble piles.
 
     Parameters
     ----------

@@ -27,7 +27,7 @@ TIME_LIMIT = 600.0
 
 @dataclass(frozen=True)
 class Settings:
-    """What a screening computes, apart from the list of asteroids.
+    """Settings of a screening, apart from the list of asteroids.
 
     Attributes
     ----------

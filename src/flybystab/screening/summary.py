@@ -34,7 +34,7 @@ SHORT = (
 
 @dataclass(frozen=True)
 class Summary:
-    """What a result table says.
+    """Summary of a result table.
 
     Attributes
     ----------

@@ -122,7 +122,7 @@ class Begun:
         return Part(self.passage, self.orbits.clones, first, self.attitudes.part(first, last))
 
     def parts(self) -> Iterator[tuple[int, Part]]:
-        """What is not judged yet: parts with the numbers of their first samples."""
+        """Parts without verdicts, with the numbers of their first samples."""
         ends = [*sorted(self.judged), len(self.attitudes.uniform)]
         for begin, end in zip([0, *(k + len(self.judged[k].verdict) for k in ends[:-1])], ends, strict=True):
             for k in range(begin, end, self.size):
