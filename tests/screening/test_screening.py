@@ -433,7 +433,7 @@ def test_one_name_is_an_asteroid_and_not_a_file():
     assert row["asteroid"] == "Apophis"
     with pytest.raises(UnknownName, match="did you mean Apophis"):
         screen("Apopis", "2029-04-01", "2029-05-01")
-    with pytest.raises(InvalidInput, match="catalogue file = Apophis.csv: expected a readable file"):
+    with pytest.raises(InvalidInput, match=r"catalogue file = Apophis\.csv: expected a readable file"):
         screen("Apophis.csv", "2029-04-01", "2029-05-01")
 
 
