@@ -29,7 +29,7 @@ from flybystab.errors import FlybystabError
 from flybystab.orbit.planets import planet
 from flybystab.screening.draws import Attitudes, draws
 from flybystab.screening.encounters import passages
-from flybystab.screening.sample_verdicts import judge
+from flybystab.screening.sample_verdicts import sample_verdicts
 from flybystab.screening.settings import settings
 
 PLANETS = ("earth", "moon", "venus", "mars", "mercury", "jupiter")
@@ -141,8 +141,8 @@ def real(args: argparse.Namespace) -> int:
             try:
                 size = p.close_bounds()
                 where = Attitudes.at(asteroid, d, args.seed, p.planet, p.time.jd)
-                fast = judge(p, d, where, Material())
-                full = judge(p, d, where, Material(), quick=False)
+                fast = sample_verdicts(p, d, where, Material())
+                full = sample_verdicts(p, d, where, Material(), quick=False)
             except FlybystabError as reason:
                 print(f"{asteroid.name} {p.planet} {p.time.isot}: {reason}")
                 continue

@@ -13,7 +13,7 @@ from flybystab.constants import AU, R_EARTH
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import NotConverged
 from flybystab.orbit.orbit import Orbit
-from flybystab.screening.clones import Clones, spread
+from flybystab.screening.clones import Clones, orbit_sampling
 from flybystab.screening.encounters import Passage, passages
 from flybystab.screening.screening import Screening, screen
 from flybystab.screening.settings import settings
@@ -34,14 +34,14 @@ def only(asteroid):
 
 
 def test_a_well_known_orbit_is_shared_by_all_samples():
-    s = spread(only(APOPHIS), 100, 0)
+    s = orbit_sampling(only(APOPHIS), 100, 0)
     assert s.clones is None
     assert s.sigma == pytest.approx(1100, rel=0.03)  # 3.3 km at three sigma (JPL)
     assert s.note == ""
 
 
 def test_samples_of_a_badly_known_orbit_have_passages_of_their_own():
-    many, few = (spread(only(with_spread(1000.0)), n, 3) for n in (24, 8))
+    many, few = (orbit_sampling(only(with_spread(1000.0)), n, 3) for n in (24, 8))
     assert many.sigma == pytest.approx(1.1e6, rel=0.05)
     followed = many.clones.passages(0, 24)
     distances = np.array([p.distance for p in followed])
@@ -65,7 +65,7 @@ def test_rows_draw_the_orbit_and_name_the_distance_among_the_contributors():
 
 def test_clones_and_rows_are_the_same_to_the_bit_however_they_are_split():
     asteroid = with_spread(7000.0)
-    clones = spread(only(asteroid), 18, 0).clones
+    clones = orbit_sampling(only(asteroid), 18, 0).clones
     whole = [p.distance for p in clones.passages(0, 18)]
     assert whole == [clones.passages(k, k + 1)[0].distance for k in range(18)]
     run = Screening([asteroid], settings(*SPAN, within=0.01 * u.au, samples=18, keep_samples=True))

@@ -60,7 +60,7 @@ def test_dead_process_is_named_and_the_run_goes_on(tmp_path, reference):
             os.kill(next(iter(pool._processes)), signal.SIGKILL)
 
     run = screening(16, three, samples=3, seed=4)
-    with open_executor(2) as pool, pytest.raises(WorkersLost, match="in work"):
+    with open_executor(2) as pool, pytest.raises(WorkersLost, match="in progress"):
         run.run(tmp_path / "p.ecsv", executor=pool, chunk=1, progress=kill)
     assert not read_results(tmp_path / "p.ecsv").meta["complete"]
     states = []

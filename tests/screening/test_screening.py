@@ -28,7 +28,7 @@ from flybystab.screening.encounters import Passage, passages
 from flybystab.screening.priors import Population
 from flybystab.screening.progress import ProgressBar
 from flybystab.screening.results import read_results
-from flybystab.screening.sample_verdicts import contributors, judge, wilson
+from flybystab.screening.sample_verdicts import contributors, sample_verdicts, wilson
 from flybystab.screening.screening import Screening, screen
 from flybystab.screening.settings import settings
 from flybystab.screening.tasks import Part
@@ -96,7 +96,7 @@ def test_a_body_that_may_touch_the_ground_is_not_left_to_the_bound():
     n = 12
     draw = draws(a, n, 3)._replace(axes=np.tile([1400.0, 850.0, 750.0], (n, 1)), cohesion=np.full(n, 1e6))
     attitudes = Attitudes.at(a, draw, 3, "moon")
-    found = judge(passage, draw, attitudes, Material())
+    found = sample_verdicts(passage, draw, attitudes, Material())
     assert found.dynamic.all()
     assert {"IMPACT", "INTACT"} == set(found.verdict)
     frame = enc.periapsis_axes
@@ -104,7 +104,9 @@ def test_a_body_that_may_touch_the_ground_is_not_left_to_the_bound():
         one = flyby(draw.body(i, Material()), enc, frame @ attitudes.matrix(i), error=False, history=False)
         assert found.verdict[i] == one.verdict
     high = Encounter.hyperbolic("moon", (floor + 1500.0) * u.m, 5 * u.km / u.s)
-    clear = judge(replace(passage, distance=floor + 1500.0, encounter=high), draw, attitudes, Material())
+    clear = sample_verdicts(
+        replace(passage, distance=floor + 1500.0, encounter=high), draw, attitudes, Material()
+    )
     assert not clear.dynamic.any()
 
 
@@ -182,8 +184,8 @@ def test_quick_verdicts_are_those_of_the_dynamics():
             d = draws(a, 12, 5)
             p = Passage(a, "earth", day(2462000.5), q * R_EARTH, 7000.0, enc)
             attitudes = Attitudes.at(a, d, 5, "earth")
-            fast = judge(p, d, attitudes, Material())
-            full = judge(p, d, attitudes, Material(), quick=False)
+            fast = sample_verdicts(p, d, attitudes, Material())
+            full = sample_verdicts(p, d, attitudes, Material(), quick=False)
             assert fast.verdict == full.verdict
             by_bound = ~fast.dynamic & (np.array(full.verdict) == "INTACT")
             assert np.all(full.margin[by_bound] >= fast.margin[by_bound] - 1e-6)
@@ -384,7 +386,7 @@ def test_a_disk_that_fills_up_in_the_middle_keeps_what_is_done(tmp_path, limit, 
     old = signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
     try:
         resource.setrlimit(resource.RLIMIT_FSIZE, (limit, before[1]))
-        with pytest.raises(OutputFailed, match=rf"asteroids are safe in .*x.{suffix}.journal") as caught:
+        with pytest.raises(OutputFailed, match=rf"asteroids are saved in .*x.{suffix}.journal") as caught:
             run.run(out)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, before)

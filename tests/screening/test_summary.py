@@ -38,7 +38,7 @@ def test_summary_counts_and_ranks(tmp_path):
     assert s.errors == {"NotConverged: x": 1}
     assert s.contributors == {"friction angle": 3}
     text = s.text()
-    assert "follows most (passages): friction angle (3)" in text
+    assert "most sensitive to (passages): friction angle (3)" in text
     assert "unfinished" in text
     assert "margin -3.00 deg, 1 deg by the passage, yields in 40 % of the samples" in text
 

@@ -1,4 +1,4 @@
-"""A whole catalogue by structural stability: one row an asteroid, what it needs and how hard a push it stands."""
+"""Structural stability of a whole catalogue: required strength and critical perturbation of each asteroid."""
 
 from __future__ import annotations
 
@@ -31,19 +31,27 @@ ANGLES = (30.0, 35.0, 40.0)
 COLUMNS: dict[str, Column] = {
     "asteroid": Column(str, None, "name, or designation"),
     "number": Column(int, None, "IAU number, -1 without"),
-    "required_friction_angle": Column(float, u.deg, "mobilised without cohesion; inf if none would do"),
+    "required_friction_angle": Column(
+        float, u.deg, "mobilised without cohesion; inf if no friction suffices"
+    ),
     **{
         f"level_{angle:g}": Column(int, None, f"at {angle:g} deg of friction; see `levels` in the meta data")
         for angle in ANGLES
     },
-    "critical_strain": Column(float, None, "strain of the push that just reaches the barrier"),
-    "critical_energy": Column(float, u.J, "least energy of a push from which the body does not come to rest"),
-    "energy_share": Column(float, None, "that over the binding energy of a sphere of its mean radius"),
+    "critical_strain": Column(
+        float, None, "strain of the smallest perturbation that reaches the energy barrier"
+    ),
+    "critical_energy": Column(
+        float, u.J, "energy barrier: least energy of a perturbation that keeps growing"
+    ),
+    "energy_share": Column(
+        float, None, "critical energy over the binding energy of the sphere of equal volume"
+    ),
     "critical_strain_second": Column(float, None, "critical strain at second order"),
     "required_cohesion": Column(
         float, u.Pa, "at the friction angle of the material; 0 where friction suffices"
     ),
-    "in_tension": Column(bool, None, "mean tension: no friction would hold the body"),
+    "in_tension": Column(bool, None, "mean tension: no friction angle is sufficient"),
     "mean_pressure": Column(float, u.Pa, "mean pressure; negative in tension"),
     "w2": Column(float, None, "omega^2/(pi G rho)"),
     "semi_axis_a": Column(float, u.m, "long semi-axis"),
@@ -51,9 +59,9 @@ COLUMNS: dict[str, Column] = {
     "semi_axis_c": Column(float, u.m, "short semi-axis"),
     "density": Column(float, u.kg / u.m**3, "bulk density"),
     "spin_period": Column(float, u.h, "2 pi over the spin rate"),
-    "assumed": Column(str, None, "what nobody measured in the catalogue's values"),
-    "drawn": Column(str, None, "what the catalogue does not know: median of its distribution"),
-    "error": Column(str, None, "why the row could not be computed"),
+    "assumed": Column(str, None, "catalogue values that are assumed, not measured"),
+    "drawn": Column(str, None, "quantities missing from the catalogue: the median of the prior is used"),
+    "error": Column(str, None, "reason why the row could not be computed"),
 }
 
 
@@ -74,8 +82,8 @@ def classification(
         As in :func:`flybystab.screening.screening.screen`; the embedded catalogue by default. Bodies of tables of
         orbits get their spins and shapes from the embedded tables; what is missing is the median of its distribution.
     material : Material, optional
-        For the critical strain and the cohesion needed; 35 deg without cohesion by default. Its yield surface serves
-        all columns.
+        For the critical strain and the cohesion needed; 35 deg without cohesion by default. Its yield surface
+        applies to all columns.
     dilatancy : float
         ``beta/min k`` of the test; 1 is associative flow.
     population : Population, optional

@@ -1,9 +1,9 @@
-"""Orbital uncertainty in the samples of an encounter: each sample is on a clone of its own.
+"""Orbital uncertainty in the samples of an encounter: each sample moves on its own clone of the orbit.
 
-Where the covariance with its correlations is known and the distance is uncertain enough to matter, sample k
-meets the planet on clone k, followed with all forces: no linearisation. Elsewhere all samples share the
-nominal passage, and the row says why. A few clones tell which of the two it is; the others are drawn and followed
-where their samples are judged.
+Where the full covariance is known and the uncertainty of the distance is significant, sample k uses clone k of the
+orbit, integrated with all forces and without linearisation. Otherwise all samples share the nominal passage, and the
+row gives the reason. The choice between the two is made with a few clones; the others are drawn and integrated
+together with their samples.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ from flybystab.screening.draws import stream
 from flybystab.screening.encounters import Passage
 from flybystab.typing import Array
 
-#: Five sigma of the distance matter beyond this share of it: the tide then changes by three times as much.
+#: Clones are used if five sigma of the distance exceed this fraction of it: the tide changes by three times as much.
 MATTERS = 1e-3
-#: The linear map of the covariance gives the sigma while its nonlinearity is below this.
+#: Largest nonlinearity at which sigma is taken from the linear map of the covariance.
 LINEAR = 0.1
-#: Clones that tell the sigma where the map is not linear.
+#: Number of clones from which sigma is estimated where the map is not linear.
 _PROBES = 16
 #: Largest difference in time between the encounter of a clone and the nominal one.
 _SEARCH = 30.0 * u.d
 
 
 class Clones(NamedTuple):
-    """The clones of an asteroid at one passage, drawn and followed when they are asked for.
+    """The clones of an asteroid at one passage, drawn and integrated on demand.
 
     Attributes
     ----------
@@ -44,7 +44,7 @@ class Clones(NamedTuple):
     time : Time
         Its closest approach.
     within : float
-        Largest distance of a passage, m. A clone that does not come near is judged there.
+        Largest distance of a passage, m. A clone that stays farther away is evaluated at this distance.
     samples, key : int
         Number of all clones, and seed: clone k depends on the key and k alone.
     """
@@ -80,17 +80,17 @@ class Clones(NamedTuple):
         return float(near.std(ddof=1)) if len(near) > 1 else np.nan
 
 
-class Spread(NamedTuple):
-    """The orbit's part in the samples of a passage.
+class OrbitSampling(NamedTuple):
+    """Contribution of the orbital uncertainty to the samples of a passage.
 
     Attributes
     ----------
     clones : Clones or None
-        One a sample; None where all samples share the nominal passage.
+        One per sample; None where all samples share the nominal passage.
     sigma : float
-        1-sigma of the distance, m; nan where nothing is known, or where only all clones can tell.
+        1-sigma of the distance, m; nan if unknown, or if it follows from the full set of clones only.
     note : str
-        Why the orbit is not drawn, for a reader; empty where it is, or where its error is too small to matter.
+        Reason why the orbit is not sampled; empty where it is, or where its error is insignificant.
     """
 
     clones: Clones | None
@@ -98,8 +98,8 @@ class Spread(NamedTuple):
     note: str
 
 
-def spread(passage: Passage, samples: int, seed: int) -> Spread:
-    """Whether the samples of a passage have orbits of their own, and which.
+def orbit_sampling(passage: Passage, samples: int, seed: int) -> OrbitSampling:
+    """Decide whether the samples of a passage have their own orbits, and draw them.
 
     Parameters
     ----------
@@ -110,13 +110,13 @@ def spread(passage: Passage, samples: int, seed: int) -> Spread:
     """
     asteroid = passage.asteroid
     if passage.encounter is not None and passage.encounter.time is None:
-        return Spread(None, np.nan, "scripted passage")
+        return OrbitSampling(None, np.nan, "scripted passage")
     covariance = asteroid.orbit.covariance
     if covariance is None:
-        return Spread(None, np.nan, "orbit without errors (no covariance)")
+        return OrbitSampling(None, np.nan, "orbit without errors (no covariance)")
     if not covariance.correlated:
         known = "1-sigmas" if covariance.caveat == "without correlations" else "known only"
-        return Spread(None, np.nan, f"orbit without errors ({known} {covariance.caveat})")
+        return OrbitSampling(None, np.nan, f"orbit without errors ({known} {covariance.caveat})")
     body = planet(passage.planet)
     key = int(stream(seed, "orbit", identity(asteroid)).integers(2**62))
     within = max(1.5 * passage.distance, far_enough(body))
@@ -132,7 +132,7 @@ def spread(passage: Passage, samples: int, seed: int) -> Spread:
             threads=1,
         )
     except FlybystabError as error:
-        return Spread(None, np.nan, f"orbit without errors ({type(error).__name__}: {error})")
+        return OrbitSampling(None, np.nan, f"orbit without errors ({type(error).__name__}: {error})")
     linear = few.linear
     if linear is not None and linear.nonlinearity < LINEAR:
         sigma = float(linear.distance_sigma.to_value(u.m))
@@ -141,5 +141,5 @@ def spread(passage: Passage, samples: int, seed: int) -> Spread:
     else:
         sigma = np.nan
     if 5.0 * sigma < MATTERS * passage.distance:
-        return Spread(None, sigma, "")
-    return Spread(Clones(passage, few.time, within, samples, key), sigma, "")
+        return OrbitSampling(None, sigma, "")
+    return OrbitSampling(Clones(passage, few.time, within, samples, key), sigma, "")

@@ -14,7 +14,7 @@ YIELDED = (Verdict.RESHAPED, Verdict.MASS_LOSS, Verdict.DISRUPTED, Verdict.IMPAC
 
 
 def share_of(verdict: str) -> str:
-    """Name of the column with the share of a verdict."""
+    """Name of the column with the fraction of samples of a verdict."""
     return "p_" + verdict.lower().replace(" ", "_")
 
 
@@ -27,49 +27,49 @@ COLUMNS: dict[str, Column] = {
         str, None, "closest approach, ISO 8601, TDB; empty where the asteroid could not be followed"
     ),
     "jd_tdb": Column(float, u.d, "closest approach, Julian date, TDB"),
-    "distance": Column(float, u.au, "between the centres at closest approach"),
-    "v_inf": Column(float, u.km / u.s, "speed relative to the planet, far from it"),
-    "verdict": Column(str, None, "verdict on the catalogue's values and the material given"),
+    "distance": Column(float, u.au, "distance of the centres at closest approach"),
+    "v_inf": Column(float, u.km / u.s, "hyperbolic excess speed"),
+    "verdict": Column(str, None, "verdict for the catalogue values and the given material"),
     "margin": Column(
         float, u.deg, "friction angle minus the largest one mobilised; a lower limit if decided by bound"
     ),
     "decided_by": Column(str, None, "bound or dynamics"),
     "friction_angle": Column(float, u.deg, "of the catalogue body"),
     "cohesion": Column(float, u.Pa, "of the catalogue body"),
-    "yield_surface": Column(str, None, "form of the yield surface, of the samples, too"),
+    "yield_surface": Column(str, None, "yield surface, of the samples also"),
     "semi_axis_a": Column(float, u.m, "long semi-axis of the catalogue body"),
     "semi_axis_b": Column(float, u.m, "middle semi-axis of the catalogue body"),
     "semi_axis_c": Column(float, u.m, "short semi-axis of the catalogue body"),
     "density": Column(float, u.kg / u.m**3, "bulk density of the catalogue body"),
     "spin_period": Column(float, u.h, "2 pi over the spin rate of the catalogue body"),
-    "required_friction_at_rest": Column(float, u.deg, "mobilised by the free body; inf if none would do"),
-    "friction_rise": Column(
-        float, u.deg, "what the passage adds to that; an upper limit if decided by bound"
+    "required_friction_at_rest": Column(
+        float, u.deg, "mobilised far from the planet; inf if no friction suffices"
     ),
+    "friction_rise": Column(float, u.deg, "increase during the passage; an upper limit if decided by bound"),
     "samples": Column(int, None, "samples drawn"),
     "samples_dynamic": Column(int, None, "samples that needed the dynamics"),
-    **{share_of(v): Column(float, None, f"share of the samples with verdict {v}") for v in VERDICTS},
-    "p_yield": Column(float, None, "share of the samples in equilibrium that yield, or hit the planet"),
+    **{share_of(v): Column(float, None, f"fraction of the samples with verdict {v}") for v in VERDICTS},
+    "p_yield": Column(float, None, "fraction of the samples in equilibrium that yield or hit the planet"),
     "p_yield_low": Column(float, None, "95 % interval (Wilson) of that probability"),
     "p_yield_high": Column(float, None, "95 % interval (Wilson) of that probability"),
     "distance_sigma": Column(
         float, u.km, "1-sigma of the distance, from the orbit's covariance; nan where none is known"
     ),
     "contributors": Column(
-        str, None, "inputs that the mobilised friction follows most, with rank correlation"
+        str, None, "inputs to which the mobilised friction is most sensitive, with Spearman's rho"
     ),
-    "assumed": Column(str, None, "what nobody measured in the catalogue body"),
-    "drawn": Column(str, None, "what the samples draw from distributions"),
-    "forces": Column(str, None, "what moves the asteroid and makes the tide"),
+    "assumed": Column(str, None, "properties of the catalogue body that are assumed, not measured"),
+    "drawn": Column(str, None, "quantities of the samples that are drawn from priors"),
+    "forces": Column(str, None, "forces on the orbit and sources of the tide"),
     "numerical_error": Column(
-        float, u.deg, "of the largest mobilised friction angle, measured; nan if by bound"
+        float, u.deg, "measured error of the largest mobilised friction angle; nan if by bound"
     ),
     "seed": Column(int, None, "seed of the run"),
     "orbit": Column(str, None, "orbit solution"),
-    "catalogue": Column(str, None, "where the asteroid comes from"),
+    "catalogue": Column(str, None, "catalogue of the asteroid"),
     "ephemeris": Column(str, None, "of the planets"),
     "version": Column(str, None, "of flybystab"),
-    "error": Column(str, None, "why the row could not be computed"),
+    "error": Column(str, None, "reason why the row could not be computed"),
 }
 
 #: Columns of the table of samples.
@@ -78,7 +78,7 @@ SAMPLE_COLUMNS: dict[str, Column] = {
     "planet": Column(str, None, "planet encountered"),
     "jd_tdb": Column(float, u.d, "closest approach, Julian date, TDB"),
     "sample": Column(int, None, "number of the sample"),
-    "distance": Column(float, u.au, "at closest approach, of the sample's orbit"),
+    "distance": Column(float, u.au, "closest-approach distance on the orbit of the sample"),
     "semi_axis_a": Column(float, u.m, "long semi-axis"),
     "semi_axis_b": Column(float, u.m, "middle semi-axis"),
     "semi_axis_c": Column(float, u.m, "short semi-axis"),
@@ -90,11 +90,11 @@ SAMPLE_COLUMNS: dict[str, Column] = {
     "pole_y": Column(float, None, "direction of the angular momentum at the start, ICRF"),
     "pole_z": Column(float, None, "direction of the angular momentum at the start, ICRF"),
     "angle": Column(float, u.deg, "turn about the pole"),
-    "phase": Column(float, None, "phase of a tumbler in its rotation period"),
+    "phase": Column(float, None, "rotation phase of a tumbler"),
     "verdict": Column(str, None, "verdict"),
     "margin": Column(
         float, u.deg, "friction angle minus the largest one mobilised; a lower limit if decided by bound"
     ),
     "decided_by": Column(str, None, "bound or dynamics"),
-    "error": Column(str, None, "why the sample could not be computed"),
+    "error": Column(str, None, "reason why the sample could not be computed"),
 }

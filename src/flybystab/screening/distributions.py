@@ -1,4 +1,4 @@
-"""Distributions of one number, as a screening states and draws them."""
+"""Probability distributions of one variable: their parameters, quantiles and text form."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ _KINDS = {
 
 @dataclass(frozen=True)
 class Distribution:
-    """A distribution of one number.
+    """A distribution of one variable.
 
     Parameters
     ----------
     kind : str
         "fixed" (value), "uniform" or "loguniform" (low, high), "normal" (mean, sd), "lognormal" (median,
-        sigma of the natural logarithm), "catalogue": the values of the embedded catalogue, each as likely, or
-        "lightcurves": the periods of the LCDB of the bodies nearest in absolute magnitude, each as likely.
+        sigma of the natural logarithm), "catalogue": the values of the embedded catalogue with equal weights, or
+        "lightcurves": LCDB periods of the bodies nearest in absolute magnitude, with equal weights.
     low, high : float, optional
         Truncate "normal" and "lognormal".
     """
@@ -96,7 +96,7 @@ class Distribution:
         return np.exp(found) if logarithmic else found
 
     def toml(self) -> str:
-        """An inline table of TOML."""
+        """The distribution as an inline table of TOML."""
         values = [f'kind = "{self.kind}"']
         values += [
             f"{f.name} = {getattr(self, f.name)!r}"

@@ -1,8 +1,8 @@
-"""Bodies drawn from what is known: catalogue values within their errors, distributions for the rest.
+"""Random bodies: catalogue values within their errors, and priors for what is not measured.
 
-A draw is fixed by the seed, the asteroid and the number of the sample alone: sample 17 of Apophis is the same
-whatever else is screened, in any order, by any number of workers, and for any number of samples. The same
-draw of a body meets every planet; its attitude is drawn anew for every encounter.
+A sample depends on the seed, the asteroid and the sample number only: sample 17 of Apophis is the same for any list
+of asteroids, any order, any number of workers and any number of samples. All encounters of an asteroid use the same
+bodies; the attitudes are drawn for each encounter.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Draws(NamedTuple):
     phase : ndarray (n,)
         Phase of a tumbler in its rotation period.
     drawn : tuple of str
-        What came from a distribution rather than from the catalogue.
+        Quantities drawn from a prior instead of the catalogue.
     """
 
     axes: Array
@@ -96,12 +96,12 @@ def _tumbling_rates(asteroid: Asteroid, phase: Array) -> Array:
 
 
 def nominal(asteroid: Asteroid, material: Material, population: Population | None = None) -> Draws:
-    """The catalogue's values as a draw of one; what is missing is the median of its distribution.
+    """The catalogue body as a draw of one; missing quantities have the median of their prior.
 
     Raises
     ------
     InvalidInput
-        The row has neither a size nor an absolute magnitude, or a value that is no number.
+        The row has neither a size nor an absolute magnitude, or a value is not a number.
     """
     middle = np.full((1, _WIDTH), 0.5)
     draw = _draws(asteroid, middle, population or Population(), keep=True)
@@ -115,7 +115,7 @@ def draws(asteroid: Asteroid, samples: int, seed: int, population: Population | 
 
 
 def _draws(asteroid: Asteroid, x: Array, population: Population, *, keep: bool) -> Draws:
-    """`keep` leaves known values as they are: without their errors, and without `replace_assumed`."""
+    """`keep` uses known values without their errors and ignores `replace_assumed`."""
     n = len(x)
     drawn: list[str] = []
     replace = population.replace_assumed and not keep
@@ -212,7 +212,7 @@ def _draws(asteroid: Asteroid, x: Array, population: Population, *, keep: bool) 
 
 @dataclass(frozen=True)
 class Attitudes:
-    """Attitudes of an asteroid's samples at one encounter, made one by one when they are asked for."""
+    """Attitudes of an asteroid's samples at one encounter, computed on demand."""
 
     asteroid: Asteroid
     draws: Draws

@@ -1,4 +1,4 @@
-"""Passages of asteroids by planets, as a screening meets them: found first, bounded, followed only if need be."""
+"""Passages of asteroids by planets: found, bounded, and integrated only where the bound does not decide."""
 
 from __future__ import annotations
 
@@ -19,17 +19,17 @@ from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.planets import PLANETS, planet
 from flybystab.screening.settings import Settings
 
-#: Nearer to the Earth than this (m) the Moon cannot be bounded without knowing where it is.
+#: Distance from the Earth (m) below which no bound on the Moon's tide holds without its position.
 FAR_FROM_EARTH = 3 * 3.844e8
 _MOON_PERIGEE, _MOON_APOGEE = 3.56e8, 4.067e8
-#: No planet comes nearer to the Sun than this share of its mean distance (Mercury: 0.794).
+#: Lower bound on perihelion over mean distance of the planets (Mercury: 0.794).
 _PERIHELION = 0.79
 _SQRT6 = np.sqrt(6.0)
 
 
 @dataclass
 class Passage:
-    """One encounter of one asteroid during its screening; the tide is made when it is first needed.
+    """One encounter of one asteroid; its tide is computed on first use.
 
     Attributes
     ----------
@@ -40,11 +40,11 @@ class Passage:
     distance, v_inf : float
         m, m/s.
     encounter : Encounter or None
-        Once it has been followed; given for a scripted one.
+        Set once it has been integrated; given for a scripted one.
     orbit : Orbit or None
         A clone, instead of the asteroid's own orbit.
     missed : bool
-        The clone does not come nearer than `distance`, and has no passage to follow.
+        The clone stays farther away than `distance` and has no passage.
     """
 
     asteroid: Asteroid
@@ -96,11 +96,11 @@ class Passage:
         near = body.gm * (1.0 + 6.0 * body.j2 * (body.radius / q) ** 2)
         peak = near / q**3 + others
         impulse = 2.0 * near / (q * q * slow) + others * (2.0 * reach / slow + SETTLE)
-        # 2 percent: the other planets, and the distance found against the distance followed.
+        # 2 percent for the other planets and for the difference between the found and the integrated distance.
         return float(1.02 * _SQRT6 * peak), float(1.02 * _SQRT6 * impulse)
 
     def meet(self) -> Encounter:
-        """The encounter, followed with all forces."""
+        """The encounter, integrated with all forces."""
         if self.missed:
             raise NoEncounter(f"the clone has no passage within {self.distance / AU:.3g} au of {self.planet}")
         if self.encounter is None:
@@ -113,7 +113,7 @@ class Passage:
         return self.encounter
 
     def close_bounds(self) -> tuple[float, float]:
-        """Bounds on the tide of the encounter that was followed."""
+        """Bounds on the tide of the integrated encounter."""
         e = self.meet()
         return tide_size(e.tide, e.t_start, e.t_stop)
 
@@ -143,5 +143,5 @@ def passages(asteroid: Asteroid, settings: Settings) -> list[Passage]:
     return sorted(found, key=lambda p: (p.time.tdb.jd, p.planet))
 
 
-#: Function that finds the encounters of an asteroid; workers must be able to import it.
+#: Function that finds the encounters of an asteroid; worker processes import it.
 Finder = Callable[[Asteroid, Settings], list[Passage]]

@@ -1,11 +1,10 @@
 """Bounds on the material of a body from its shape, its spin and the encounters that it survived.
 
-For each density and cohesion there is a least friction angle that carries the body as it is (theory,
-section 4) and one that carries it through a passage without yielding. The second depends on the attitude,
-which nobody knew in the past: its least value over the attitudes is a bound that any attitude obeys, its
-largest one makes the body safe at every attitude. A body that yielded and was moulded into its present shape
-escapes the bounds from passages, and nothing here says that it did not: they hold for a body that kept its
-shape.
+For each density and cohesion there is a least friction angle at which the body is in equilibrium (theory,
+section 4) and one at which it passes a planet without yielding. The second depends on the attitude, which is
+unknown for past encounters: its minimum over all attitudes is necessary, its maximum is sufficient. The bounds
+from passages assume that the body kept its shape; a body that yielded and took its present shape in the
+encounter is not constrained by them.
 """
 
 from __future__ import annotations
@@ -33,9 +32,9 @@ from flybystab.screening.draws import stream
 from flybystab.units import to_si, whole
 
 _TOLERANCE = 1e-7
-#: A passage that adds less than this is not followed, rad.
+#: Increase of the mobilised friction angle below which a passage is not integrated, rad.
 NEGLIGIBLE = float(np.radians(0.05))
-#: A friction angle that no material has, rad: where the bound may look.
+#: Friction angle above that of any material, rad: upper end of the search of the bound.
 _STEEP = 1.5
 
 
@@ -49,20 +48,20 @@ def infer(
     seed: int = 0,
     yield_surface: str = DEFAULT_SURFACE,
 ) -> QTable:
-    """Least friction angles that are compatible with a body's shape and spin and with its passages.
+    """Least friction angles compatible with the shape and spin of a body and with its past encounters.
 
     Parameters
     ----------
     asteroid : Asteroid or Body
     encounters : sequence of Encounter
-        Passages that it is known to have survived. One that the quick bound shows to add less than 0.05 deg
-        is not followed: its bound counts for every attitude, and nothing for any attitude.
+        Passages that it is known to have survived. Where the analytic bound on the increase is below 0.05 deg the
+        passage is not integrated: the bound is used for every attitude, and zero for any attitude.
     densities, cohesions : Quantity (n,), (m,)
-        The grid; by default 1000 to 3500 kg/m3, and cohesions from zero to three times the body's own stress.
+        The grid; by default 1000 to 3500 kg/m3, and cohesions from zero to three times the mean internal stress.
     attitudes : int
         Attitudes tried in every passage: the catalogue's pole where it is known, isotropic ones elsewhere.
     seed : int
-        Of the attitudes.
+        Seed of the random attitudes.
     yield_surface : str
         As in :class:`flybystab.Material`.
 
@@ -70,9 +69,9 @@ def infer(
     -------
     QTable
         Rows over densities, then cohesions: ``density``, ``cohesion``, ``friction_equilibrium`` (of a tumbler: in
-        all its phases), and over all passages ``friction_any_attitude`` (needed whatever the attitude was) and
-        ``friction_every_attitude`` (enough for every attitude tried); deg, inf where no friction is enough.
-        ``meta["passages"]`` says what each passage adds.
+        all its phases), and over all passages ``friction_any_attitude`` (necessary at any attitude) and
+        ``friction_every_attitude`` (sufficient at every attitude tried); deg, inf where no friction suffices.
+        ``meta["passages"]`` gives the increase by each passage.
 
     Raises
     ------
@@ -97,7 +96,7 @@ def infer(
     sizes = [tide_size(e.tide, e.t_start, e.t_stop) for e in encounters]
     shape = (len(rho), len(cohesion))
     rest = np.empty(shape)
-    needs = np.empty((*shape, len(encounters), 2))  # whatever the attitude, at the worst one
+    needs = np.empty((*shape, len(encounters), 2))  # at the best and at the worst attitude
     followed = np.zeros(len(encounters), dtype=bool)
     for i, r in enumerate(rho):
         for j, c in enumerate(cohesion):
@@ -149,7 +148,7 @@ def infer(
 def strongest_passage(table: QTable) -> dict[str, Any] | None:
     """The passage with the strongest tide out of ``meta["passages"]``; None without passages.
 
-    Not the one that adds most: what a passage adds may be a bound, which says nothing of the order.
+    Passages are ordered by tide, not by increase, since an increase may be an upper bound.
     """
     return max(table.meta.get("passages", []), key=lambda p: p["tide_s-2"], default=None)
 
@@ -161,7 +160,7 @@ def _largest(rise: np.ndarray) -> float:
 
 
 def _known_density(asteroid: Asteroid | Body) -> list[float]:
-    """Density and its 1-sigma in the catalogue, kg/m3; empty for a body of one's own."""
+    """Density and its 1-sigma in the catalogue, kg/m3; empty for a user-defined body."""
     columns = ("density_kg_m3", "density_sigma_kg_m3")
     if not isinstance(asteroid, Asteroid) or not asteroid.knows(columns[0]):
         return []
@@ -169,7 +168,7 @@ def _known_density(asteroid: Asteroid | Body) -> list[float]:
 
 
 def _cohesions(body: Body) -> np.ndarray:
-    """Zero, and the steps 1, 3, 10 ... Pa from a hundredth to three times the body's own stress."""
+    """Zero, and the steps 1, 3, 10 ... Pa from a hundredth to three times the mean internal stress."""
     a = body.axes
     weight = 2.0 / 15.0 * np.pi * G * 2000.0**2 * np.cbrt(np.prod(a)) ** 2
     spin = 2000.0 / 5.0 * float(body.omega @ body.omega) * a[0] ** 2
@@ -201,7 +200,7 @@ def survived(
     planets: Sequence[str] = ("earth",),
     within: Quantity = 0.05 * u.au,
 ) -> list[Encounter]:
-    """Passages of an asteroid's orbit between two dates, followed with all forces, for :func:`infer`.
+    """Passages of an asteroid between two dates, integrated with all forces, for :func:`infer`.
 
     Raises
     ------

@@ -1,9 +1,9 @@
 """The journal of a screening: results of finished asteroids, and of parts of long ones, on disk.
 
-The journal stands next to the output while a run lasts. Each record is one line of JSON with a checksum, written as
-soon as its result is there and forced to the disk at least every `SYNC_INTERVAL` seconds, and before the run reports
-success. A run that is killed, by a power cut too, is continued from its journal; the last line may then be incomplete
-and is dropped. A record whose checksum does not agree is reported, and its result is computed again.
+The journal is kept beside the output during a run. Each record is one line of JSON with a checksum. It is written as
+soon as its result is available, and synchronised to disk at least every `SYNC_INTERVAL` seconds and before the run
+reports success. A run that was killed, also by a power cut, resumes from its journal; the last line may then be
+incomplete and is dropped. A record whose checksum does not agree is reported, and its result is recomputed.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from typing import Any, BinaryIO
 
 from flybystab.errors import InvalidInput, OutputFailed
 
-#: Longest time between two fsync calls while records are written, s: what a power cut can lose.
+#: Longest time between two fsync calls while records are written, s: the work that a power cut can lose.
 SYNC_INTERVAL = 1.0
 
 _MARK = b', "checksum": "'
@@ -34,12 +34,12 @@ class Journal:
     path : Path
         Created if it does not exist.
     header : mapping
-        What the run computes; the journal of another run is refused.
+        Description of the run; the journal of another run is refused.
 
     Attributes
     ----------
     count : int
-        Finished tasks; ``task in journal`` tells whether one of them is finished.
+        Number of finished tasks; ``task in journal`` tells whether a task is finished.
     damaged : list of int
         Numbers of the lines that were damaged when the journal was opened.
     resumed : bool
@@ -160,7 +160,7 @@ class Journal:
         return dict(json.loads(line))
 
     def sync(self) -> None:
-        """Force what was written to the disk."""
+        """Synchronise written records to disk."""
         sync_file(self._file.fileno())
         self._synced = clock.monotonic()
 
@@ -175,7 +175,7 @@ class Journal:
         if found is None:
             raise OutputFailed(
                 f"{self.path} was changed while the run used it (byte {offset}): run the same command again; "
-                "what is damaged is computed again"
+                "damaged results are recomputed"
             )
         return found
 
@@ -192,9 +192,9 @@ class Journal:
             return self._record(stream, self._offsets[task])
 
     def close(self, *, remove: bool = False) -> None:
-        """Close the file; `remove` it when the tables that were made from it are on the disk."""
+        """Close the file; `remove` it once the tables made from it are on disk."""
         if remove:
-            # Before the lock is released: no other run can take it up meanwhile.
+            # Removed before the lock is released, so that no other run can open it.
             self.path.unlink(missing_ok=True)
             sync_folder(self.path.parent)
         else:

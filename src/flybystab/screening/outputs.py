@@ -1,4 +1,4 @@
-"""The tables of a run: they grow with its journal, and are made from it again when the run is interrupted."""
+"""Output tables of a run: they grow with the journal and are rebuilt from it after an interruption."""
 
 from __future__ import annotations
 
@@ -74,7 +74,7 @@ class Outputs:
     def so_far(self, meta: Mapping[str, Any]) -> None:
         """Write valid tables of the finished tasks.
 
-        They are made from the journal, since an interrupt may have come in the middle of a row.
+        They are rebuilt from the journal, since an interrupt may have left an incomplete row.
         """
         self.discard()
         for kind, (path, columns) in self._tables.items():

@@ -15,7 +15,7 @@ from flybystab.errors import InvalidInput, UnknownName
 from flybystab.files import DOCUMENT_LIMIT, parse_toml, read_text
 from flybystab.screening.distributions import Distribution, distribution_of
 
-#: Ranges that every distribution must keep.
+#: Admissible range of each quantity.
 _LIMITS = {
     "friction_angle_deg": (0.0, 89.0),
     "cohesion_Pa": (0.0, np.inf),
@@ -34,7 +34,7 @@ _ELONGATION = Distribution("catalogue")
 _FLATTENING = Distribution("normal", mean=0.9, sd=0.1, low=0.4, high=1.0)
 _PERIOD = Distribution("lightcurves")
 _ALBEDO = Distribution("lognormal", median=0.14, sigma=0.8, low=0.02, high=0.6)
-#: Density by taxonomic letter where it is not measured: means and spreads of the measured bodies (data/README.md).
+#: Density by taxonomic letter where it is not measured: mean and scatter of measured bodies (data/README.md).
 _STONY = Distribution("normal", mean=2300.0, sd=500.0, low=575.0, high=9200.0)
 _CARBONACEOUS = Distribution("normal", mean=1300.0, sd=300.0, low=325.0, high=5200.0)
 
@@ -44,10 +44,10 @@ class Population:
     """Distributions of the material and of the quantities that a catalogue lacks.
 
     Units are in the names. `friction_angle_deg` and `cohesion_Pa` apply to every body, the others only where the
-    catalogue has no value, or also to its assumed values with `replace_assumed`. `density_by_class_kg_m3` goes
-    before `density_kg_m3` where the first letter of the taxonomic class is among its keys. Where a lightcurve
+    catalogue has no value, or also to its assumed values with `replace_assumed`. `density_by_class_kg_m3` takes
+    precedence over `density_kg_m3` where the first letter of the taxonomic class is among its keys. Where a lightcurve
     amplitude is known, ``log10(a/b)`` is normal with mean `log_elongation_per_mag` times the amplitude and
-    `log_elongation_sigma`, cut to 1 <= a/b <= 4; else `elongation` counts. `flattening` is c/b.
+    `log_elongation_sigma`, truncated to 1 <= a/b <= 4; otherwise `elongation` is used. `flattening` is c/b.
     """
 
     friction_angle_deg: Distribution = _FRICTION
@@ -91,7 +91,7 @@ class Population:
                 yield from ((f"{f.name}.{letters}", d) for letters, d in value.items())
 
     def density_of(self, taxonomic_class: str) -> tuple[Distribution, str]:
-        """Distribution of the density of a class, and what to call it."""
+        """Density distribution of a taxonomic class, and its label."""
         for letters, distribution in self.density_by_class_kg_m3.items():
             if taxonomic_class[:1] and taxonomic_class[0] in letters:
                 return distribution, "density (from the class)"
@@ -101,7 +101,7 @@ class Population:
     def from_mapping(cls, data: Mapping[str, Any]) -> Population:
         """From a mapping such as a TOML table: ``{"cohesion_Pa": {"kind": "fixed", "value": 0}}``.
 
-        A `density_kg_m3` without `density_by_class_kg_m3` counts for every class.
+        A `density_kg_m3` without `density_by_class_kg_m3` applies to every class.
 
         Raises
         ------
@@ -129,7 +129,7 @@ class Population:
 
     @classmethod
     def from_file(cls, path: str | Path) -> Population:
-        """From a TOML file, as :meth:`toml` writes it; what it leaves out keeps its default."""
+        """From a TOML file as written by :meth:`toml`; omitted keys keep their defaults."""
         what = "population file"
         return cls.from_mapping(parse_toml(read_text(path, what, DOCUMENT_LIMIT), what, path))
 
@@ -154,7 +154,7 @@ class Population:
         return "\n".join([*lines, *tables]) + "\n"
 
     def stated(self) -> dict[str, str]:
-        """The distributions in words."""
+        """Descriptions of the distributions."""
         fixed = {"pole": "the catalogue's, else isotropic", "angle_and_phase": "uniform"}
         return (
             fixed

@@ -1,4 +1,4 @@
-"""Progress of a screening on a terminal, or as quiet lines in a log; nothing on the standard output."""
+"""Progress of a screening: a bar on a terminal, occasional lines in a log; always on the standard error."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 
 #: Seconds between two lines where there is no terminal.
 QUIET = 30.0
-#: Seconds between two pictures of the bar.
+#: Seconds between two updates of the bar.
 FRAME = 0.1
 
 
@@ -25,7 +25,7 @@ class Progress:
     done, total : int
         Asteroids.
     resumed : int
-        Of these, from a former run.
+        Of these, finished in an earlier run.
     rows : int
         Encounters.
     verdicts : dict of str to int
@@ -33,7 +33,7 @@ class Progress:
     seconds : float
         Since this run began.
     begun : float
-        What is done of the asteroids in work, by samples, as a number of asteroids.
+        Completed fraction of the asteroids in progress, by samples, summed over them.
     """
 
     done: int
@@ -84,7 +84,7 @@ class ProgressBar:
         self.stream.flush()
 
     def end(self) -> None:
-        """Leave the line of the bar, for other words."""
+        """End the line of the bar, so that other text can follow."""
         if self.terminal:
             self.stream.write("\n")
             self.stream.flush()
@@ -104,7 +104,7 @@ class ProgressBar:
 
 
 def duration(seconds: float) -> str:
-    """A time for people: 48 s, 3 min, 2.5 h, 4 d."""
+    """A duration with a suitable unit: 48 s, 3 min, 2.5 h, 4 d."""
     for size, unit in ((86400.0, "d"), (3600.0, "h"), (60.0, "min")):
         if seconds >= 1.5 * size:
             return f"{seconds / size:.2g} {unit}"

@@ -1,4 +1,4 @@
-"""Rows of a screening: one an encounter, for the catalogue body and its samples, and one a sample."""
+"""Rows of a screening: one per encounter, for the catalogue body and its samples, and one per sample."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from flybystab.constants import AU
 from flybystab.errors import FlybystabError
 from flybystab.flybys.verdict import Verdict
 from flybystab.orbit.ephemeris import ephemeris
-from flybystab.screening.clones import Spread
+from flybystab.screening.clones import OrbitSampling
 from flybystab.screening.columns import VERDICTS, YIELDED, share_of
 from flybystab.screening.draws import Attitudes, Draws, nominal
 from flybystab.screening.encounters import Passage
-from flybystab.screening.sample_verdicts import Judged, contributors, inputs, judge, wilson
+from flybystab.screening.sample_verdicts import SampleVerdicts, contributors, inputs, sample_verdicts, wilson
 from flybystab.screening.settings import Settings
 
-#: Values by column; a column that is left out is empty.
+#: Values by column; omitted columns are empty.
 Row = dict[str, Any]
 
-#: The margin of the catalogue body is computed, not bounded, where the bound is this far from rest, rad.
+#: The margin of the catalogue body is integrated where the bound exceeds the value at rest by this, rad.
 SHARP = float(np.radians(0.01))
 
 
@@ -34,7 +34,7 @@ def failed_row(asteroid: Asteroid, settings: Settings, error: Exception) -> Row:
 
 
 def body_row(passage: Passage, settings: Settings) -> Row:
-    """Row of an encounter with what happens to the catalogue body; without a verdict where that is not known."""
+    """Row of an encounter for the catalogue body; without a verdict where it could not be computed."""
     asteroid, material = passage.asteroid, settings.material
     row = _head(asteroid, settings) | {
         "planet": passage.planet,
@@ -46,7 +46,7 @@ def body_row(passage: Passage, settings: Settings) -> Row:
     try:
         known = nominal(asteroid, material, settings.population)
         attitude = Attitudes.at(asteroid, known, settings.seed, "nominal", *passage.key)
-        main = judge(
+        main = sample_verdicts(
             passage, known, attitude, material, tolerance=settings.tolerance, sharp=SHARP, measure=True
         )
     except FlybystabError as error:
@@ -73,8 +73,8 @@ def body_row(passage: Passage, settings: Settings) -> Row:
     }
 
 
-def sampled_row(row: Row, orbits: Spread, draw: Draws, result: Judged) -> Row:
-    """The row of the catalogue body with what happens to the samples."""
+def sampled_row(row: Row, orbits: OrbitSampling, draw: Draws, result: SampleVerdicts) -> Row:
+    """The row of the catalogue body completed by the statistics of the samples."""
     counts = Counter(result.verdict)
     judged = len(draw.rho) - counts[""]
     stands = judged - counts[Verdict.NOT_IN_EQUILIBRIUM]
@@ -102,11 +102,11 @@ def sampled_row(row: Row, orbits: Spread, draw: Draws, result: Judged) -> Row:
 
 
 def _rise(most: float, rest: float) -> float:
-    """Mobilised friction added by an encounter; inf if no friction suffices, nan if none does at rest either."""
+    """Mobilised friction added by an encounter; inf if no friction suffices, nan if none suffices at rest either."""
     return most - rest if np.isfinite(rest) else np.nan
 
 
-def sample_rows(passage: Passage, attitudes: Attitudes, result: Judged) -> Iterator[Row]:
+def sample_rows(passage: Passage, attitudes: Attitudes, result: SampleVerdicts) -> Iterator[Row]:
     """Rows of the samples of one encounter."""
     draw = attitudes.draws
     for i in range(len(draw.rho)):

@@ -22,7 +22,7 @@ RESULT_LIMIT = 4 * 2**30
 
 
 class Column(NamedTuple):
-    """A column of a result table: Python type, unit of floats, and what it is."""
+    """A column of a result table: Python type, unit of floats, description."""
 
     kind: type
     unit: u.UnitBase | None
@@ -109,7 +109,7 @@ def read_results(path: str | Path) -> QTable:
 
 
 def _check_complete(table: QTable, content: bytes, path: str | Path) -> None:
-    """Refuse a table that was cut off: its header gives the number of rows, and its last line has an end."""
+    """Refuse a truncated table: the header gives the number of rows, and the last line must end with a newline."""
     rows = table.meta.get("rows")
     if isinstance(rows, int) and (rows != len(table) or not content.endswith(b"\n")):
         raise InvalidInput(

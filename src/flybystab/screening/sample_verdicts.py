@@ -1,4 +1,4 @@
-"""Verdicts on many bodies in one passage: by the bound where it decides, by the dynamics elsewhere."""
+"""Verdicts on many bodies in one passage: by the bound where it decides, by integration elsewhere."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def _quick(draw: Draws, code: int, size: tuple[float, float]) -> tuple[Array, ND
 
 
 @dataclass
-class Judged:
+class SampleVerdicts:
     """Verdicts on the samples of one passage.
 
     Attributes
@@ -49,11 +49,11 @@ class Judged:
     verdict : list of str
         Empty where there is none.
     margin, rest : ndarray
-        Friction angle of the material less the one mobilised in the passage; the one mobilised far from it, rad.
+        Friction angle of the material minus the largest one mobilised in the passage; the one mobilised at rest, rad.
     dynamic : ndarray of bool
         Decided by the dynamics, not by the bound.
     error : list of str
-        Why there is no verdict.
+        Reason why there is no verdict; empty if there is one.
     distance : ndarray
         Of the passage, m.
     numerical : float
@@ -69,7 +69,7 @@ class Judged:
     numerical: float = np.nan
 
     @classmethod
-    def joined(cls, parts: Sequence[Judged]) -> Judged:
+    def joined(cls, parts: Sequence[SampleVerdicts]) -> SampleVerdicts:
         """The samples of all parts, in their order."""
         return cls(
             [v for p in parts for v in p.verdict],
@@ -81,25 +81,25 @@ class Judged:
         )
 
     @classmethod
-    def failed(cls, error: str, distance: float) -> Judged:
+    def failed(cls, error: str, distance: float) -> SampleVerdicts:
         """One sample that could not be judged."""
         nothing = np.full(1, np.nan)
         return cls([""], nothing, nothing.copy(), np.zeros(1, dtype=bool), [error], np.full(1, distance))
 
     def stored(self) -> dict[str, Any]:
-        """As what JSON holds; no digit is lost."""
+        """As JSON-compatible data, without loss of digits."""
         arrays = {name: getattr(self, name).tolist() for name in ("margin", "rest", "dynamic", "distance")}
         return {"verdict": [str(v) for v in self.verdict], "error": self.error, **arrays}
 
     @classmethod
-    def restored(cls, stored: Mapping[str, Any]) -> Judged:
-        """From what `stored` gave."""
+    def restored(cls, stored: Mapping[str, Any]) -> SampleVerdicts:
+        """Inverse of `stored`."""
         margin, rest, distance = (np.array(stored[n], dtype=float) for n in ("margin", "rest", "distance"))
         dynamic = np.array(stored["dynamic"], dtype=bool)
         return cls(list(stored["verdict"]), margin, rest, dynamic, list(stored["error"]), distance)
 
 
-def judge(
+def sample_verdicts(
     passage: Passage,
     draw: Draws,
     attitudes: Attitudes,
@@ -109,7 +109,7 @@ def judge(
     quick: bool = True,
     sharp: float = np.inf,
     measure: bool = False,
-) -> Judged:
+) -> SampleVerdicts:
     """Verdicts on bodies in one passage: by the bound where it decides, else by the dynamics.
 
     Parameters
@@ -123,8 +123,8 @@ def judge(
     quick : bool
         Whether the bound may decide.
     sharp : float
-        Follow a body that the bound decides all the same if its bound on the mobilised friction angle exceeds
-        the angle mobilised at rest by more than this, rad: for a margin instead of a lower limit to it.
+        Integrate a body although the bound decides if the bound on its mobilised friction angle exceeds the
+        angle at rest by more than this, rad: the margin is then a value instead of a lower limit.
     measure : bool
         Measure the numerical error of the first body by a run with a larger step tolerance.
     """
@@ -149,7 +149,7 @@ def judge(
                 friction[fresh], decided[fresh] = close[fresh], sharper[fresh]
     dynamic = decided == UNDECIDED
     distance = np.full(n, passage.distance)
-    out = Judged([""] * n, np.full(n, np.nan), friction[:, 0].copy(), dynamic, [""] * n, distance)
+    out = SampleVerdicts([""] * n, np.full(n, np.nan), friction[:, 0].copy(), dynamic, [""] * n, distance)
     for i in (int(k) for k in np.flatnonzero(~dynamic)):
         intact = decided[i] == INTACT
         out.verdict[i] = Verdict.INTACT if intact else Verdict.NOT_IN_EQUILIBRIUM
@@ -175,18 +175,18 @@ def judge(
     return out
 
 
-def judge_each(
+def verdicts_each(
     passages: Sequence[Passage],
     draw: Draws,
     attitudes: Attitudes,
     material: Material,
     *,
     tolerance: float = 1e-7,
-) -> Judged:
-    """Verdicts on bodies, each in a passage of its own (arguments as of :func:`judge`)."""
-    return Judged.joined(
+) -> SampleVerdicts:
+    """Verdicts on bodies, each in a passage of its own (arguments as of :func:`sample_verdicts`)."""
+    return SampleVerdicts.joined(
         [
-            judge(p, draw.part(i, i + 1), attitudes.part(i, i + 1), material, tolerance=tolerance)
+            sample_verdicts(p, draw.part(i, i + 1), attitudes.part(i, i + 1), material, tolerance=tolerance)
             for i, p in enumerate(passages)
         ]
     )
@@ -201,7 +201,7 @@ def wilson(successes: int, trials: int) -> tuple[float, float]:
 
 
 def contributors(inputs: dict[str, Array], outcome: Array, most: int = 3) -> str:
-    """Inputs whose ranks follow the outcome most, with Spearman's rank correlation."""
+    """Inputs with the strongest Spearman rank correlation with the outcome."""
     good = np.isfinite(outcome)
     if good.sum() < 8 or np.ptp(outcome[good]) == 0.0:
         return ""

@@ -1,4 +1,4 @@
-"""Work of a screening on the workers of an executor: what is sent next, and what has come back."""
+"""Scheduling of the tasks of a screening on the workers of an executor."""
 
 from __future__ import annotations
 
@@ -13,58 +13,58 @@ from typing import Any, NamedTuple, Protocol
 from flybystab.catalogues.catalogue import Asteroid
 from flybystab.errors import WorkersLost
 from flybystab.screening.encounters import Finder
-from flybystab.screening.sample_verdicts import Judged
+from flybystab.screening.sample_verdicts import SampleVerdicts
 from flybystab.screening.settings import Settings
-from flybystab.screening.tasks import Begun, Part, Rows, begin, joined
+from flybystab.screening.tasks import OpenPassage, Part, Rows, begin, joined
 
 
 def _begin(
     asteroids: list[Asteroid], settings: Settings, finder: Finder, block: int
-) -> list[list[Rows | Begun]]:
+) -> list[list[Rows | OpenPassage]]:
     return [begin(a, settings, finder, block) for a in asteroids]
 
 
-def _judge(part: Part, settings: Settings) -> Judged:
+def _judge(part: Part, settings: Settings) -> SampleVerdicts:
     return part.judged(settings)
 
 
 @dataclass(eq=False)
 class _Asteroid:
-    """An asteroid in work: its passages, how many of them are not done, and the samples that those began with."""
+    """An asteroid in progress: its passages, the number of open ones, and their initial number of samples."""
 
     position: int
-    work: list[Rows | Begun]
+    work: list[Rows | OpenPassage]
     open: int
     samples: int
     done: int = 0
 
 
 class _Piece(NamedTuple):
-    """Place of the result of a part."""
+    """Position of the result of a part."""
 
     asteroid: _Asteroid
     number: int
-    passage: Begun
+    passage: OpenPassage
     first: int
 
 
 class Parts(Protocol):
-    """Keeps the parts of asteroids that take long."""
+    """Store of finished parts of long tasks."""
 
-    def add(self, asteroid: int, passage: int, first: int, judged: Judged) -> None:
-        """Keep a part: samples from `first` on of one of the asteroid's passages."""
+    def add(self, asteroid: int, passage: int, first: int, judged: SampleVerdicts) -> None:
+        """Store a part: samples from `first` on of one passage of the asteroid."""
 
     def of(self, asteroid: int) -> Sequence[Mapping[str, Any]]:
-        """Parts of an asteroid that were kept before, with ``passage``, ``first`` and what `Judged.stored` gave."""
+        """Stored parts of an asteroid, with ``passage``, ``first`` and the result of `SampleVerdicts.stored`."""
 
 
-class Here(Executor):
-    """Computes at once, in the caller."""
+class SerialExecutor(Executor):
+    """Executor that computes immediately, in the calling thread."""
 
     _max_workers = 1
 
     def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
-        """The answer, in a future that is done."""
+        """The result, in a finished future."""
         future: Future[Any] = Future()
         try:
             future.set_result(fn(*args, **kwargs))
@@ -86,9 +86,9 @@ def scheduled(
     report: Callable[[float], None] | None = None,
     parts: Parts | None = None,
 ) -> Iterator[tuple[int, Rows]]:
-    """Rows of the asteroids at the positions `todo`, as they are done: (position, rows).
+    """Rows of the asteroids at the positions `todo`, in order of completion: (position, rows).
 
-    Parts of asteroids that are begun go before new asteroids, so that few are open at a time.
+    Parts of asteroids in progress take precedence over new asteroids, so that few are open at a time.
 
     Parameters
     ----------
@@ -97,16 +97,16 @@ def scheduled(
     window : int
         Calls in flight at a time: memory does not grow with the length of the list.
     block : int
-        Samples by the dynamics in one part (:func:`flybystab.screening.tasks.begun`).
+        Samples by the dynamics in one part (:func:`flybystab.screening.tasks.opened`).
     report : callable, optional
-        Called after every part with what is done of the asteroids in work, as a number of asteroids.
+        Called after every part with the completed fractions of the asteroids in progress, summed.
     parts : Parts, optional
-        Keeps parts that are done, and has those of an earlier run.
+        Stores finished parts, and holds those of an earlier run.
 
     Raises
     ------
     WorkersLost
-        With the names of the asteroids in work.
+        Names the asteroids in progress.
     """
     positions = iter(todo)
     waiting: deque[Iterator[tuple[_Piece, Part]]] = deque()
@@ -142,7 +142,7 @@ def scheduled(
                         raise
                     names = ", ".join(asteroids[i].name for i in _positions(call))
                     raise WorkersLost(
-                        f"workers died or were lost ({type(error).__name__}: {error}); in work: {names}. Finished "
+                        f"workers died or were lost ({type(error).__name__}: {error}); in progress: {names}. Finished "
                         "asteroids are kept: the same call continues the run"
                     ) from None
                 if isinstance(call, _Piece):
@@ -162,9 +162,9 @@ def scheduled(
                 for i, work in zip(call, answer, strict=True):
                     for part in () if parts is None else parts.of(i):
                         found = work[part["passage"]] if part["passage"] < len(work) else None
-                        if isinstance(found, Begun):
+                        if isinstance(found, OpenPassage):
                             found.take_stored([part])
-                    left = [(n, w) for n, w in enumerate(work) if isinstance(w, Begun) and w.left]
+                    left = [(n, w) for n, w in enumerate(work) if isinstance(w, OpenPassage) and w.left]
                     if left:
                         samples = sum(w.left for _, w in left)
                         waiting.append(_pieces(_Asteroid(i, work, len(left), samples), left))
@@ -175,14 +175,14 @@ def scheduled(
             future.cancel()
 
 
-def _pieces(asteroid: _Asteroid, left: Sequence[tuple[int, Begun]]) -> Iterator[tuple[_Piece, Part]]:
+def _pieces(asteroid: _Asteroid, left: Sequence[tuple[int, OpenPassage]]) -> Iterator[tuple[_Piece, Part]]:
     for number, passage in left:
         for first, part in list(passage.parts()):
             yield _Piece(asteroid, number, passage, first), part
 
 
 def _lost(error: Exception) -> bool:
-    """Whether an error says that workers are gone: of concurrent.futures, or of dask (KilledWorker, comm errors)."""
+    """Whether an error means that workers were lost: of concurrent.futures, or of dask (KilledWorker, comm errors)."""
     kinds = {kind.__module__.partition(".")[0] for kind in type(error).__mro__}
     return isinstance(error, BrokenExecutor | CancelledError) or "distributed" in kinds
 

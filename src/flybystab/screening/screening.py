@@ -1,12 +1,11 @@
-"""Many bodies through many encounters: which passages could reshape which asteroids, and how likely.
+"""Screening: which encounters could reshape which asteroids, and with what probability.
 
-Each asteroid is one task (:mod:`flybystab.screening.tasks`). Its encounters are found; at each one the catalogue body
-and the samples of :mod:`flybystab.screening.priors` meet the tide. What the bound of
-:mod:`flybystab.core.ellipsoid.yield_bound`
-decides is decided by it, the rest by the dynamics (:mod:`flybystab.screening.sample_verdicts`), split over the
-workers where
-there is much of it. Tasks share nothing, and their random numbers depend on the seed, the asteroid and the sample
-only, so that any executor gives the same rows.
+Each asteroid is one task (:mod:`flybystab.screening.tasks`). Its encounters are found, and verdicts are computed for
+the catalogue body and for samples drawn from :mod:`flybystab.screening.priors`. The bound of
+:mod:`flybystab.core.ellipsoid.yield_bound` decides most of them; the others are integrated
+(:mod:`flybystab.screening.sample_verdicts`), in parts shared by all workers where there are many. Tasks are
+independent, and their random numbers depend on the seed, the asteroid and the sample only, so that the rows do not
+depend on the executor.
 """
 
 from __future__ import annotations
@@ -41,8 +40,8 @@ from flybystab.screening.priors import Population
 from flybystab.screening.progress import Progress
 from flybystab.screening.result_rows import Row
 from flybystab.screening.results import Column, read_meta, table_of
-from flybystab.screening.sample_verdicts import Judged
-from flybystab.screening.scheduling import Here, Parts, scheduled, window_of
+from flybystab.screening.sample_verdicts import SampleVerdicts
+from flybystab.screening.scheduling import Parts, SerialExecutor, scheduled, window_of
 from flybystab.screening.selection import listed
 from flybystab.screening.settings import Settings, settings
 from flybystab.screening.table_files import check_output
@@ -50,7 +49,7 @@ from flybystab.screening.tasks import Rows, block_of
 
 
 class Screening:
-    """A screening that can be run, stopped and taken up again.
+    """A screening that can be run, interrupted and resumed.
 
     Parameters
     ----------
@@ -107,26 +106,26 @@ class Screening:
         report: Callable[[float], None] | None = None,
         parts: Parts | None = None,
     ) -> Iterator[tuple[int, Rows]]:
-        """Results of the asteroids that are not in `skip`, as they are done: (position, result).
+        """Results of the asteroids that are not in `skip`, in order of completion: (position, result).
 
         Parameters
         ----------
         executor : concurrent.futures.Executor, optional
-            Anything with ``submit``; without it, here.
+            Anything with ``submit``; by default this process.
         chunk : int
             Asteroids in one call of a worker.
         window : int, optional
-            Calls in flight at a time; four a worker by default.
+            Calls in flight at a time; four per worker by default.
         block : int, optional
             Samples by the dynamics in one call of a worker. The rows do not depend on it.
         report : callable, optional
-            Called with what is done of the asteroids in work, as a number of asteroids.
+            Called with the completed fractions of the asteroids in progress, summed.
         parts : Parts, optional
-            Keeps parts of asteroids that take long, and has those of an earlier run.
+            Stores finished parts of long tasks, and holds those of an earlier run.
         """
         todo = (i for i in range(len(self.asteroids)) if i not in skip)
         if executor is None:
-            executor, window = Here(), 1
+            executor, window = SerialExecutor(), 1
         yield from scheduled(
             self.asteroids,
             todo,
@@ -150,30 +149,30 @@ class Screening:
         chunk: int = 1,
         progress: Callable[[Progress], None] | None = None,
     ) -> Progress:
-        """Compute what is missing and write the files.
+        """Compute the missing results and write the files.
 
         Parameters
         ----------
         output : str or Path
-            Table of encounters, ``.ecsv`` or ``.parquet``. Its journal stands next to it meanwhile.
+            Table of encounters, ``.ecsv`` or ``.parquet``. The journal is kept beside it until the run ends.
         samples_output : str or Path, optional
             Table of samples; needs ``keep_samples`` in the settings.
         overwrite : bool
-            Replace tables of these names that are there already. Those of a run that this one takes up again are
-            replaced in any case.
+            Replace existing tables of these names. The tables of the run that this one resumes are always
+            replaced.
 
         Raises
         ------
         InvalidInput, MissingExtra
-            The output cannot be written, is there already, or another run's journal is in the way: before anything
-            is computed.
+            The output cannot be written or exists already, or the journal belongs to another run. Raised before
+            anything is computed.
         WorkersLost
-            Processes of the executor died; the rows so far are in the file and the same call goes on.
+            Processes of the executor died; the rows so far are in the file and the same call resumes the run.
         OutputFailed
-            The disk is full, or gone, in the middle, or another program made a file of the output's name; the rows so
-            far are in the journal and the same call goes on.
+            The disk became full or unavailable, or another program created a file of the output's name; the rows
+            so far are in the journal and the same call resumes the run.
         KeyboardInterrupt
-            After the rows so far have been written into a valid file; the same call goes on later.
+            After the rows so far have been written to a valid file; the same call resumes the run.
         """
         out = check_output(output)
         tables: dict[str, tuple[Path, Mapping[str, Column]]] = {"rows": (out, COLUMNS)}
@@ -191,7 +190,7 @@ class Screening:
         taken = [path for path, _ in tables.values() if os.path.lexists(path)]
         if not overwrite:
             for path in taken:
-                # A run that is taken up again may replace its own table, and no other one.
+                # A resumed run may replace its own table only.
                 if not unfinished or read_meta(path).get("settings") != self.meta()["settings"]:
                     raise InvalidInput(
                         "output",
@@ -225,9 +224,9 @@ class Screening:
                 yield
             except OSError as error:
                 raise OutputFailed(
-                    f"{out.parent} cannot be written any more ({error.strerror or error}). {journal.count} of "
-                    f"{len(self.asteroids)} asteroids are safe in {journal.path}: make room and start the same "
-                    "run again"
+                    f"{out.parent} can no longer be written ({error.strerror or error}). {journal.count} of "
+                    f"{len(self.asteroids)} asteroids are saved in {journal.path}: free some space and repeat "
+                    "the same command"
                 ) from None
 
         outputs: Outputs | None = None
@@ -259,21 +258,21 @@ class Screening:
 
 
 def _damage(journal: Journal, asteroids: int) -> str:
-    """Describe what a damaged journal has lost."""
+    """Describe the losses of a damaged journal."""
     lines = ", ".join(map(str, journal.damaged[:10])) + (", ..." if len(journal.damaged) > 10 else "")
     return (
         f"{journal.path} is damaged in {len(journal.damaged)} of its lines ({lines}); their results are lost. "
-        f"{journal.count} of {asteroids} asteroids are intact, the others are computed again"
+        f"{journal.count} of {asteroids} asteroids are intact, the others are recomputed"
     )
 
 
 class _Kept:
-    """The parts of asteroids in work, in the journal."""
+    """Finished parts of the asteroids in progress, stored in the journal."""
 
     def __init__(self, journal: Journal, writing: Callable[[], AbstractContextManager[None]]) -> None:
         self._journal, self._writing = journal, writing
 
-    def add(self, asteroid: int, passage: int, first: int, judged: Judged) -> None:
+    def add(self, asteroid: int, passage: int, first: int, judged: SampleVerdicts) -> None:
         with self._writing():
             self._journal.add_part(asteroid, passage, first, judged.stored())
 
@@ -297,7 +296,7 @@ def screen(
     progress: Callable[[Progress], None] | None = None,
     finder: Finder = passages,
 ) -> QTable:
-    """Verdicts of the encounters of asteroids, treated as rubble piles.
+    """Verdicts on the encounters of asteroids, modelled as rubble piles.
 
     Parameters
     ----------
@@ -311,15 +310,15 @@ def screen(
     within : Quantity
         Largest distance of an encounter.
     samples : int
-        Above one: draws of the uncertain inputs for every encounter, beside the catalogue's values.
+        Number of samples of the uncertain inputs per encounter, in addition to the catalogue values; 1 for none.
     seed : int
-        Fixes every draw, for any executor.
+        Seed of all random numbers; results do not depend on the executor.
     executor : concurrent.futures.Executor, optional
-        Where the asteroids are computed; here and one by one without it.
+        Computes the asteroids; by default they are computed one by one in this process.
     material : Material, optional
         Of the catalogue body: 35 deg and no cohesion by default. Samples draw theirs from `population`.
     population : Population, optional
-        Distributions of what is not known.
+        Distributions of unmeasured quantities.
     tolerance : float
         Step tolerance of the dynamics.
     progress : callable, optional
@@ -334,7 +333,7 @@ def screen(
 
     Notes
     -----
-    For long runs use :meth:`Screening.run`, which writes to a file and can be taken up again.
+    For long runs use :meth:`Screening.run`, which writes to a file and can be resumed.
     """
     chosen = listed(asteroids)
     wanted = settings(start, stop, planets, within, samples, seed, material, population, tolerance=tolerance)

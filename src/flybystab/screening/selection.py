@@ -13,7 +13,7 @@ from flybystab.errors import InvalidInput
 
 
 def listed(asteroids: str | Path | Sequence[Asteroid | str | int | Path] | None) -> tuple[Asteroid, ...]:
-    """Asteroids from what `screen` accepts; bodies of tables of orbits are completed from the embedded tables."""
+    """Asteroids from what `screen` accepts; tables of orbits are completed by the embedded physical data."""
     if asteroids is None:
         return catalogue()
     if isinstance(asteroids, str | Path):

@@ -1,4 +1,4 @@
-"""Settings of a screening: what it computes, apart from the list of asteroids."""
+"""Settings of a screening, apart from the list of asteroids."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from flybystab.orbit.planets import planet
 from flybystab.screening.priors import Population
 from flybystab.units import checked_time, to_si, whole
 
-#: Time that one asteroid may take before its row fails, s: ten thousand times the median.
+#: Time limit of one asteroid, s: ten thousand times the median; its row fails beyond it.
 TIME_LIMIT = 600.0
 
 
@@ -43,7 +43,7 @@ class Settings:
     tolerance : float
         Step tolerance of the dynamics.
     keep_samples : bool
-        Return the samples, too.
+        Also return the samples.
     time_limit : float
         Longest time to find the encounters of one asteroid and begin with its samples, s.
     """
@@ -61,7 +61,7 @@ class Settings:
     time_limit: float = TIME_LIMIT
 
     def stated(self) -> dict[str, Any]:
-        """Everything that fixes the rows, as plain data."""
+        """All settings that determine the rows, as plain data."""
         m = self.material
         return {
             "start_jd_tdb": self.start,

@@ -1,4 +1,4 @@
-"""Reading a result table: counts, the encounters closest to failure, and a figure."""
+"""Summary of a result table: counts, and the encounters closest to failure."""
 
 from __future__ import annotations
 
@@ -45,13 +45,13 @@ class Summary:
     samples, samples_dynamic : int
         Samples drawn, and those that needed the dynamics.
     closest : QTable
-        Encounters of bodies in equilibrium that come closest to failure, worst first.
+        Encounters of bodies in equilibrium with the least margin, worst first.
     strongest : QTable
-        Encounters of bodies in equilibrium that add most to the mobilised friction, of those computed.
+        Integrated encounters of bodies in equilibrium with the largest increase of mobilised friction.
     reshaped : QTable
         Encounters in which any sample, or the catalogue body, yields.
     contributors : dict of str to int
-        Inputs that the margin of a passage follows most, with the number of passages.
+        Inputs to which the margin is most sensitive, with the number of passages.
     errors : dict of str to int
         Reasons of failure.
     meta : dict
@@ -72,7 +72,7 @@ class Summary:
 
     @property
     def dynamic_share(self) -> float:
-        """Share of the samples that needed the dynamics; nan without samples."""
+        """Fraction of the samples that were integrated; nan without samples."""
         return self.samples_dynamic / self.samples if self.samples else float("nan")
 
     def text(self) -> str:
@@ -88,10 +88,10 @@ class Summary:
             lines.append(f"{self.samples} samples, {100 * self.dynamic_share:.2g} % of them by the dynamics")
         if self.contributors:
             most = ", ".join(f"{name} ({n})" for name, n in self.contributors.items())
-            lines.append(f"the margin follows most (passages): {most}")
+            lines.append(f"margin most sensitive to (passages): {most}")
         for title, table in (
             ("closest to failure", self.closest),
-            ("most loaded by the passage", self.strongest),
+            ("largest increase by the passage", self.strongest),
             ("may yield", self.reshaped[:TOP]),
         ):
             if len(table):

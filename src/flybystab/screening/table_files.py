@@ -1,8 +1,8 @@
 """Tables as files, ECSV or Parquet, written row by row: memory does not grow with the number of rows.
 
-A table grows in a temporary file (``NAME.part``), in Parquet by row groups. When it is complete it is forced to the
-disk and takes its own name, so that a file of that name is whole. The header of an ECSV file gives the number of rows,
-and :func:`flybystab.screening.results.read_results` refuses a file with fewer.
+A table grows in a temporary file (``NAME.part``), in Parquet by row groups. When complete it is synchronised to
+disk and renamed, so that a file of the final name is always complete. The header of an ECSV file gives the number of
+rows, and :func:`flybystab.screening.results.read_results` refuses a file with fewer.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ ROW_GROUP = 10_000
 LEAST_SPACE = 64 * 2**20
 #: Placeholder of the number of rows in the header of an ECSV file, which is written before the rows are known.
 _ROWS = 999_999_999_999
-#: Longest ending of a file beside the output.
+#: Longest suffix of a file beside the output.
 _LONGEST = ".journal"
 #: Text that starts with one of these is quoted: spreadsheets read it as a formula, ECSV readers as a comment (#).
 _QUOTED_START = ("=", "+", "-", "@", "#", " ", "\t")
@@ -41,7 +41,7 @@ def check_output(path: str | Path) -> Path:
     ------
     InvalidInput
         Wrong ending, no such directory, not an ordinary file, name too long, not writable, or less than
-        `LEAST_SPACE` free. Nothing that is there is touched.
+        `LEAST_SPACE` free. Existing files are left unchanged.
     MissingExtra
         A Parquet file without pyarrow.
     """
@@ -159,12 +159,12 @@ class _Parquet:
 
 
 class TableFile:
-    """A table that is being written; as a context manager it is finished at the end, and discarded on an exception.
+    """A table being written; as a context manager it is finished on exit, and discarded on an exception.
 
     Parameters
     ----------
     path : Path
-        Its name when it is complete, ``.ecsv`` or ``.parquet``.
+        Final name, ``.ecsv`` or ``.parquet``.
     columns : mapping of str to Column
     meta : mapping
         Provenance.
@@ -201,12 +201,12 @@ class TableFile:
             raise
 
     def write(self, row: Mapping[str, Any]) -> None:
-        """Append a row; what it has no value for is empty."""
+        """Append a row; missing values are empty."""
         self._file.write([cell(row.get(name), kind) for name, kind in self._kinds])
         self.count += 1
 
     def finish(self) -> None:
-        """Force the table to the disk and give it its name.
+        """Synchronise the table to disk and rename it to its final name.
 
         Raises
         ------
@@ -295,7 +295,7 @@ def write_rows(
     *,
     replace: bool = True,
 ) -> int:
-    """Write rows as they come into an ECSV or Parquet file; returns their number."""
+    """Write rows from an iterator to an ECSV or Parquet file; returns their number."""
     with TableFile(path, columns, meta, replace=replace) as file:
         for row in rows:
             file.write(row)
@@ -303,7 +303,7 @@ def write_rows(
 
 
 def write_whole(text: str, path: Path) -> None:
-    """Write a text file through a temporary one: it is complete, or not there."""
+    """Write a text file through a temporary one: it is either complete or absent."""
     replaced = _identity(path)
     part, stream = _new_file(path)
     try:

@@ -1,4 +1,4 @@
-"""Tables of encounters as files: ECSV with all columns as they are, or Parquet with one number a column."""
+"""Tables of encounters as files: ECSV with vector columns, or Parquet with scalar columns."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from flybystab.screening.table_files import check_output, write_rows, write_whol
 
 
 def write_table(table: QTable, path: str | Path) -> None:
-    """Write a table as its ending says, with units and provenance.
+    """Write a table in the format of its suffix, with units and provenance.
 
     In Parquet a time becomes text (ISO, TDB) and a vector three columns ``name_x``, ``name_y``, ``name_z``;
     :func:`flybystab.screening.results.read_results` reads both.

@@ -1,10 +1,10 @@
 """Units of work of a screening: an asteroid, and parts of the samples of a passage that takes long.
 
-A worker begins an asteroid: it finds the passages, judges the catalogue body and, in each passage, a few samples. The
-other samples are judged at once where the bound decides, and left in parts for all workers where the dynamics has to,
-or where each has an orbit of its own to be followed: one asteroid in one passage keeps every core busy. A sample
-depends on the seed, the asteroid and its own number (:mod:`flybystab.screening.draws`), so that the rows are the same
-however the samples are split.
+A worker starts an asteroid: it finds the passages and computes verdicts for the catalogue body and a few samples of
+each passage. The other samples are completed immediately where the bound decides. Those that need an integration of
+the body, or of their own orbit, are left in parts for all workers, so that a single passage keeps every core busy. A
+sample depends on the seed, the asteroid and its number only (:mod:`flybystab.screening.draws`): the rows do not
+depend on the division into parts.
 """
 
 from __future__ import annotations
@@ -15,26 +15,26 @@ from typing import Any
 
 from flybystab.catalogues.catalogue import Asteroid
 from flybystab.errors import FlybystabError
-from flybystab.screening.clones import Clones, Spread, spread
+from flybystab.screening.clones import Clones, OrbitSampling, orbit_sampling
 from flybystab.screening.draws import Attitudes, draws
 from flybystab.screening.encounters import Finder, Passage
 from flybystab.screening.result_rows import Row, body_row, failed_row, sample_rows, sampled_row
-from flybystab.screening.sample_verdicts import Judged, judge, judge_each
+from flybystab.screening.sample_verdicts import SampleVerdicts, sample_verdicts, verdicts_each
 from flybystab.screening.settings import Settings
 from flybystab.screening.time_limits import time_limit
 
 #: ``rows`` of encounters, and ``samples`` where they are kept.
 Rows = dict[str, list[Row]]
-#: Samples by which a worker sees how many need the dynamics.
+#: Samples from which a worker estimates how many need the dynamics.
 _PROBE = 8
-#: Least and largest number of samples that one part gives to the dynamics, and of parts between the two.
+#: Least and largest number of integrated samples in one part, and the number of parts aimed at.
 _BLOCK, _LARGEST, _PARTS = 16, 256, 64
-#: A sample that the bound decides costs about this share of one that the dynamics decides.
+#: Cost of a sample decided by the bound over that of an integrated one, approximately.
 _BOUND = 1 / 64
 
 
 def block_of(samples: int) -> int:
-    """Samples by the dynamics in one part of a passage."""
+    """Integrated samples in one part of a passage."""
     return max(_BLOCK, min(_LARGEST, samples // _PARTS))
 
 
@@ -46,7 +46,7 @@ class Part:
     ----------
     passage : Passage
     clones : Clones or None
-        Where each sample has an orbit of its own.
+        Set where each sample has its own orbit.
     first : int
         Number of the first of these samples.
     attitudes : Attitudes
@@ -58,61 +58,63 @@ class Part:
     first: int
     attitudes: Attitudes
 
-    def judged(self, settings: Settings) -> Judged:
+    def judged(self, settings: Settings) -> SampleVerdicts:
         """Verdicts on the samples."""
         given = self.attitudes.draws, self.attitudes, settings.material
         if self.clones is None:
-            return judge(self.passage, *given, tolerance=settings.tolerance)
+            return sample_verdicts(self.passage, *given, tolerance=settings.tolerance)
         n = len(self.attitudes.uniform)
         try:
             followed = self.clones.passages(self.first, self.first + n)
-        except FlybystabError:  # one of them: it is found, whatever part it is in, by itself
-            return Judged.joined([self._one(self.clones, k, settings) for k in range(n)])
-        return judge_each(followed, *given, tolerance=settings.tolerance)
+        except (
+            FlybystabError
+        ):  # one sample fails: it is isolated, so that the result does not depend on the division
+            return SampleVerdicts.joined([self._one(self.clones, k, settings) for k in range(n)])
+        return verdicts_each(followed, *given, tolerance=settings.tolerance)
 
-    def _one(self, clones: Clones, k: int, settings: Settings) -> Judged:
-        """Verdict on the k-th of the samples alone."""
+    def _one(self, clones: Clones, k: int, settings: Settings) -> SampleVerdicts:
+        """Verdict on the k-th sample alone."""
         try:
             followed = clones.passages(self.first + k, self.first + k + 1)
         except FlybystabError as error:
-            return Judged.failed(f"{type(error).__name__}: {error}", clones.within)
+            return SampleVerdicts.failed(f"{type(error).__name__}: {error}", clones.within)
         one = self.attitudes.part(k, k + 1)
-        return judge_each(followed, one.draws, one, settings.material, tolerance=settings.tolerance)
+        return verdicts_each(followed, one.draws, one, settings.material, tolerance=settings.tolerance)
 
 
 @dataclass
-class Begun:
-    """A passage whose samples are not all judged.
+class OpenPassage:
+    """A passage with samples that have no verdict yet.
 
     Attributes
     ----------
     passage : Passage
     row : dict
         Of the catalogue body.
-    orbits : Spread
+    orbits : OrbitSampling
     attitudes : Attitudes
         Of all samples, with their bodies.
     size : int
         Samples of a part.
-    judged : dict of int to Judged
-        Parts that are done, by their first sample.
+    judged : dict of int to SampleVerdicts
+        Finished parts, by their first sample.
     left : int
-        Samples that are not judged yet.
+        Samples without a verdict.
     """
 
     passage: Passage
     row: Row
-    orbits: Spread
+    orbits: OrbitSampling
     attitudes: Attitudes
     size: int = 0
-    judged: dict[int, Judged] = field(default_factory=dict)
+    judged: dict[int, SampleVerdicts] = field(default_factory=dict)
     left: int = field(init=False)
 
     def __post_init__(self) -> None:
         self.left = len(self.attitudes.uniform)
 
-    def take(self, first: int, judged: Judged) -> Judged:
-        """Keep the verdicts of a part."""
+    def take(self, first: int, judged: SampleVerdicts) -> SampleVerdicts:
+        """Store the verdicts of a part."""
         self.judged[first] = judged
         self.left -= len(judged.verdict)
         return judged
@@ -129,23 +131,23 @@ class Begun:
                 yield k, self.part(k, min(k + self.size, end))
 
     def take_stored(self, stored: Sequence[Mapping[str, Any]]) -> None:
-        """Keep what an earlier run has judged, as of :meth:`flybystab.screening.journal.Journal.parts`."""
+        """Store verdicts of an earlier run, from :meth:`flybystab.screening.journal.Journal.parts`."""
         for part in stored:
-            first, judged = int(part["first"]), Judged.restored(part)
+            first, judged = int(part["first"]), SampleVerdicts.restored(part)
             last = first + len(judged.verdict)
             if all(last <= k or first >= k + len(j.verdict) for k, j in self.judged.items()):
                 self.take(first, judged)
 
     def rows(self, settings: Settings) -> Rows:
-        """The rows, when all samples are judged."""
-        result = Judged.joined([self.judged[first] for first in sorted(self.judged)])
+        """The rows, once all samples have a verdict."""
+        result = SampleVerdicts.joined([self.judged[first] for first in sorted(self.judged)])
         row = sampled_row(self.row, self.orbits, self.attitudes.draws, result)
         kept = sample_rows(self.passage, self.attitudes, result) if settings.keep_samples else ()
         return {"rows": [row], "samples": list(kept)}
 
 
-def begun(passage: Passage, settings: Settings, block: int) -> Rows | Begun:
-    """The rows of a passage, or what is left of it.
+def opened(passage: Passage, settings: Settings, block: int) -> Rows | OpenPassage:
+    """The rows of a passage, or the passage with its open samples.
 
     Parameters
     ----------
@@ -160,11 +162,11 @@ def begun(passage: Passage, settings: Settings, block: int) -> Rows | Begun:
         return {"rows": [row], "samples": []}
     draw = draws(passage.asteroid, n, settings.seed, settings.population)
     attitudes = Attitudes.at(passage.asteroid, draw, settings.seed, *passage.key)
-    work = Begun(passage, row, spread(passage, n, settings.seed), attitudes)
+    work = OpenPassage(passage, row, orbit_sampling(passage, n, settings.seed), attitudes)
     probe = min(n, block, _PROBE)
     first = work.take(0, work.part(0, probe).judged(settings))
     if work.left:
-        # a clone costs more than the dynamics, whatever decides it: its orbit is followed
+        # integrating the orbit of a clone costs more than the dynamics of the body
         least = _BOUND if work.orbits.clones is None else 1.0
         work.size = max(1, int(block / max(first.dynamic.mean(), least)))
         if work.left > work.size:
@@ -173,20 +175,20 @@ def begun(passage: Passage, settings: Settings, block: int) -> Rows | Begun:
     return work.rows(settings)
 
 
-def begin(asteroid: Asteroid, settings: Settings, finder: Finder, block: int) -> list[Rows | Begun]:
-    """An asteroid's passages, each as its rows or as what is left of it.
+def begin(asteroid: Asteroid, settings: Settings, finder: Finder, block: int) -> list[Rows | OpenPassage]:
+    """An asteroid's passages, each as its rows or with its open samples.
 
     An asteroid that fails, for whatever reason, or that exceeds the time limit of the settings, gets one row with the
     reason: it does not end the run, and a continued run does not compute it again.
     """
     try:
         with time_limit(settings.time_limit, asteroid.name):
-            return [begun(passage, settings, block) for passage in finder(asteroid, settings)]
+            return [opened(passage, settings, block) for passage in finder(asteroid, settings)]
     except Exception as error:
         return [{"rows": [failed_row(asteroid, settings, error)], "samples": []}]
 
 
-def joined(work: Sequence[Rows | Begun], settings: Settings) -> Rows:
-    """The rows of an asteroid whose passages are all done."""
-    rows = [w.rows(settings) if isinstance(w, Begun) else w for w in work]
+def joined(work: Sequence[Rows | OpenPassage], settings: Settings) -> Rows:
+    """The rows of an asteroid whose passages are all finished."""
+    rows = [w.rows(settings) if isinstance(w, OpenPassage) else w for w in work]
     return {kind: [r for w in rows for r in w[kind]] for kind in ("rows", "samples")}

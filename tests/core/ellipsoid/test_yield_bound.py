@@ -21,7 +21,7 @@ from flybystab.core.ellipsoid.yield_bound import (
 from flybystab.encounter.encounter import Encounter
 from flybystab.screening.draws import Attitudes, draws
 from flybystab.screening.encounters import passages
-from flybystab.screening.sample_verdicts import judge as judged
+from flybystab.screening.sample_verdicts import sample_verdicts as judged
 from flybystab.screening.settings import settings
 
 honesty = runpy.run_path(str(Path(__file__).resolve().parents[3] / "benchmarks" / "honesty.py"))
