@@ -1,8 +1,8 @@
-"""What the spin of Anteros says of its density and friction.
+"""Constraints on the density and friction of Anteros from its spin.
 
-Anteros is nearly a sphere and turns in 2.8695 h. A sphere without cohesion needs
-omega^2 <= (8/3) sin phi/(1 + sin phi) pi G rho; the shape of the catalogue shifts that a little. Its density was never
-measured: the bound is what there is.
+Anteros is nearly a sphere and rotates in 2.8695 h. A cohesionless sphere requires
+omega^2 <= (8/3) sin phi/(1 + sin phi) pi G rho; the catalogue shape changes this slightly. Its density has not been
+measured, so that this lower bound is the only constraint.
 """
 
 import astropy.units as u

@@ -1,10 +1,10 @@
-"""How 13 April 2029 changes the slopes of the surface of Apophis.
+"""Change of the surface slopes of Apophis by the encounter of 13 April 2029.
 
 Published for shape models with relief: slopes change by up to 4 deg at 1.29 g/cm3 and 2 deg at a higher density
 (2.2 here), and about 1 % of the area is resurfaced. The body here is a smooth ellipsoid that tumbles as observed, at
-64 phases. No slope of it is as steep as loose material can lie, so that none of it slides; on a surface with relief,
-whose slopes are spread with a density of some 1 or 2 % of the area a degree near the angle of repose, the share that
-passes it is that density times the mean rise of the slopes. A sphere without spin has (3/2) GM/d^3 / (4/3 pi G rho).
+64 phases. Its slopes stay below the angle of repose. On a surface with relief, 1 to 2 % of the area per degree of slope
+lies near the angle of repose; the fraction that exceeds it is that density times the mean increase of the slopes.
+The slope of a sphere without spin changes by (3/2) GM/d^3 / (4/3 pi G rho).
 """
 
 import astropy.units as u

@@ -1,4 +1,4 @@
-"""How 13 April 2029 may change the spin of Apophis: 256 phases of its tumbling.
+"""Change of the spin of Apophis by the encounter of 13 April 2029, for 256 tumbling phases.
 
 Benson et al. (2023) predict that the effective spin rate may halve or double and the pole move by 10 deg or more.
 """

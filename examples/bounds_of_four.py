@@ -1,6 +1,6 @@
-"""What shape and spin say of four asteroids: friction, density and cohesion, with the errors carried through.
+"""Friction, density and cohesion of four asteroids from shape and spin, with error propagation.
 
-Anteros, whose density nobody measured; 1950 DA, which no friction can hold; Didymos and 1999 KW4 (Moshup), two fast
+Anteros, whose density is not measured; 1950 DA, for which no friction suffices; Didymos and 1999 KW4 (Moshup), two fast
 primaries of binaries. Values and errors are the catalogue's; those of the three axes are taken as independent. Each
 line gives the median and the ends of the 1-sigma interval.
 

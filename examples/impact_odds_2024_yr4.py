@@ -1,8 +1,8 @@
-"""How likely does 2024 YR4 hit the Moon on 22 December 2032, and what does it take to know?
+"""Probability that 2024 YR4 hits the Moon on 22 December 2032, by two methods.
 
-The orbit and its covariance are ESA NEOCC's (2024YR4.ke1 beside this script). Two routes to the odds: clones of the
-orbit, and the covariance mapped linearly to the target plane of the Moon. NASA gave 4.3 % (CNEOS, June 2025).
-Writes out/2024_yr4.png.
+The orbit and its covariance are ESA NEOCC's (2024YR4.ke1 beside this script). The probability is computed from clones
+of the orbit, and from the covariance mapped linearly to the target plane of the Moon. NASA gave 4.3 % (CNEOS, June
+2025). Writes out/2024_yr4.png.
 """
 
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Does the answer depend on the yield surface? A 2.8 x 1.7 x 1.5 km pile passes the Earth at several distances."""
+"""Dependence of the verdict on the yield surface: a 2.8 x 1.7 x 1.5 km pile passes the Earth at several distances."""
 
 import astropy.units as u
 

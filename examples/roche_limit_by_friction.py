@@ -1,7 +1,7 @@
-"""How near a sphere of grains may come, slowly: failure distance against friction angle.
+"""Failure distance of a granular sphere in a slowly growing tide, against friction angle.
 
 The closed form d/Rp (rho/rho_p)^(1/3) = [(3 - sin phi)/(2 sin phi)]^(1/3) (Holsapple & Michel 2006) and the
-dynamics, which is brought there by a slow ramp of the tide and reports its onset.
+onset of yield found by the dynamics in a slowly increasing tide.
 """
 
 import numpy as np

@@ -1,4 +1,4 @@
-"""Every passage of the embedded catalogue within 0.02 au of the Earth before 2050, judged on the catalogue's values."""
+"""Encounters of the embedded catalogue within 0.02 au of the Earth before 2050, with nominal verdicts."""
 
 import astropy.units as u
 import numpy as np

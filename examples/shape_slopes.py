@@ -1,4 +1,4 @@
-"""Slopes of an irregular shape through a flyby at the distance of Apophis, and a map of them.
+"""Slopes of an irregular shape during a flyby at the distance of Apophis, with a map.
 
 The shape is made in code (an ellipsoid with Gaussian relief). For a shape from a file:
 ``shape = fs.Shape.read("apophis.obj", unit=u.km)``.

@@ -1,9 +1,9 @@
-"""How dense may a strengthless comet be that Jupiter draws out as it did Shoemaker-Levy 9?
+"""Upper bound on the density of a strengthless comet elongated by Jupiter like Shoemaker-Levy 9.
 
-The comet passed at 1.31 Jupiter radii in July 1992 on an orbit that was nearly a parabola. A sphere of grains that
-does not spin is sent along it. The density below which it is drawn out past 6:1 bounds that of the comet from above.
-Published simulations of the break-up speak of a few hundred kg/m3 (Asphaug & Benz 1996 and later work; quoted from
-memory, not from the papers). The size cancels: without cohesion only the density counts.
+The comet passed at 1.31 Jupiter radii in July 1992 on a nearly parabolic orbit. A granular sphere without spin follows
+this orbit. The density below which it is elongated beyond 6:1 is an upper bound on that of the comet. Published
+simulations of the break-up give a few hundred kg/m3 (Asphaug & Benz 1996 and later work; not checked against the
+papers). Without cohesion the result does not depend on size.
 """
 
 import astropy.units as u

@@ -1,8 +1,8 @@
-"""From an uncertain target-plane point to a probability of survival.
+"""Probability of survival for an uncertain point on the target plane.
 
-A rubble pile comes at 6 km/s; its orbit is known only to within an ellipse on the target plane, long in one direction
-as after a few months of observations. The share of the points at which it survives is the answer, with the error
-of the sample. Writes out/target_plane.png.
+A rubble pile approaches at 6 km/s. Its uncertainty is an elongated ellipse on the target plane, as after a few months
+of observations. The fraction of sampled points at which it survives is given with its sampling error.
+Writes out/target_plane.png.
 """
 
 from pathlib import Path

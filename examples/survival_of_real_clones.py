@@ -1,11 +1,11 @@
-"""From the published uncertainty of an orbit to the odds of survival: clones of Apophis, Bennu and Didymos.
+"""Probability of survival from published orbit covariances: clones of Apophis, Bennu and Didymos.
 
-Clones are drawn from the covariance that JPL or ESA published and followed with all forces to the encounter.
+Clones are drawn from the covariance that JPL or ESA published and integrated with all forces to the encounter.
 For Bennu and Didymos the tide at their closest encounters before 2050 is negligible compared with their own
 gravity. For Apophis it is not: each clone meets the Earth at its own attitude, since the rotation phase
 cannot be predicted so far ahead. The spread of the result is shown for sampled orbits alone, and for sampled
-orbits and attitudes. A body stays INTACT as long as it mobilises less friction than it has, so that one run
-gives the odds at every friction angle. Writes out/real_clones.png.
+orbits and attitudes. A body stays INTACT while the mobilised friction angle is below that of its material, so that
+one run gives the probability at every friction angle. Writes out/real_clones.png.
 """
 
 from pathlib import Path

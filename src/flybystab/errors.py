@@ -1,7 +1,7 @@
-"""Named errors. Each one says what was wrong, shows the offending value and what would be right.
+"""Named errors. Each message gives the offending value and what is expected.
 
 Every error derives from :class:`FlybystabError`; those caused by an argument are also ``ValueError``
-(or ``KeyError`` and so on), so that code that knows nothing of this package still catches them.
+(or ``KeyError`` and so on), so that general handlers catch them too.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ class FlybystabError(Exception):
 
 
 class FlybystabWarning(UserWarning):
-    """Something was wrong, and the result is right nevertheless: a damaged journal whose loss is computed again."""
+    """A problem that does not affect the result, such as a damaged journal whose losses are recomputed."""
 
 
 class InvalidInput(FlybystabError, ValueError):
@@ -27,7 +27,7 @@ class InvalidInput(FlybystabError, ValueError):
     value : object
         What was given.
     expected : str
-        What would be right.
+        What is expected.
     """
 
     def __init__(self, name: str, value: Any, expected: str) -> None:

@@ -7,7 +7,7 @@ entry.
 
 from __future__ import annotations
 
-#: By name: the module below this package, and what it shows.
+#: Benchmarks by name (module of this package) with a description.
 BENCHES = {
     "flyby": "integrators of one flyby",
     "many": "rate of many encounters by threads",

@@ -1,10 +1,10 @@
 """Error against time of the flyby integrators, on one case with flow (reference flyby P1) and one without.
 
-The truth is the default integrator at a tolerance of 1e-12; errors are the largest relative ones of the
-semi-axes at the end. SciPy's Radau and DOP853 solve the same compiled right-hand side from the same onset to the
-same arrest: what they are spared is the location of events. How many steps Radau refuses depends on the last digits
-of its start: each is started at several of the first states of the flow, and medians are given. The rigid row is a
-pass at 3 radii; its error is that of the spin.
+The reference solution is the default integrator at a tolerance of 1e-12; errors are the largest relative errors of
+the final semi-axes. SciPy's Radau and DOP853 integrate the same compiled right-hand side from onset to arrest, without
+locating these events. The number of steps that Radau rejects depends on the last digits of the initial state:
+each method starts from several of the first states of the flow, and medians are given. The rigid row is a
+passage at 3 radii; its error is that of the spin.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from flybystab.units import R_earth
 
 PHI = np.deg2rad(35.0)
 
-#: Starts of each SciPy run.
+#: Number of initial states of each SciPy run.
 STARTS = 9
 
 
@@ -48,7 +48,7 @@ def case() -> tuple[Body, Encounter]:
 
 
 def _best(run: Any, repeat: int) -> float:
-    """Least processor time of several runs, s: the least disturbed one. All of them use one core."""
+    """Least processor time of several runs on one core, s."""
     times = []
     for _ in range(repeat):
         start = time.process_time()

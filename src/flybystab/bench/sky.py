@@ -1,8 +1,8 @@
-"""The sky: errors of close approaches against JPL's, and object-years per second against ASSIST in one run.
+"""Close approaches: errors against JPL's list, and object-years per second beside ASSIST in one run.
 
 Accuracy: every approach of January to June 2020 from the orbits of the same solutions, by ephemeris. Each event off
-by more than a kilometre is listed with the growth of errors from its epoch and, where ASSIST is installed, with what
-ASSIST makes of the same elements.
+by more than a kilometre is listed with the growth of errors from its epoch and, where ASSIST is installed, with the
+result of ASSIST from the same elements.
 
 Speed: a search for minima of the distance from the Earth below 0.5 au, one thread, processor time. Errors are against
 ASSIST at its tightest; without ASSIST against this search with every force at the least tolerance.
@@ -30,7 +30,7 @@ from flybystab.plots.style import save
 from flybystab.typing import Array
 
 WITHIN = 0.5
-#: Errors asked of the search, km (its default is 0.1), and tolerances of ASSIST.
+#: Target errors of the search, km (default 0.1), and tolerances of ASSIST.
 ERRORS = (0.01, 0.1, 1.0, 10.0)
 EPSILONS = (1e-6, 1e-4, 1e-3)
 TIGHT = 1e-9
@@ -99,7 +99,7 @@ def _accuracy(known: dict[str, tuple[Orbit, str]], name: str) -> list[dict[str, 
 
 
 def _by_assist(orbit: Orbit, event: dict[str, str]) -> float | None:
-    """Distance by ASSIST less that of the list, km; None without ASSIST."""
+    """Distance by ASSIST minus that of the list, km; None without ASSIST."""
     if oracle.missing():
         return None
     there = oracle.Oracle(Time(float(event["jd"]), format="jd", scale="tdb"))
@@ -155,7 +155,7 @@ def _speed(chosen: list[Orbit], years: float) -> list[dict[str, Any]]:
         row("ASSIST", f"epsilon {TIGHT:.0e}", truth, used, truth)
         for epsilon in EPSILONS:
             row("ASSIST", f"epsilon {epsilon:.0e}", *assist(epsilon), truth)
-            row("ASSIST", f"epsilon {epsilon:.0e}, not looking", *assist(epsilon, False), None)
+            row("ASSIST", f"epsilon {epsilon:.0e}, integration only", *assist(epsilon, False), None)
     for error in ERRORS:
         row("flybystab", f"error {error:g} km", *ours(error=error * u.km), truth)
     return out
@@ -193,7 +193,7 @@ def lines(rows: list[dict[str, Any]]) -> list[str]:
     ]
     out += [
         "",
-        "events off by more than 1 km; ASSIST: what it makes of the same elements with DE440",
+        "events off by more than 1 km; ASSIST: the same elements with DE440",
         f"{'ephemeris':10s} {'asteroid':10s} {'time (TDB)':17s} {'(au)':>7s} {'off (km)':>9s} {'(s)':>9s} "
         f"{'ASSIST (km)':>11s} {'growth':>7s} {'days from epoch':>15s}",
     ]

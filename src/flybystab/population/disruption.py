@@ -1,8 +1,8 @@
 """Rates of the verdicts of encounters in a population, by planet.
 
 The rate of a verdict is the encounter rate times the probability of the verdict, integrated over periapsis, hyperbolic
-excess speed, attitude and the uncertain properties of the bodies. The periapsis is stratified: each stratum gets the
-same number of sampled encounters, so that the rare deep ones, where the verdict is decided, are not the fewest.
+excess speed, attitude and the uncertain properties of the bodies. The periapsis is stratified: each stratum has the
+same number of sampled encounters, so that the rare deep encounters, which decide the verdict, are well sampled.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ from flybystab.units import to_si, whole
 PLANETS = ("mercury", "venus", "earth", "mars")
 #: Strata in periapsis between the surface and the limit.
 STRATA = 8
-#: Geometric albedo behind the absolute magnitude that selects spin periods of bodies of like size.
+#: Geometric albedo that converts the diameter to the absolute magnitude by which LCDB spin periods are selected.
 ALBEDO = 0.14
 
 
@@ -58,12 +58,12 @@ class DisruptionRates:
     Attributes
     ----------
     table : QTable
-        One row a planet and verdict: ``planet``, ``verdict``, ``rate`` and its sampling error ``rate_error`` (1/yr, of
-        the whole population). A verdict that no sample met has the rate 0 and as error the largest rate that one
-        sample stands for.
+        One row per planet and verdict: ``planet``, ``verdict``, ``rate`` and its sampling error ``rate_error`` (1/yr,
+        of the whole population). A verdict without samples has the rate 0, and its error is the largest weight
+        of a sample.
     samples : QTable
         Every sampled encounter: ``planet``, ``orbit``, ``periapsis``, ``v_inf``, ``verdict``, ``spin_ratio`` and
-        ``weight`` (1/yr: the rate that it stands for).
+        ``weight`` (1/yr: its contribution to the rate).
     bodies : int
         Orbits of the population.
     diameter : Quantity
@@ -82,12 +82,12 @@ class DisruptionRates:
         return self.table["rate"][mask].sum()
 
     def lifetime(self, *verdicts: str) -> Quantity:
-        """Mean time, Myr, until one of the verdicts befalls one body of the population."""
+        """Mean time, Myr, until a body of the population meets one of the verdicts."""
         total = sum((self.rate(v) for v in verdicts), 0.0 / u.yr)
         return (self.bodies / total).to(u.Myr) if total.value > 0.0 else np.inf * u.Myr
 
     def spin_change_rate(self, least: float) -> Quantity:
-        """Rate, 1/yr, of bodies that stay INTACT and change their spin rate by more than the share `least`."""
+        """Rate, 1/yr, of bodies that stay INTACT and whose spin rate changes by more than the fraction `least`."""
         share = to_si(least, u.dimensionless_unscaled, "least", low=0.0)
         mask = (self.samples["verdict"] == str(Verdict.INTACT)) & (
             np.abs(self.samples["spin_ratio"] - 1.0) > share
@@ -123,7 +123,7 @@ def disruption_rates(
         Encounters up to this many planetary radii from the centre are sampled. At two radii a tenth of the drawn bodies
         yield, between four and five about 1 % (those drawn close to their limit); farther ones are not counted.
     samples : int
-        Sampled encounters a planet.
+        Sampled encounters per planet.
     seed : int
     material : Material, optional
         Yield surface and dilatancy; friction angle and cohesion are drawn.
@@ -135,7 +135,7 @@ def disruption_rates(
     Returns
     -------
     DisruptionRates
-        Draws that cannot exist on their own are drawn again: rates are those of the bodies that can.
+        Bodies that are not in equilibrium in isolation are drawn again: the rates are those of bodies that are.
     """
     size = to_si(diameter, u.m, "diameter", low=0.0, open_low=True)
     limit = to_si(radii, u.dimensionless_unscaled, "radii", low=1.0, high=100.0, open_low=True)
@@ -186,7 +186,7 @@ def disruption_rates(
 def _bodies(
     model: Asteroid, number: int, seed: int, priors: Population | None, material: Material
 ) -> list[Body]:
-    """Drawn bodies that can exist on their own."""
+    """Drawn bodies that are in equilibrium in isolation."""
     found: list[Body] = []
     for attempt in range(20):
         drawn = draws(model, number, seed + 104729 * attempt, priors)
@@ -195,7 +195,7 @@ def _bodies(
         if len(found) >= number:
             return found[:number]
     raise InvalidInput(
-        "priors", priors, "distributions of which a twentieth or more can exist: hardly any draw does"
+        "priors", priors, "distributions of which at least 5 % are in equilibrium in isolation"
     )
 
 

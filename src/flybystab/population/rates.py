@@ -37,7 +37,7 @@ class EncounterRates:
     ----------
     planet : Planet
     periapsis : Quantity
-        Encounters are those with a smaller periapsis distance, gravitational focusing counted.
+        Encounters have a smaller periapsis distance, including gravitational focusing.
     rate : Quantity, shape (n,)
         1/yr; zero for an orbit that does not reach the planet's.
     v_inf : Quantity, shape (n,)
@@ -82,7 +82,7 @@ class EncounterRates:
         if low > 0.0:
             rate = rate - rates_within(self._elements, self._orbit, gm, low)[0] * YEAR
         if not rate.sum() > 0.0:
-            raise InvalidInput("count", count, "orbits that meet the planet: none does")
+            raise InvalidInput("count", count, "orbits that reach the planet: none does")
         chosen = rng.choice(len(rate), size=whole(count, "count", 1), p=rate / rate.sum())
         speed = np.empty(len(chosen))
         speeds, weights = np.empty(4 * NODES_R * NODES_S), np.empty(4 * NODES_R * NODES_S)
@@ -105,7 +105,7 @@ class EncounterRates:
     def __repr__(self) -> str:
         return (
             f"<EncounterRates {len(self.rate)} orbits, {self.planet.name} within {self.periapsis:.6g}: "
-            f"{self.total.value:.4g} a year>"
+            f"{self.total.value:.4g} per year>"
         )
 
 
@@ -129,7 +129,7 @@ def encounter_rates(
     planet_orbit : (Quantity, float, Quantity), optional
         Semi-major axis, eccentricity and inclination; its mean orbit by default.
     workers : int, optional
-        Threads; one a core by default.
+        Threads; one per core by default.
 
     Returns
     -------
@@ -143,7 +143,7 @@ def encounter_rates(
     -----
     Angles are taken to circulate uniformly (:mod:`flybystab.population.wetherill`): resonances, correlated returns and
     the evolution of ``a``, ``e`` and ``i`` are left out. For a single asteroid the rate over the next centuries can
-    differ by any factor; for a population the mean rate is that of the counted passages (tests/population).
+    differ arbitrarily; for a population the mean rate is that of the counted passages (tests/population).
     """
     body = planet(planet_name)
     distance = body.radius * u.m if periapsis is None else periapsis

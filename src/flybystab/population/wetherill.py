@@ -65,7 +65,7 @@ def rate_at_speeds(
     gm_sun : float
         m3/s2.
     speeds, weights : ndarray (4 NODES_R NODES_S,)
-        Written: ``U`` (m/s) and the share of the rate over ``sigma`` (1/(m2 s)): the rate is
+        Written: ``U`` (m/s) and the contribution to the rate per ``sigma`` (1/(m2 s)): the rate is
         ``sum weights sigma(speeds)``.
     """
     low, high = a * (1.0 - e), a * (1.0 + e)
