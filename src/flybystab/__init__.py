@@ -40,6 +40,7 @@ _HOME = {
     "flyby_margin": "flybys.margin",
     "infer": "screening.inference",
     "periapsis_axes": "encounter.attitude",
+    "read_population": "population.model_population",
     "recovery": "body.recovery",
     "screen": "screening.screening",
     "spin_sample": "flybys.spin_sample",
@@ -74,6 +75,7 @@ if TYPE_CHECKING:
     from flybystab.orbit.orbit import Orbit
     from flybystab.orbit.search.encounter_finder import find_encounters
     from flybystab.population.disruption import disruption_rates
+    from flybystab.population.model_population import read_population
     from flybystab.population.rates import encounter_rates
     from flybystab.screening.inference import infer
     from flybystab.screening.screening import screen

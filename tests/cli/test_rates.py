@@ -57,3 +57,46 @@ def test_no_encounter_is_null(capsys, tmp_path):
 def test_a_missing_file_is_named(capsys):
     assert main(["rates", "nowhere.csv"]) == 1
     assert "nowhere.csv" in capsys.readouterr().err
+
+
+def test_samples_and_figure_are_written(capsys, tmp_path):
+    from astropy.table import QTable
+
+    path, table, figure = tmp_path / "model.csv", tmp_path / "samples.ecsv", tmp_path / "rates.png"
+    path.write_text("18,1.3,0.4,10\n19,2.0,0.6,5\n")
+    words = (
+        str(path),
+        "--columns",
+        "H,a,e,i",
+        "--planet",
+        "earth",
+        "--verdicts",
+        "--samples",
+        "16",
+        "--diameter",
+        "H",
+    )
+    out = document(capsys, *words, "--output", str(table))
+    assert len(QTable.read(table)) == 16
+    assert {r["planet"] for r in out["rows"]} == {"earth"}
+    assert not (tmp_path / "samples.ecsv.journal").exists()
+    document(capsys, *words, "--output", str(figure))
+    assert figure.read_bytes()[:4] == b"\x89PNG"
+
+
+def test_a_law_is_read_and_options_that_need_verdicts_say_so(capsys, tmp_path):
+    law = tmp_path / "law.toml"
+    law.write_text(
+        "count = 10\n"
+        'a = {kind = "fixed", value = 1.3}\n'
+        'e = {kind = "fixed", value = 0.4}\n'
+        'i = {kind = "fixed", value = 10}'
+    )
+    (row,) = document(capsys, str(law), "--planet", "earth")["rows"]
+    assert row["rate_per_yr"] == pytest.approx(
+        10 * fs.encounter_rates(_table()[:1], "earth").total.value, rel=1e-12
+    )
+    assert main(["rates", str(law), "--output", "x.png"]) == 1
+    assert "--verdicts" in capsys.readouterr().err
+    assert main(["rates", str(law), "--verdicts", "--diameter", "big"]) == 1
+    assert "number of km" in capsys.readouterr().err

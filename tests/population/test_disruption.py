@@ -87,3 +87,96 @@ def test_bad_input_is_named():
         fs.disruption_rates(ORBITS, ["earth"], samples=3)
     with pytest.raises(InvalidInput, match="at least one planet"):
         fs.disruption_rates(ORBITS, [])
+
+
+def test_a_run_is_resumed_from_its_journal_and_gives_the_same(tmp_path, earth):
+    from flybystab.population import sampled_encounters
+
+    path = tmp_path / "rates.journal"
+    calls = []
+
+    def stop(done, total):
+        calls.append(done)
+        if done == 3:
+            raise KeyboardInterrupt
+
+    options = {"samples": 160, "seed": 4, "journal": path}
+    with pytest.raises(KeyboardInterrupt):
+        fs.disruption_rates(ORBITS, ["earth"], progress=stop, **options)
+    assert path.exists()
+    with pytest.raises(InvalidInput, match="journal of this run"):
+        fs.disruption_rates(ORBITS, ["earth"], samples=160, seed=5, journal=path)
+    counts = []
+    again = fs.disruption_rates(
+        ORBITS, ["earth"], progress=lambda done, total: counts.append(done), **options
+    )
+    assert counts == [4, 5, 6, 7, 8]
+    assert not path.exists()
+    assert again.samples.colnames == earth.samples.colnames
+    for name in earth.samples.colnames:
+        assert np.array_equal(np.asarray(again.samples[name]), np.asarray(earth.samples[name]))
+    assert sampled_encounters.ENDS  # the module that processes import
+
+
+def test_processes_give_the_same(earth):
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    with ProcessPoolExecutor(2, get_context("spawn")) as pool:
+        other = fs.disruption_rates(ORBITS, ["earth"], samples=160, seed=4, executor=pool)
+    assert np.array_equal(other.samples["verdict"], earth.samples["verdict"])
+    assert np.array_equal(other.table["rate"].value, earth.table["rate"].value)
+
+
+def test_sizes_follow_from_absolute_magnitudes():
+    table = ORBITS.copy()
+    table["H"] = np.linspace(15.0, 22.0, len(table))
+    fixed = Population.from_mapping({"albedo": {"kind": "fixed", "value": 0.14}})
+    rates = fs.disruption_rates(table, ["earth"], diameter=None, samples=80, seed=1, priors=fixed)
+    expected = 1329.0 / np.sqrt(0.14) * 10 ** (-0.2 * np.asarray(table["H"])[rates.samples["orbit"]])
+    assert rates.samples["diameter"].to_value(u.km) == pytest.approx(expected, rel=1e-12)
+    largest = rates.samples["diameter"].max()
+    everything = rates.cumulative(0 * u.km, *set(rates.samples["verdict"]))[0]
+    assert everything.value == pytest.approx(rates.samples["weight"].value.sum(), rel=1e-12)
+    assert rates.cumulative(1.01 * largest, "INTACT")[0].value == 0.0
+    with pytest.raises(InvalidInput, match="absolute magnitudes"):
+        fs.disruption_rates(ORBITS, ["earth"], diameter=None)
+    table["H"][3] = np.nan
+    with pytest.raises(InvalidInput, match="row 3 has none"):
+        fs.disruption_rates(table, ["earth"], diameter=None, samples=800)
+
+
+def test_what_follows_from_the_samples(earth):
+    lifetime = earth.lifetime("RESHAPED", "MASS LOSS", "DISRUPTED", "BEYOND MODEL")
+    assert earth.changed_fraction(lifetime) == pytest.approx(1 - np.exp(-1), rel=1e-12)
+    top = earth.contributors(most=3)
+    changed = np.isin(earth.samples["verdict"], ["RESHAPED", "MASS LOSS", "DISRUPTED", "BEYOND MODEL"])
+    one = changed & (earth.samples["orbit"] == top["orbit"][0])
+    assert top["rate"][0].value == pytest.approx(earth.samples["weight"][one].value.sum(), rel=1e-12)
+    assert np.all(np.diff(top["rate"].value) <= 0.0)
+    after = earth.survivors()
+    assert after["elongation"][1] > after["elongation_before"][1]  # tides draw bodies out
+    share = earth.outcome_map([1.0, 5.1], [0.0, 100.0] * u.km / u.s, planet_name="earth")
+    counted = earth.samples["weight"].value > 0.0
+    assert share[0, 0] == pytest.approx(changed[counted].mean(), rel=1e-12)
+
+
+def test_grains_take_over_where_the_ellipsoid_ends():
+    weak = Population.from_mapping(
+        {
+            "friction_angle_deg": {"kind": "fixed", "value": 30},
+            "cohesion_Pa": 0,
+            "density_kg_m3": {"kind": "fixed", "value": 1000},
+            "spin_period_h": {"kind": "fixed", "value": 6},
+        }
+    )
+    slow = QTable({"a": [1.05] * u.au, "e": [0.1], "i": [3.0] * u.deg})
+    plain = fs.disruption_rates(slow, ["earth"], radii=1.6, samples=8, seed=2, priors=weak)
+    ends = np.isin(plain.samples["verdict"], ["BEYOND MODEL", "MASS LOSS", "DISRUPTED"])
+    assert ends.any()
+    carried = fs.disruption_rates(slow, ["earth"], radii=1.6, samples=8, seed=2, priors=weak, grains=100)
+    assert np.array_equal(carried.samples["model"] == "grains", ends)
+    assert np.all(carried.samples["verdict"] != "BEYOND MODEL")
+    assert np.all(carried.samples["fragments"][ends] >= 1)
+    assert np.array_equal(carried.samples["verdict"][~ends], plain.samples["verdict"][~ends])
+    assert carried.table["rate"].sum().value == pytest.approx(plain.table["rate"].sum().value, rel=1e-12)

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
+import sys
 from typing import Any
 
 from flybystab._version import __version__
-from flybystab.cli.common import show
+from flybystab.cli.common import show, surface_argument
+from flybystab.errors import InvalidInput
 
-HELP = "how often the asteroids of a population pass the planets, and with which verdicts"
+HELP = "encounter rates of a population, and the rates of the verdicts"
 EXAMPLE = "flybystab rates --planet earth --within 0.05"
 #: Planets by default.
 PLANETS = ("mercury", "venus", "earth", "mars")
@@ -19,7 +21,13 @@ def arguments(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
         "file",
         nargs="?",
-        help="catalogue, or table (.ecsv, .csv) with columns a, e, i of a model population; embedded catalogue",
+        help="catalogue, table with columns a, e, i (and H, weight) of a model population, or law (.toml); "
+        "default: the embedded catalogue",
+    )
+    sub.add_argument(
+        "--columns",
+        metavar="NAMES",
+        help="columns of a table without header, such as H,a,e,i (others are skipped)",
     )
     sub.add_argument("--planet", action="append", help=f"planet, repeatable ({', '.join(PLANETS)})")
     sub.add_argument("--within", type=float, metavar="AU", help="largest periapsis distance (au; surface)")
@@ -27,41 +35,42 @@ def arguments(sub: argparse.ArgumentParser) -> None:
         "--verdicts", action="store_true", help="rates of the verdicts within 5 radii of each planet"
     )
     sub.add_argument(
-        "--diameter", type=float, default=1.0, metavar="KM", help="of every body, for --verdicts (1 km)"
+        "--diameter",
+        metavar="KM",
+        default="1",
+        help="of every body, for --verdicts (1 km); H: from H and the albedo",
     )
-    sub.add_argument("--samples", type=int, default=800, metavar="N", help="encounters drawn a planet (800)")
+    sub.add_argument(
+        "--samples", type=int, default=800, metavar="N", help="encounters sampled per planet (800)"
+    )
     sub.add_argument("--seed", type=int, default=0, help="random seed (0)")
+    sub.add_argument(
+        "--grains", type=int, metavar="N", help="with --verdicts: piles of N grains where the ellipsoid ends"
+    )
+    surface_argument(sub)
+    sub.add_argument("--population", metavar="FILE", help="priors of the bodies, TOML, as for screen")
+    sub.add_argument(
+        "--output", metavar="FILE",
+        help="with --verdicts: figure (.png, .pdf, .svg) or table of the samples (.ecsv, .parquet); resumable",
+    )  # fmt: skip
 
 
 def run(options: argparse.Namespace) -> None:
     """Execute the command."""
     import astropy.units as u
 
-    from flybystab.population.disruption import disruption_rates
-    from flybystab.population.rates import encounter_rates
+    from flybystab.population.rates import elements_table, encounter_rates
 
-    orbits = _orbits(options.file)
+    orbits = elements_table(_orbits(options))
     planets = options.planet or list(PLANETS)
     source = options.file or "embedded catalogue"
     if options.verdicts:
-        result = disruption_rates(
-            orbits, planets, diameter=options.diameter * u.km, samples=options.samples, seed=options.seed
-        )
-        rows = [
-            {
-                "planet": str(row["planet"]),
-                "verdict": str(row["verdict"]),
-                "rate_per_yr": float(row["rate"].to_value(1 / u.yr)),
-                "rate_error_per_yr": float(row["rate_error"].to_value(1 / u.yr)),
-            }
-            for row in result.table
-        ]
-        lines = [
-            f"{row['planet']:8s} {row['verdict']:18s} {_interval(float(row['rate'].to_value(1 / u.yr)))}"
-            for row in result.table
-        ]
-        count = result.bodies
-        what = f"verdicts of bodies of {options.diameter:g} km within 5 radii"
+        rows, lines, count = _verdicts(options, orbits, planets)
+        size = "sizes from H" if options.diameter == "H" else f"bodies of {options.diameter} km"
+        what = f"verdicts of {size} within 5 radii"
+    elif options.output or options.grains:
+        name = "output" if options.output else "grains"
+        raise InvalidInput(f"--{name}", getattr(options, name), "--verdicts with it")
     else:
         within = None if options.within is None else options.within * u.au
         rows, lines, count = [], [], 0
@@ -70,9 +79,8 @@ def run(options: argparse.Namespace) -> None:
             count = len(rates.rate)
             met = rates.rate.value > 0.0
             total = float(rates.total.to_value(1 / u.yr))
-            speed = (
-                float((rates.rate.value[met] * rates.v_inf.value[met]).sum() / total) if total > 0.0 else None
-            )
+            share = rates.weight[met] * rates.rate.value[met]
+            speed = float((share * rates.v_inf.value[met]).sum() / total) if total > 0.0 else None
             rows.append(
                 {
                     "planet": rates.planet.name,
@@ -92,22 +100,99 @@ def run(options: argparse.Namespace) -> None:
     )
 
 
+def _verdicts(
+    options: argparse.Namespace, orbits: Any, planets: list[str]
+) -> tuple[list[dict[str, Any]], list[str], int]:
+    """Rows of the document, lines of the text, and the number of orbits."""
+    from pathlib import Path
+
+    import astropy.units as u
+
+    from flybystab.body.body import Material
+    from flybystab.plots.formats import FIGURES
+    from flybystab.population.disruption import disruption_rates
+    from flybystab.population.rates import encounter_rates
+    from flybystab.screening.priors import Population
+    from flybystab.screening.results import FORMATS
+    from flybystab.screening.table_files import check_output
+
+    output = None if options.output is None else Path(options.output)
+    figure = output is not None and output.suffix in FIGURES
+    if output is not None and not figure:
+        if output.suffix not in FORMATS:
+            raise InvalidInput(
+                "--output", str(output), f"a file that ends in {', '.join((*FIGURES, *FORMATS))}"
+            )
+        check_output(output)
+    result = disruption_rates(
+        orbits,
+        planets,
+        diameter=_diameter(options.diameter),
+        samples=options.samples,
+        seed=options.seed,
+        material=Material(yield_surface=options.surface),
+        priors=None if options.population is None else Population.from_file(options.population),
+        grains=options.grains,
+        journal=None if output is None else output.with_name(output.name + ".journal"),
+        progress=_progress if sys.stderr.isatty() else None,
+    )
+    if figure and output is not None:
+        from flybystab.plots.population import population_figure
+        from flybystab.plots.style import save
+
+        save(population_figure(result, [encounter_rates(orbits, name) for name in planets]), output)
+    elif output is not None:
+        from flybystab.screening.tables import write_table
+
+        write_table(result.samples, output)
+    rows: list[dict[str, Any]] = [
+        {
+            "planet": str(row["planet"]),
+            "verdict": str(row["verdict"]),
+            "rate_per_yr": float(row["rate"].to_value(1 / u.yr)),
+            "rate_error_per_yr": float(row["rate_error"].to_value(1 / u.yr)),
+        }
+        for row in result.table
+    ]
+    lines = [f"{row['planet']:8s} {row['verdict']:18s} {_interval(row['rate_per_yr'])}" for row in rows]
+    changed = result.changed_fraction(1 * u.Myr)
+    lines.append(f"reshaped or worse in a million years: {changed:.2g} of the population")
+    lines += [f"{'figure' if figure else 'samples'}  {output}"] if output is not None else []
+    return rows, lines, len(orbits)
+
+
+def _diameter(text: str) -> Any:
+    """Diameter from the option: a number of km, or H."""
+    import astropy.units as u
+
+    if text == "H":
+        return None
+    try:
+        return float(text) * u.km
+    except ValueError:
+        raise InvalidInput(
+            "--diameter", text, "a number of km, or H for sizes from absolute magnitudes"
+        ) from None
+
+
+def _progress(done: int, total: int) -> None:
+    end = "\n" if done == total else ""
+    print(f"\r{done} of {total} strata", end=end, file=sys.stderr, flush=True)
+
+
 def _interval(rate: float) -> str:
     """A rate per year, and the mean time between two events."""
     return f"{rate:9.3e} /yr   one in {1.0 / rate:.3g} yr" if rate > 0.0 else f"{rate:9.3e} /yr"
 
 
-def _orbits(path: str | None) -> Any:
-    """Orbits of a file: a table with columns a, e, i, or any catalogue; the embedded catalogue without a file."""
+def _orbits(options: argparse.Namespace) -> Any:
+    """Orbits of a file: a population (table or law), or any catalogue; the embedded catalogue without a file."""
     from flybystab.catalogues.catalogue import catalogue
+    from flybystab.population.model_population import is_population, read_population
 
-    if path is None:
+    columns = None if options.columns is None else [c.strip() for c in options.columns.split(",")]
+    if options.file is None:
         return catalogue()
-    from astropy.table import QTable
-
-    from flybystab.files import read_text
-
-    lines = [line for line in read_text(path, "population file").splitlines() if not line.startswith("#")]
-    if lines and {"a", "e", "i"} <= set(lines[0].replace(",", " ").split()) and "pdes" not in lines[0]:
-        return QTable.read(path, format="ascii.ecsv" if path.endswith(".ecsv") else "ascii.csv")
-    return catalogue(path)
+    if columns is not None or is_population(options.file):
+        return read_population(options.file, columns=columns, seed=options.seed)
+    return catalogue(options.file)

@@ -7,26 +7,27 @@ same number of sampled encounters, so that the rare deep encounters, which decid
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+import hashlib
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Executor
+from pathlib import Path
 from typing import Any
 
 import astropy.units as u
 import numpy as np
 from astropy.table import QTable, vstack
 from astropy.units import Quantity
-from scipy.spatial.transform import Rotation
 
-from flybystab.body.body import Body, Material
-from flybystab.body.equilibrium import equilibrium
-from flybystab.catalogues.asteroid import Asteroid
-from flybystab.encounter.encounter import Encounter
-from flybystab.errors import InvalidInput
-from flybystab.flybys.flyby_many import flyby_many
+from flybystab._version import __version__
+from flybystab.body.body import Material
+from flybystab.errors import FlybystabWarning, InvalidInput
 from flybystab.flybys.verdict import Verdict
 from flybystab.orbit.planets import planet
-from flybystab.population.rates import EncounterRates, elements_table, encounter_rates
-from flybystab.screening.draws import draws
+from flybystab.population.rates import EncounterRates, elements_table
+from flybystab.population.sampled_encounters import Plan, impact_and_total, sampled
+from flybystab.population.verdict_rates import DisruptionRates
+from flybystab.screening.journal import Journal
 from flybystab.screening.priors import Population
 from flybystab.units import to_si, whole
 
@@ -34,81 +35,23 @@ from flybystab.units import to_si, whole
 PLANETS = ("mercury", "venus", "earth", "mars")
 #: Strata in periapsis between the surface and the limit.
 STRATA = 8
-#: Geometric albedo that converts the diameter to the absolute magnitude by which LCDB spin periods are selected.
-ALBEDO = 0.14
-
-
-_NO_SAMPLES = QTable(
-    {
-        "orbit": np.empty(0, dtype=int),
-        "v_inf": np.empty(0) * u.km / u.s,
-        "periapsis": np.empty(0) * u.km,
-        "planet": np.empty(0, dtype="U16"),
-        "verdict": np.empty(0, dtype="U20"),
-        "spin_ratio": np.empty(0),
-        "weight": np.empty(0) / u.yr,
-    }
-)
-
-
-@dataclass(frozen=True, eq=False)
-class DisruptionRates:
-    """Rates of verdicts in a population.
-
-    Attributes
-    ----------
-    table : QTable
-        One row per planet and verdict: ``planet``, ``verdict``, ``rate`` and its sampling error ``rate_error`` (1/yr,
-        of the whole population). A verdict without samples has the rate 0, and its error is the largest weight
-        of a sample.
-    samples : QTable
-        Every sampled encounter: ``planet``, ``orbit``, ``periapsis``, ``v_inf``, ``verdict``, ``spin_ratio`` and
-        ``weight`` (1/yr: its contribution to the rate).
-    bodies : int
-        Orbits of the population.
-    diameter : Quantity
-    """
-
-    table: QTable
-    samples: QTable
-    bodies: int
-    diameter: Quantity
-
-    def rate(self, verdict: str, planet_name: str | None = None) -> Quantity:
-        """Rate of a verdict, 1/yr, over all planets or for one."""
-        mask = self.table["verdict"] == str(verdict)
-        if planet_name is not None:
-            mask &= self.table["planet"] == planet(planet_name).name
-        return self.table["rate"][mask].sum()
-
-    def lifetime(self, *verdicts: str) -> Quantity:
-        """Mean time, Myr, until a body of the population meets one of the verdicts."""
-        total = sum((self.rate(v) for v in verdicts), 0.0 / u.yr)
-        return (self.bodies / total).to(u.Myr) if total.value > 0.0 else np.inf * u.Myr
-
-    def spin_change_rate(self, least: float) -> Quantity:
-        """Rate, 1/yr, of bodies that stay INTACT and whose spin rate changes by more than the fraction `least`."""
-        share = to_si(least, u.dimensionless_unscaled, "least", low=0.0)
-        mask = (self.samples["verdict"] == str(Verdict.INTACT)) & (
-            np.abs(self.samples["spin_ratio"] - 1.0) > share
-        )
-        return self.samples["weight"][mask].sum()
-
-    def __repr__(self) -> str:
-        return f"<DisruptionRates {self.bodies} orbits, {len(self.samples)} sampled encounters>"
 
 
 def disruption_rates(
     population: Any,
     planets: Sequence[str] = PLANETS,
     *,
-    diameter: Quantity = 1.0 * u.km,
+    diameter: Quantity | None = 1.0 * u.km,
     radii: float = 5.0,
     samples: int = 800,
     seed: int = 0,
     material: Material | None = None,
     priors: Population | None = None,
+    grains: int | None = None,
     workers: int | None = None,
+    executor: Executor | None = None,
+    journal: str | Path | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> DisruptionRates:
     """Rates of every verdict in a population of asteroids.
 
@@ -117,8 +60,9 @@ def disruption_rates(
     population : table, or sequence of Orbit or Asteroid
         As in :func:`flybystab.encounter_rates`.
     planets : sequence of str
-    diameter : Quantity
-        Of every body; the verdicts of cohesionless bodies do not depend on it, but the drawn spin periods do.
+    diameter : Quantity or None
+        Of every body; None for the sizes that follow from the absolute magnitudes ``H`` of the population and the prior
+        of the albedo. The verdicts of cohesionless bodies depend on size through their spin periods only.
     radii : float
         Encounters up to this many planetary radii from the centre are sampled. At two radii a tenth of the drawn bodies
         yield, between four and five about 1 % (those drawn close to their limit); farther ones are not counted.
@@ -129,105 +73,203 @@ def disruption_rates(
         Yield surface and dilatancy; friction angle and cohesion are drawn.
     priors : flybystab.screening.priors.Population, optional
         Distributions of density, shape, spin period, friction and cohesion.
+    grains : int, optional
+        Number of grains of the pile that replaces the ellipsoid where it ends (BEYOND MODEL, MASS LOSS, DISRUPTED): a
+        few seconds for each. Without it such bodies keep the verdict of the ellipsoid.
     workers : int, optional
         Threads; no result depends on it.
+    executor : concurrent.futures.Executor, optional
+        Computes the strata, such as processes or a dask client's executor; no result depends on it.
+    journal : str or Path, optional
+        File in which finished strata are kept: the same call resumes an interrupted run. Removed at the end.
+    progress : callable, optional
+        Called with the number of finished strata and the number of all.
 
     Returns
     -------
     DisruptionRates
         Bodies that are not in equilibrium in isolation are drawn again: the rates are those of bodies that are.
+
+    Raises
+    ------
+    InvalidInput, UnitMismatch, UnknownName
     """
-    size = to_si(diameter, u.m, "diameter", low=0.0, open_low=True)
+    size = np.nan if diameter is None else to_si(diameter, u.m, "diameter", low=0.0, open_low=True)
     limit = to_si(radii, u.dimensionless_unscaled, "radii", low=1.0, high=100.0, open_low=True)
-    number = whole(samples, "samples", STRATA)
-    first = whole(seed, "seed", 0)
+    number, first = whole(samples, "samples", STRATA), whole(seed, "seed", 0)
     if isinstance(planets, str):
         planets = (planets,)
     if not planets:
         raise InvalidInput("planets", planets, "at least one planet")
-    magnitude = 5.0 * np.log10(1.329e6 / (size * np.sqrt(ALBEDO)))
-    model = Asteroid(
-        {"name": "sample", "diameter_m": f"{size!r}", "H_mag": f"{magnitude:.4f}"}, file="population"
-    )
-    matter = material or Material()
-    tables, rows = [], []
     orbits = elements_table(population)
-    for k, name in enumerate(planets):
-        body = planet(name)
-        edges = body.impact_distance + (limit * body.radius - body.impact_distance) * np.linspace(
-            0.0, 1.0, STRATA + 1
+    if diameter is None and "H" not in orbits.colnames:
+        raise InvalidInput("diameter", None, "a diameter, or a population with absolute magnitudes H")
+    plan = Plan(
+        orbits,
+        tuple(planet(name).name for name in planets),
+        tuple(1.0 + (limit - 1.0) * np.linspace(0.0, 1.0, STRATA + 1)),
+        max(1, number // STRATA),
+        first,
+        size,
+        material or Material(),
+        priors or Population(),
+        0 if grains is None else whole(grains, "grains", 1),
+    )
+    rates = {name: impact_and_total(plan, name, workers) for name in plan.planets}
+    tasks = [
+        (k, i)
+        for k, name in enumerate(plan.planets)
+        for i in range(STRATA)
+        if rates[name][0].total.value > 0.0
+    ]
+    parts: dict[tuple[int, int], QTable] = {}
+    book = None if journal is None else Journal(Path(journal), _fingerprint(plan))
+    if book is not None and book.damaged:
+        warnings.warn(
+            f"{book.path} is damaged in {len(book.damaged)} of its lines; these strata are recomputed",
+            FlybystabWarning,
+            stacklevel=2,
         )
-        within = [encounter_rates(orbits, body, edge * u.m, workers=workers) for edge in edges]
-        rows.append((body.name, str(Verdict.IMPACT), within[0].total.value, 0.0))
-        if not within[-1].total.value > 0.0:
+    try:
+        done = {record["task"]: record for record in book.tasks()} if book is not None else {}
+        for number, task in enumerate(tasks):
+            if number in done:
+                parts[task] = _restored(done[number]["columns"])
+        todo = [(n, t) for n, t in enumerate(tasks) if t not in parts]
+        for number, task, table in _results(plan, todo, rates, workers, executor):
+            parts[task] = table
+            if book is not None:
+                book.add(number, {"columns": _stored(table)})
+            if progress is not None:
+                progress(len(parts), len(tasks))
+    except BaseException:
+        if book is not None:
+            book.close()
+        raise
+    if book is not None:
+        book.close(remove=True)
+    return _joined(plan, rates, parts)
+
+
+def _results(
+    plan: Plan,
+    todo: Sequence[tuple[int, tuple[int, int]]],
+    rates: dict[str, tuple[EncounterRates, float]],
+    workers: int | None,
+    executor: Executor | None,
+) -> Iterator[tuple[int, tuple[int, int], QTable]]:
+    """Strata in order of completion, on the executor or one by one."""
+    if executor is None:
+        for number, (k, i) in todo:
+            yield number, (k, i), sampled(plan, k, i, rates[plan.planets[k]][0], workers)
+        return
+    from concurrent.futures import as_completed
+
+    calls = {executor.submit(_task, plan, k, i): (number, (k, i)) for number, (k, i) in todo}
+    try:
+        for call in as_completed(calls):
+            yield *calls[call], call.result()
+    finally:
+        for call in calls:
+            call.cancel()
+
+
+def _task(plan: Plan, planet_index: int, stratum: int) -> QTable:
+    """One stratum in a worker of an executor."""
+    rates, _ = impact_and_total(plan, plan.planets[planet_index], 1)
+    return sampled(plan, planet_index, stratum, rates, 1)
+
+
+def _fingerprint(plan: Plan) -> dict[str, Any]:
+    """Description of a run: two runs share a journal only if it agrees."""
+    digest = hashlib.sha256()
+    for name in plan.orbits.colnames:
+        column = plan.orbits[name]
+        digest.update(name.encode() + np.ascontiguousarray(getattr(column, "value", column)).tobytes())
+    digest.update(repr((plan.material, plan.priors)).encode())
+    return {
+        "flybystab": __version__,
+        "run": digest.hexdigest(),
+        "settings": {
+            "planets": list(plan.planets),
+            "radii": plan.edges[-1],
+            "samples": plan.samples,
+            "seed": plan.seed,
+            "diameter_m": None if np.isnan(plan.diameter) else plan.diameter,
+            "grains": plan.grains,
+        },
+    }
+
+
+def _stored(table: QTable) -> dict[str, Any]:
+    """Columns of a table as lists, with their units."""
+    return {
+        name: [np.asarray(getattr(table[name], "value", table[name])).tolist(), str(table[name].unit or "")]
+        for name in table.colnames
+    }
+
+
+def _restored(columns: dict[str, Any]) -> QTable:
+    """Inverse of `_stored`."""
+    return QTable(
+        {
+            name: np.array(values) * u.Unit(unit) if unit else np.array(values)
+            for name, (values, unit) in columns.items()
+        }
+    )
+
+
+def _joined(
+    plan: Plan, rates: dict[str, tuple[EncounterRates, float]], parts: dict[tuple[int, int], QTable]
+) -> DisruptionRates:
+    rows: list[tuple[str, str, float, float]] = []
+    tables: list[QTable] = []
+    for k, name in enumerate(plan.planets):
+        total, impact = rates[name]
+        if not total.total.value > 0.0:
+            rows.append((name, str(Verdict.IMPACT), 0.0, 0.0))
             continue
-        bodies = _bodies(model, number, first + 7919 * k, priors, matter)
-        rng = np.random.default_rng([first, k])
-        parts = [
-            _stratum(within[i], within[i - 1], bodies[i - 1 :: STRATA], rng, workers)
-            for i in range(1, STRATA + 1)
-            if within[i].total > within[i - 1].total
-        ]
-        rows += _rows(body.name, parts)
-        tables += parts
-    names, verdicts, rates, errors = zip(*rows, strict=True)
+        strata = [parts[k, i] for i in range(STRATA) if len(parts[k, i])]
+        rows += _rows(name, strata, impact)
+        tables += strata
+    names, verdicts, values, errors = zip(*rows, strict=True)
     table = QTable(
         {
             "planet": list(names),
             "verdict": list(verdicts),
-            "rate": np.array(rates) / u.yr,
+            "rate": np.array(values) / u.yr,
             "rate_error": np.array(errors) / u.yr,
         }
     )
-    samples_table = vstack(tables) if tables else _NO_SAMPLES.copy()
-    return DisruptionRates(table, samples_table, len(orbits), (size * u.m).to(u.km))
+    weight = plan.orbits["weight"] if "weight" in plan.orbits.colnames else np.ones(len(plan.orbits))
+    size = None if np.isnan(plan.diameter) else (plan.diameter * u.m).to(u.km)
+    joined = vstack(tables) if tables else _no_samples()
+    return DisruptionRates(table, joined, float(np.sum(weight)), size)
 
 
-def _bodies(
-    model: Asteroid, number: int, seed: int, priors: Population | None, material: Material
-) -> list[Body]:
-    """Drawn bodies that are in equilibrium in isolation."""
-    found: list[Body] = []
-    for attempt in range(20):
-        drawn = draws(model, number, seed + 104729 * attempt, priors)
-        many = [drawn.body(i, material) for i in range(number)]
-        found += [b for b in many if equilibrium(b).admissible]
-        if len(found) >= number:
-            return found[:number]
-    raise InvalidInput(
-        "priors", priors, "distributions of which at least 5 % are in equilibrium in isolation"
-    )
+def _no_samples() -> QTable:
+    """The table of samples without rows."""
+    texts, numbers = ("planet", "verdict", "model"), ("orbit", "fragments")
+    units = {"v_inf": u.km / u.s, "periapsis": u.km, "diameter": u.km, "spin_period": u.h, "weight": 1 / u.yr}
+    table = QTable({name: np.empty(0, dtype=int) for name in numbers})
+    for name in texts:
+        table[name] = np.empty(0, dtype="U20")
+    for name, unit in units.items():
+        table[name] = np.empty(0) * unit
+    for name in ("spin_ratio", "elongation_before", "elongation", "largest_fraction"):
+        table[name] = np.empty(0)
+    return table
 
 
-def _stratum(
-    outer: EncounterRates,
-    inner: EncounterRates,
-    bodies: list[Body],
-    rng: np.random.Generator,
-    workers: int | None,
-) -> QTable:
-    """Sampled encounters between two periapsis distances, their verdicts and weights."""
-    sample = outer.sample(len(bodies), int(rng.integers(2**31)), above=inner.periapsis)
-    encounters = [
-        Encounter.hyperbolic(outer.planet, periapsis=q, v_inf=v)
-        for q, v in zip(sample["periapsis"], sample["v_inf"], strict=True)
-    ]
-    turns = list(Rotation.random(len(bodies), random_state=rng).as_matrix())
-    flown = flyby_many(bodies, encounters, turns, workers=workers)
-    sample["planet"] = outer.planet.name
-    sample["verdict"] = np.asarray(flown.verdict).astype("U20")
-    sample["spin_ratio"] = flown.spin_ratio
-    counted = ~np.isin(sample["verdict"], ("FAILED", str(Verdict.NOT_IN_EQUILIBRIUM)))
-    total = (outer.total - inner.total).value
-    sample["weight"] = np.where(counted, total / max(1, int(counted.sum())), 0.0) / u.yr
-    return sample
+def _rows(name: str, parts: Sequence[QTable], impact: float) -> list[tuple[str, str, float, float]]:
+    """Rate and sampling error of each verdict at one planet, over its strata.
 
-
-def _rows(name: str, parts: Sequence[QTable]) -> list[tuple[str, str, float, float]]:
-    """Rate and sampling error of each verdict at one planet, over its strata."""
+    Impacts of the centre of mass have the rate `impact` (1/yr) without error; bodies of the samples that touch the
+    ground or the atmosphere with any part are added to them.
+    """
     out = []
-    for verdict in Verdict:
-        if verdict in (Verdict.IMPACT, Verdict.NOT_IN_EQUILIBRIUM):
+    for verdict in (Verdict.IMPACT, *(v for v in Verdict if v != Verdict.IMPACT)):
+        if verdict == Verdict.NOT_IN_EQUILIBRIUM:
             continue
         rate, variance, least = 0.0, 0.0, 0.0
         for part in parts:
@@ -240,5 +282,8 @@ def _rows(name: str, parts: Sequence[QTable]) -> list[tuple[str, str, float, flo
             rate += total * share
             variance += total**2 * share * (1.0 - share) / n
             least = max(least, total / n)
-        out.append((name, str(verdict), rate, np.sqrt(variance) if rate > 0.0 else least))
+        if verdict == Verdict.IMPACT:
+            out.append((name, str(verdict), impact + rate, float(np.sqrt(variance))))
+        else:
+            out.append((name, str(verdict), rate, float(np.sqrt(variance)) if rate > 0.0 else least))
     return out

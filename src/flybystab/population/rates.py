@@ -12,6 +12,7 @@ import numpy as np
 from astropy.table import QTable, Table
 from astropy.units import Quantity
 
+from flybystab.catalogues.asteroid import Asteroid
 from flybystab.constants import AU
 from flybystab.core.numerics.threads import in_order
 from flybystab.errors import InvalidInput
@@ -19,12 +20,10 @@ from flybystab.orbit.elements import GM_SUN
 from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.planets import Planet, planet
 from flybystab.population.mean_orbits import mean_orbit
-from flybystab.population.wetherill import NODES_R, NODES_S, encounter_rates_of, rate_at_speeds
+from flybystab.population.wetherill import NODES_R, NODES_S, rate_and_moments, rate_at_speeds, speed_sums
 from flybystab.typing import Array
 from flybystab.units import to_si, whole
 
-#: Julian year, s.
-YEAR = 365.25 * 86400.0
 #: Orbits of one task of a thread.
 BLOCK = 20_000
 
@@ -39,11 +38,13 @@ class EncounterRates:
     periapsis : Quantity
         Encounters have a smaller periapsis distance, including gravitational focusing.
     rate : Quantity, shape (n,)
-        1/yr; zero for an orbit that does not reach the planet's.
+        1/yr, of one asteroid on each orbit; zero for an orbit that does not reach the planet's.
     v_inf : Quantity, shape (n,)
         Mean hyperbolic excess speed of these encounters, km/s; nan without encounters.
     v_inf_dispersion : Quantity, shape (n,)
         Its standard deviation.
+    weight : ndarray (n,)
+        Number of asteroids on each orbit.
     """
 
     planet: Planet
@@ -51,13 +52,20 @@ class EncounterRates:
     rate: Quantity
     v_inf: Quantity
     v_inf_dispersion: Quantity
+    weight: Array
     _elements: Array
     _orbit: Array
+    _sums: Array
 
     @property
     def total(self) -> Quantity:
-        """Rate of all orbits together, 1/yr."""
-        return self.rate.sum()
+        """Rate of all asteroids together, 1/yr."""
+        return (self.weight * self.rate).sum()
+
+    def within(self, periapsis: Quantity) -> EncounterRates:
+        """The rates within another periapsis distance, without repeating the integration."""
+        limit = to_si(periapsis, u.m, "periapsis", low=0.0, open_low=True)
+        return _rates(self.planet, limit, self.weight, self._elements, self._orbit, self._sums)
 
     def sample(self, count: int, seed: int, *, above: Quantity | None = None) -> QTable:
         """Encounters drawn from the population in proportion to their rates.
@@ -78,9 +86,9 @@ class EncounterRates:
         rng = np.random.default_rng(whole(seed, "seed", 0))
         high, gm = self.periapsis.to_value(u.m), self.planet.gm
         low = 0.0 if above is None else to_si(above, u.m, "above", low=0.0, high=high, open_high=True)
-        rate = self.rate.value
+        rate = self.weight * self.rate.value
         if low > 0.0:
-            rate = rate - rates_within(self._elements, self._orbit, gm, low)[0] * YEAR
+            rate = rate - self.weight * self.within(low * u.m).rate.value
         if not rate.sum() > 0.0:
             raise InvalidInput("count", count, "orbits that reach the planet: none does")
         chosen = rng.choice(len(rate), size=whole(count, "count", 1), p=rate / rate.sum())
@@ -94,8 +102,9 @@ class EncounterRates:
                 a, e, np.sin(i), np.cos(i), self._orbit[0], self._orbit[1], np.sin(self._orbit[2]), GM_SUN,
                 speeds, weights,
             )  # fmt: skip
-            cross = weights[:m] * (high - low) * (high + low + 2.0 * gm / speeds[:m] ** 2)
-            speed[block] = rng.choice(speeds[:m], size=len(block), p=cross / cross.sum())
+            u2 = speeds[:m] ** 2
+            share = weights[:m] * (high * (high + 2.0 * gm / u2) - low * (low + 2.0 * gm / u2))
+            speed[block] = rng.choice(speeds[:m], size=len(block), p=share / share.sum())
         # q^2 + 2 f q = x is uniform between its values at the two limits, f = GM/U^2
         f = gm / speed**2
         x = low * (low + 2.0 * f) + rng.random(len(chosen)) * (high - low) * (high + low + 2.0 * f)
@@ -122,7 +131,8 @@ def encounter_rates(
     Parameters
     ----------
     orbits : table, sequence of Orbit or of Asteroid, or one of them
-        A table has columns ``a``, ``e`` and ``i`` (with units; without: au and deg).
+        A table has columns ``a``, ``e`` and ``i`` (with units; without: au and deg), and optionally ``weight``, the
+        number of asteroids that a row represents.
     planet_name : str or Planet
     periapsis : Quantity, optional
         Largest distance from the planet's centre; its radius by default (impacts on the surface).
@@ -148,7 +158,7 @@ def encounter_rates(
     body = planet(planet_name)
     distance = body.radius * u.m if periapsis is None else periapsis
     limit = to_si(distance, u.m, "periapsis", low=0.0, open_low=True)
-    elements = _elements(orbits)
+    elements, weight = _elements(orbits), _weight(orbits)
     if planet_orbit is None:
         target = mean_orbit(body.name)
     else:
@@ -161,38 +171,64 @@ def encounter_rates(
             ]
         )
     threads = (os.cpu_count() or 1) if workers is None else whole(workers, "workers", 1)
-    rate, moments = rates_within(elements, target, body.gm, limit, threads)
-    mean = moments[:, 0]
-    spread = np.sqrt(np.maximum(0.0, moments[:, 1] - mean**2))
+    sums = np.empty((len(elements), 5))
+
+    def part(first: int) -> None:
+        block = slice(first, first + BLOCK)
+        speed_sums(elements[block], target, GM_SUN, sums[block])
+
+    list(in_order(part, range(0, len(elements), BLOCK), threads))
+    return _rates(body, limit, np.ones(len(elements)) if weight is None else weight, elements, target, sums)
+
+
+def _rates(
+    body: Planet, limit: float, weight: Array, elements: Array, target: Array, sums: Array
+) -> EncounterRates:
+    rate, mean, square = rate_and_moments(sums, body.gm, limit)
+    dispersion = np.sqrt(np.maximum(0.0, square - mean**2))
     return EncounterRates(
         body,
         (limit * u.m).to(u.km),
         (rate / u.s).to(1 / u.yr),
         mean / 1e3 * u.km / u.s,
-        spread / 1e3 * u.km / u.s,
+        dispersion / 1e3 * u.km / u.s,
+        weight,
         elements,
         target,
+        sums,
     )
 
 
-def rates_within(
-    elements: Array, target: Array, gm: float, limit: float, workers: int = 1
-) -> tuple[Array, Array]:
-    """Rates (1/s) within a periapsis (m), and the mean and mean square of the excess speed, on threads."""
-    rate, moments = np.empty(len(elements)), np.empty((len(elements), 2))
-
-    def part(first: int) -> None:
-        block = slice(first, first + BLOCK)
-        encounter_rates_of(elements[block], target, GM_SUN, gm, limit, rate[block], moments[block])
-
-    list(in_order(part, range(0, len(elements), BLOCK), workers))
-    return rate, moments
-
-
 def elements_table(orbits: Any) -> QTable:
-    """Orbits as a table of ``a``, ``e`` and ``i``, which :func:`encounter_rates` does not convert again."""
+    """Orbits as a table of ``a``, ``e`` and ``i``, which :func:`encounter_rates` does not convert again.
+
+    Columns ``weight`` and ``H`` of a table, and absolute magnitudes of asteroids, are kept.
+    """
     a, e, i = _elements(orbits).T
-    return QTable({"a": a * u.m, "e": e, "i": i * u.rad})
+    table = QTable({"a": a * u.m, "e": e, "i": i * u.rad})
+    weight = _weight(orbits)
+    if weight is not None:
+        table["weight"] = weight
+    if isinstance(orbits, Table):
+        if "H" in orbits.colnames:
+            column = orbits["H"]
+            table["H"] = np.asarray(getattr(column, "value", column), dtype=float)
+    elif isinstance(orbits, Iterable):
+        table["H"] = [
+            float(o.row["H_mag"]) if isinstance(o, Asteroid) and o.knows("H_mag") else np.nan for o in orbits
+        ]
+    return table
+
+
+def _weight(orbits: Any) -> Array | None:
+    """Number of asteroids of each row of a table; None without the column."""
+    if not isinstance(orbits, Table) or "weight" not in orbits.colnames:
+        return None
+    column = orbits["weight"]
+    weight = np.asarray(getattr(column, "value", column), dtype=float)
+    if not (np.isfinite(weight) & (weight >= 0.0)).all():
+        raise InvalidInput("orbits", "weight", "finite weights of zero or more")
+    return weight
 
 
 def _elements(orbits: Any) -> Array:

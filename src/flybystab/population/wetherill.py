@@ -118,10 +118,11 @@ def rate_at_speeds(
 
 
 @kernel
-def encounter_rates_of(
-    elements: Array, planet: Array, gm_sun: float, gm: float, periapsis: float, rate: Array, moments: Array
-) -> None:
-    """Rates of many orbits and the mean and mean square of their hyperbolic excess speeds.
+def speed_sums(elements: Array, planet: Array, gm_sun: float, sums: Array) -> None:
+    """Sums ``sum weights U^k`` for k = -2 to 2, from which rates at any periapsis distance follow.
+
+    The focused cross-section is ``sigma = pi q^2 + 2 pi q GM/U^2``, so that the rate within ``q`` and the mean of
+    ``U^m`` over these encounters are linear combinations of the sums (:func:`rate_and_moments`).
 
     Parameters
     ----------
@@ -129,12 +130,10 @@ def encounter_rates_of(
         Semi-major axis (m), eccentricity, inclination (rad).
     planet : ndarray (3,)
         The same of the planet.
-    gm_sun, gm, periapsis : float
-        GM of the Sun and of the planet (m3/s2), periapsis distance (m).
-    rate : ndarray (n,)
-        Written: passages within `periapsis`, 1/s.
-    moments : ndarray (n, 2)
-        Written: mean (m/s) and mean square of ``U`` over these passages; nan where there are none.
+    gm_sun : float
+        m3/s2.
+    sums : ndarray (n, 5)
+        Written, SI.
     """
     speeds, weights = np.empty(4 * NODES_R * NODES_S), np.empty(4 * NODES_R * NODES_S)
     for n in range(elements.shape[0]):
@@ -142,13 +141,22 @@ def encounter_rates_of(
         m = rate_at_speeds(
             a, e, np.sin(i), np.cos(i), planet[0], planet[1], np.sin(planet[2]), gm_sun, speeds, weights
         )
-        total, first, second = 0.0, 0.0, 0.0
+        sums[n, :] = 0.0
         for k in range(m):
-            u2 = speeds[k] * speeds[k]
-            cross = np.pi * periapsis * (periapsis + 2.0 * gm / u2)
-            total += weights[k] * cross
-            first += weights[k] * cross * speeds[k]
-            second += weights[k] * cross * u2
-        rate[n] = total
-        moments[n, 0] = first / total if total > 0.0 else np.nan
-        moments[n, 1] = second / total if total > 0.0 else np.nan
+            u, w = speeds[k], weights[k]
+            sums[n, 0] += w / (u * u)
+            sums[n, 1] += w / u
+            sums[n, 2] += w
+            sums[n, 3] += w * u
+            sums[n, 4] += w * u * u
+
+
+def rate_and_moments(sums: Array, gm: float, periapsis: float) -> tuple[Array, Array, Array]:
+    """Rate (1/s) within `periapsis` (m), and mean (m/s) and mean square of ``U`` over these encounters.
+
+    ``rate <U^m> = pi q^2 sum w U^m + 2 pi q GM sum w U^(m - 2)``; the moments are nan where the rate is zero.
+    """
+    area, focus = np.pi * periapsis**2, 2.0 * np.pi * periapsis * gm
+    rate, first, second = (area * sums[:, m + 2] + focus * sums[:, m] for m in range(3))
+    with np.errstate(invalid="ignore"):
+        return rate, first / rate, second / rate

@@ -1,0 +1,140 @@
+"""Figures of the rates of a population: functions that take matplotlib axes and return them, and one figure of all."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import astropy.units as u
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
+
+from flybystab.flybys.verdict import Verdict
+from flybystab.population.rates import EncounterRates
+from flybystab.population.verdict_rates import CHANGED, DisruptionRates
+
+#: Colours (Okabe & Ito) and line styles of the planets: told apart in grey, too.
+PLANETS = {
+    "mercury": ("#000000", ":"),
+    "venus": ("#E69F00", "--"),
+    "earth": ("#0072B2", "-"),
+    "mars": ("#D55E00", "-."),
+    "jupiter": ("#009E73", (0, (5, 1, 1, 1, 1, 1))),
+}
+#: Verdicts of the panel against size, each with its name, colour and line.
+_SIZES = (
+    (CHANGED, "reshaped, shedding or disrupted", "#0072B2", "-"),
+    (
+        (Verdict.MASS_LOSS, Verdict.DISRUPTED, Verdict.BEYOND_MODEL),
+        "shedding, disrupted or beyond 6:1",
+        "#D55E00",
+        "--",
+    ),
+)
+
+
+def _line(name: str) -> tuple[str, Any]:
+    return PLANETS.get(name, ("0.4", "-"))
+
+
+def rate_plot(axes: Any, rates: Sequence[EncounterRates]) -> Any:
+    """Plot the rate of encounters within a periapsis distance (planetary radii), one line per planet."""
+    for one in rates:
+        q = np.geomspace(1.0, 30.0, 40)
+        total = [one.within(x * one.planet.radius * u.m).total.to_value(1 / u.Myr) for x in q]
+        if not any(total):
+            continue
+        colour, style = _line(one.planet.name)
+        axes.loglog(q, total, color=colour, ls=style, label=one.planet.name.capitalize())
+    axes.set(xlabel="periapsis distance (radii of the planet)", ylabel="encounters within it (1/Myr)")
+    axes.set_title("Encounters of the population", fontsize=9)
+    axes.legend(frameon=False, fontsize=8)
+    return axes
+
+
+def verdict_plot(axes: Any, result: DisruptionRates) -> Any:
+    """Plot the rate of each change by planet as bars with sampling errors; verdicts without samples are left out."""
+    planets = list(dict.fromkeys(str(p) for p in result.table["planet"]))
+    shown = [v for v in CHANGED if result.rate(v).value > 0.0]
+    width = 0.8 / max(1, len(shown))
+    hatches = ("", "////", "....", "xxxx")
+    for k, verdict in enumerate(shown):
+        rows = [
+            result.table[(result.table["planet"] == p) & (result.table["verdict"] == str(verdict))]
+            for p in planets
+        ]
+        rate = np.array([r["rate"].to_value(1 / u.Myr).sum() for r in rows])
+        error = np.array([np.sqrt((r["rate_error"].to_value(1 / u.Myr) ** 2).sum()) for r in rows])
+        bars = axes.bar(
+            np.arange(len(planets)) + (k - 0.5 * (len(shown) - 1)) * width,
+            rate,
+            width,
+            yerr=np.where(rate > 0.0, error, 0.0),
+            label=str(verdict).capitalize(),
+            color=("#56B4E9", "#E69F00", "#D55E00", "#009E73")[k % 4],
+            edgecolor="black",
+            linewidth=0.6,
+            error_kw={"lw": 0.8},
+        )
+        for bar in bars:
+            bar.set_hatch(hatches[k % 4])
+    axes.set_xticks(np.arange(len(planets)), [p.capitalize() for p in planets])
+    axes.set(ylabel="rate in the population (1/Myr)", yscale="log" if shown else "linear")
+    axes.set_title("Verdicts by planet", fontsize=9)
+    if shown:
+        axes.legend(frameon=False, fontsize=8)
+    return axes
+
+
+def probability_plot(axes: Any, result: DisruptionRates, planet_name: str = "earth") -> Any:
+    """Plot the probability of a change (reshaped or worse) over periapsis and hyperbolic excess speed at one planet."""
+    here = result.samples["planet"] == planet_name
+    if not np.any(here):
+        axes.set_title(f"{planet_name.capitalize()}: no encounters sampled", fontsize=9)
+        return axes
+    speed = result.samples["v_inf"][here].to_value(u.km / u.s)
+    edges_v = np.unique(np.round(np.quantile(speed, np.linspace(0.0, 1.0, 7)), 1))
+    if len(edges_v) < 2:
+        edges_v = np.array([speed.min() - 0.5, speed.max() + 0.5])
+    edges_q = np.linspace(1.0, 5.0, 9)
+    share = result.outcome_map(edges_q, edges_v * u.km / u.s, planet_name=planet_name)
+    image = axes.pcolormesh(
+        edges_q, edges_v, share, cmap="viridis", vmin=0.0, vmax=max(0.05, np.nanmax(share))
+    )
+    axes.figure.colorbar(image, ax=axes, label="probability of a change of shape")
+    axes.set(xlabel="periapsis distance (radii of the planet)", ylabel="hyperbolic excess speed (km/s)")
+    axes.set_title(f"Reshaped or worse at {planet_name.capitalize()}", fontsize=9)
+    return axes
+
+
+def size_plot(axes: Any, result: DisruptionRates) -> Any:
+    """Plot the cumulative rate of changes against diameter; one size needs no such plot and gets a vertical line."""
+    sizes = result.samples["diameter"].to_value(u.km)
+    if len(sizes) == 0:
+        return axes
+    low, high = sizes.min(), sizes.max()
+    grid = np.geomspace(low * 0.8, high * 1.2, 80)
+    for verdicts, name, colour, style in _SIZES:
+        rate = result.cumulative(grid * u.km, *verdicts).to_value(1 / u.Myr)
+        if rate.max() > 0.0:
+            axes.loglog(grid, np.where(rate > 0.0, rate, np.nan), color=colour, ls=style, label=name)
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter(FormatStrFormatter("%g"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+    axes.set(xlabel="diameter (km)", ylabel="rate for larger bodies (1/Myr)")
+    axes.set_title("Cumulative rate against size", fontsize=9)
+    axes.legend(frameon=False, fontsize=8)
+    return axes
+
+
+def population_figure(result: DisruptionRates, rates: Sequence[EncounterRates]) -> Figure:
+    """Encounters, verdicts by planet, probability over periapsis and speed, and rates against size, on one page."""
+    figure = Figure(figsize=(9.6, 7.6), layout="constrained")
+    (first, second), (third, fourth) = figure.subplots(2, 2)
+    rate_plot(first, rates)
+    verdict_plot(second, result)
+    total = {one.planet.name: one.total.value for one in rates}
+    probability_plot(third, result, max(total, key=total.__getitem__) if "earth" not in total else "earth")
+    size_plot(fourth, result)
+    return figure
