@@ -14,8 +14,13 @@ from flybystab.core.dynamics import state
 from flybystab.core.dynamics.jacobian import flow_jacobian
 from flybystab.core.dynamics.run import parameters
 from flybystab.core.ellipsoid.tide import TidePanels, components
+from flybystab.core.material import parameters as material
 
-PARTS = {"smooth": state.SMOOTH, "extension": state.EXTENSION_CORNER, "compression": state.COMPRESSION_CORNER}
+PARTS = {
+    "smooth": material.SMOOTH,
+    "extension": material.EXTENSION_CORNER,
+    "compression": material.COMPRESSION_CORNER,
+}
 CASES = [
     *itertools.product(range(len(YIELD_SURFACES)), (0.0, 0.5), ("smooth",)),
     *((surface, 1.0, "smooth") for surface in (0, 1, 3)),
@@ -46,7 +51,7 @@ def test_columns_are_central_differences(surface, dilatancy, part, cohesion, vol
         encounter.tide.coefficients * unit**2,
     )
     par = parameters(np.array([1400.0, 850.0, 750.0]), 2000.0, np.deg2rad(35.0), cohesion, dilatancy, surface)
-    par[state.PART] = PARTS.get(part, state.FACE)
+    par[material.PART] = PARTS.get(part, material.FACE)
     work = state.empty_buffers()
     t, y = 0.3, flow(11, volume)
 

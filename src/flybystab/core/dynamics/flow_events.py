@@ -10,19 +10,12 @@ import numpy as np
 
 from flybystab.core.dynamics.rates import rate
 from flybystab.core.dynamics.state import (
-    BESIDE,
-    COHESION,
-    COMPRESSION_CORNER,
     DETERMINANT,
-    FACE,
     FLOWING,
     N_FULL,
-    PART,
     PAST,
     PLACE,
     PRESSURE,
-    SIN_PHI,
-    SMOOTH,
     STRENGTH,
     VOLUME,
     W_SCRATCH,
@@ -43,6 +36,15 @@ from flybystab.core.dynamics.workspace import (
 )
 from flybystab.core.ellipsoid.self_gravity import spread
 from flybystab.core.ellipsoid.tide import TidePanels
+from flybystab.core.material.parameters import (
+    BESIDE,
+    COHESION,
+    COMPRESSION_CORNER,
+    FACE,
+    PART,
+    SIN_PHI,
+    SMOOTH,
+)
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import eigensystem
 from flybystab.typing import Array

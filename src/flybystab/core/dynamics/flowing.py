@@ -15,11 +15,7 @@ from flybystab.core.dynamics.flow_events import (
 from flybystab.core.dynamics.ground import Ground, touches
 from flybystab.core.dynamics.jacobian import flow_jacobian
 from flybystab.core.dynamics.mohr_coulomb_hexagon import choose_part, settle
-from flybystab.core.dynamics.state import (
-    BETA,
-    FLOWING,
-    N_FULL,
-)
+from flybystab.core.dynamics.state import FLOWING, N_FULL
 from flybystab.core.dynamics.steppers import (
     explicit_dense,
     explicit_step,
@@ -39,6 +35,7 @@ from flybystab.core.dynamics.workspace import (
 )
 from flybystab.core.ellipsoid.tide import TidePanels
 from flybystab.core.material.flow_rule import fade
+from flybystab.core.material.parameters import BETA
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import determinant, deviator
 from flybystab.typing import Array

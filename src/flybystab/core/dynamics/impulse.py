@@ -15,7 +15,12 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from flybystab.core.dynamics.state import (
+from flybystab.core.dynamics.state import W_A, W_B, W_L, W_N, W_S, W_SINV, Buffers, gradient, set_gradient
+from flybystab.core.dynamics.steppers import factorise, solve
+from flybystab.core.dynamics.workspace import copy
+from flybystab.core.ellipsoid.tide import COMPONENTS
+from flybystab.core.material.flow_rule import dilatancy, dilation, flow_stress, isotropic
+from flybystab.core.material.parameters import (
     COHESION,
     COMPRESSION_CORNER,
     COS_PHI,
@@ -26,20 +31,7 @@ from flybystab.core.dynamics.state import (
     SIN_PHI,
     SMOOTH,
     SURFACE,
-    W_A,
-    W_B,
-    W_L,
-    W_N,
-    W_S,
-    W_SINV,
-    Buffers,
-    gradient,
-    set_gradient,
 )
-from flybystab.core.dynamics.steppers import factorise, solve
-from flybystab.core.dynamics.workspace import copy
-from flybystab.core.ellipsoid.tide import COMPONENTS
-from flybystab.core.material.flow_rule import dilatancy, dilation, flow_stress, isotropic
 from flybystab.core.material.yield_surface import (
     beyond_face,
     corner,

@@ -17,9 +17,6 @@ from __future__ import annotations
 import numpy as np
 
 from flybystab.core.dynamics.state import (
-    COHESION,
-    COS_PHI,
-    FACE,
     J_ACROSS,
     J_CHANGE,
     J_FACE,
@@ -31,11 +28,8 @@ from flybystab.core.dynamics.state import (
     J_STRESS,
     J_TURN,
     J_UNIT,
-    NORMAL,
-    PART,
     PLACE,
     PRESSURE,
-    SIN_PHI,
     VOLUME,
     W_A,
     W_B,
@@ -49,6 +43,7 @@ from flybystab.core.dynamics.state import (
 from flybystab.core.ellipsoid.self_gravity import gravity_derivative
 from flybystab.core.ellipsoid.tide import COMPONENTS, TidePanels, tide_at
 from flybystab.core.material.flow_rule import dilatancy, flow_coefficients, isotropic
+from flybystab.core.material.parameters import COHESION, COS_PHI, FACE, NORMAL, PART, SIN_PHI
 from flybystab.core.material.yield_surface import corner
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import contract, deviator, multiply, unpack

@@ -5,24 +5,21 @@ from __future__ import annotations
 import numpy as np
 
 from flybystab.core.dynamics.rates import rate
-from flybystab.core.dynamics.state import (
+from flybystab.core.dynamics.state import FLOWING, PAST, PLACE, W_N
+from flybystab.core.dynamics.workspace import Workspace
+from flybystab.core.ellipsoid.tide import TidePanels
+from flybystab.core.material.flow_rule import dilatancy, dilation, flow_stress, isotropic
+from flybystab.core.material.parameters import (
     BESIDE,
     COMPRESSION_CORNER,
     EXTENSION_CORNER,
     FACE,
-    FLOWING,
     NORMAL,
     PART,
-    PAST,
-    PLACE,
     SIN_PHI,
     SMOOTH,
     SURFACE,
-    W_N,
 )
-from flybystab.core.dynamics.workspace import Workspace
-from flybystab.core.ellipsoid.tide import TidePanels
-from flybystab.core.material.flow_rule import dilatancy, dilation, flow_stress, isotropic
 from flybystab.core.material.yield_surface import corner, is_hexagon, onto_face
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import determinant, deviator, pack

@@ -16,10 +16,7 @@ import numpy as np
 from flybystab.core.dynamics.impulse import FAILED, FREE, REST, SLIDING, friction_impulse
 from flybystab.core.dynamics.rates import field
 from flybystab.core.dynamics.state import (
-    COHESION,
     N_FULL,
-    SIN_PHI,
-    SURFACE,
     W_A,
     W_B,
     W_K,
@@ -33,6 +30,7 @@ from flybystab.core.dynamics.state import (
 from flybystab.core.dynamics.workspace import copy
 from flybystab.core.ellipsoid.tide import TidePanels
 from flybystab.core.material.flow_rule import dilatancy, dilation
+from flybystab.core.material.parameters import COHESION, SIN_PHI, SURFACE
 from flybystab.core.material.yield_surface import normal
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import determinant, deviator, multiply, pack, unpack

@@ -9,17 +9,12 @@ from __future__ import annotations
 import numpy as np
 
 from flybystab.core.dynamics.state import (
-    COHESION,
-    COS_PHI,
     DETERMINANT,
-    FACE,
     FLOWING,
     FLUID,
     G1,
     G2,
     G3,
-    NORMAL,
-    PART,
     PAST,
     PLACE,
     PRESSURE,
@@ -27,11 +22,7 @@ from flybystab.core.dynamics.state import (
     S1,
     S2,
     S3,
-    SIN_PHI,
-    SMOOTH,
     STRENGTH,
-    SURFACE,
-    VISCOSITY,
     VOLUME,
     W_A,
     W_B,
@@ -54,6 +45,17 @@ from flybystab.core.ellipsoid.rigid_stress import rigid_load
 from flybystab.core.ellipsoid.self_gravity import gravity_tensor
 from flybystab.core.ellipsoid.tide import TidePanels, tide_at
 from flybystab.core.material.flow_rule import dilatancy, dilation, flow_stress, isotropic
+from flybystab.core.material.parameters import (
+    COHESION,
+    COS_PHI,
+    FACE,
+    NORMAL,
+    PART,
+    SIN_PHI,
+    SMOOTH,
+    SURFACE,
+    VISCOSITY,
+)
 from flybystab.core.material.yield_surface import beyond_face, corner, slope_over_sine
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import contract, determinant, deviator, inverse, multiply, pack, unpack

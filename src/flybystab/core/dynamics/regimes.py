@@ -31,20 +31,14 @@ from flybystab.core.dynamics.impulse import FAILED, FREE, SLIDING, friction_impu
 from flybystab.core.dynamics.rates import rigid_excess, set_rigid_shape
 from flybystab.core.dynamics.rigid import follow_rigid
 from flybystab.core.dynamics.state import (
-    COHESION,
     DETERMINANT,
     DISPERSED,
     FLOWING,
     N_FULL,
-    NORMAL,
-    PART,
     RIGID,
     S1,
     S2,
     S3,
-    SIN_PHI,
-    SMOOTH,
-    SURFACE,
     W_SCRATCH,
     angular_momentum,
     to_fixed_frame,
@@ -66,6 +60,7 @@ from flybystab.core.dynamics.workspace import (
 )
 from flybystab.core.ellipsoid.tide import COMPONENTS, TidePanels
 from flybystab.core.material.flow_rule import dilatancy
+from flybystab.core.material.parameters import COHESION, NORMAL, PART, SIN_PHI, SMOOTH, SURFACE
 from flybystab.core.material.yield_surface import flow_direction
 from flybystab.core.numerics.jit import borrowed, kernel
 from flybystab.core.numerics.tensors import determinant, deviator, eigensystem

@@ -6,7 +6,7 @@ import numpy as np
 
 from flybystab.core.dynamics.ground import Ground, touches
 from flybystab.core.dynamics.rates import rate, rigid_excess
-from flybystab.core.dynamics.state import COHESION, N_RIGID, NORMAL, RIGID, S1, S2, S3, SIN_PHI, SURFACE
+from flybystab.core.dynamics.state import N_RIGID, RIGID, S1, S2, S3
 from flybystab.core.dynamics.steppers import explicit_at, explicit_dense, explicit_step
 from flybystab.core.dynamics.workspace import (
     DONE,
@@ -21,6 +21,7 @@ from flybystab.core.dynamics.workspace import (
 )
 from flybystab.core.ellipsoid.tide import TidePanels
 from flybystab.core.material.flow_rule import dilatancy
+from flybystab.core.material.parameters import COHESION, NORMAL, SIN_PHI, SURFACE
 from flybystab.core.material.yield_surface import required_friction, slope
 from flybystab.core.numerics.jit import code, kernel
 from flybystab.typing import Array

@@ -16,6 +16,7 @@ from flybystab.core.dynamics import regimes, state
 from flybystab.core.dynamics.ground import Ground, no_ground
 from flybystab.core.dynamics.workspace import N_EVENT, N_HISTORY, Counts, workspace
 from flybystab.core.ellipsoid.tide import TidePanels
+from flybystab.core.material import parameters as material
 from flybystab.core.material.yield_surface import is_circular, least_slope
 from flybystab.core.numerics.jit import inlined, kernel
 from flybystab.core.numerics.tensors import determinant, multiply, pack, unpack
@@ -82,17 +83,17 @@ def parameters(
     a0 = np.cbrt(axes[0] * axes[1] * axes[2])
     rate2 = np.pi * G * rho
     par = np.zeros(state.N_PARAMETERS)
-    par[state.SURFACE] = surface
-    par[state.SIN_PHI] = np.sin(phi)
-    par[state.COS_PHI] = np.cos(phi)
-    par[state.BETA] = dilatancy * least_slope(surface, np.sin(phi))
+    par[material.SURFACE] = surface
+    par[material.SIN_PHI] = np.sin(phi)
+    par[material.COS_PHI] = np.cos(phi)
+    par[material.BETA] = dilatancy * least_slope(surface, np.sin(phi))
     # Associative flow on a slope k(theta) is the true normal; less dilatant flow goes along the stress deviator.
     if dilatancy >= 1.0 and not is_circular(surface):
-        par[state.NORMAL] = 1.0
-        par[state.BETA] = 1.0
-    par[state.COHESION] = 5.0 * cohesion / (rho * a0 * a0 * rate2)
-    par[state.VISCOSITY] = 10.0 * viscosity / (rho * a0 * a0 * np.sqrt(rate2))
-    par[state.EXPANSION] = expansion
+        par[material.NORMAL] = 1.0
+        par[material.BETA] = 1.0
+    par[material.COHESION] = 5.0 * cohesion / (rho * a0 * a0 * rate2)
+    par[material.VISCOSITY] = 10.0 * viscosity / (rho * a0 * a0 * np.sqrt(rate2))
+    par[material.EXPANSION] = expansion
     motion.set_rigid_shape((axes[0] / a0) ** 2, (axes[1] / a0) ** 2, (axes[2] / a0) ** 2, par)
     return par
 

@@ -6,7 +6,7 @@ initial density, stress in the form ``T = 5 sigma/rho``. Then ``det S = (V/V0)^2
 RIGID, 7 numbers: unit quaternion (body axes -> fixed frame, scalar first), ``omega`` along the body axes.
 Every other regime, 15 numbers, fixed frame: ``S`` (6 components), ``D = sym L`` (6), ``w``: ``W x = w x x``.
 
-The parameters of a run are one flat array, see ``SURFACE`` and the constants below it.
+The parameters of a run are one flat array, see the slots below and in :mod:`flybystab.core.material.parameters`.
 """
 
 from __future__ import annotations
@@ -29,30 +29,14 @@ FLUID = code(3)
 N_RIGID = code(7)
 N_FULL = code(15)
 
-# Slots of the parameter array.
-SURFACE = 0  # code of the yield surface
-SIN_PHI = 1
-COS_PHI = 2
-BETA = 3  # dilatancy beta (not beta over k); 1 where NORMAL is on
-COHESION = 4  # 5 Y/rho0 in units of a0^2 pi G rho0
-VISCOSITY = 5  # 5 (2 mu)/rho0 in units of a0^2 sqrt(pi G rho0), FLUID only
-EXPANSION = 6  # V/V0 at which dilation has ended
+# Slots of the parameter array beside those of the material (:mod:`flybystab.core.material.parameters`).
 S1 = 7  # squared semi-axes of the rigid body, and its gravity K_g,i
 S2 = 8
 S3 = 9
 G1 = 10
 G2 = 11
 G3 = 12
-NORMAL = 13  # 1: associative flow on a slope k(theta), the true normal; 0: D along the stress deviator
-PART = 14  # which part of the yield section the stress is on, see the codes below
-BESIDE = 15  # angle past the normal of a Mohr-Coulomb face, rad, up to which a corner keeps the stress
 N_PARAMETERS = 16
-
-# Where the stress is on the hexagon of Mohr-Coulomb in associative flow; SMOOTH on any other section.
-SMOOTH = code(0)
-EXTENSION_CORNER = code(1)
-COMPRESSION_CORNER = code(2)
-FACE = code(3)
 
 # Matrices of `Buffers.m` that `field` fills and the rates read.
 W_SINV = 0

@@ -6,7 +6,7 @@ The stress deviator over ``p sin(phi) + c cos(phi)`` is an isotropic function of
 
 from __future__ import annotations
 
-from flybystab.core.dynamics.state import (
+from flybystab.core.material.parameters import (
     BETA,
     COMPRESSION_CORNER,
     EXPANSION,
