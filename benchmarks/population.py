@@ -1,7 +1,7 @@
 """Encounter rates of the known near-Earth asteroids, against counts and published figures; and what encounters do.
 
-Usage: ``python benchmarks/population.py counts|verdicts``. The MPC catalogue and CNEOS's list of close approaches are
-read from ``../shared/data`` (or ``FLYBYSTAB_SHARED``).
+Usage: ``python benchmarks/population.py counts|published|nbody|verdicts|convergence|scale|binaries``. The MPC catalogue
+and CNEOS's list of close approaches are read from ``../shared/data`` (or ``FLYBYSTAB_SHARED``).
 """
 
 import argparse
@@ -93,7 +93,192 @@ def verdicts():
     print(f"{len(rates.samples)} sampled encounters in {wall:.0f} s")
 
 
+def published():
+    """Rates of the known asteroids beside published figures of the whole population."""
+    orbits, h = catalogue()
+    kilometre = orbits[h < 17.75]
+    # H of a diameter of 420 m at an albedo of 0.14; the catalogue is nearly complete there.
+    limit = 5.0 * np.log10(1329.0 / (0.42 * np.sqrt(0.14)))
+    large = orbits[h < limit]
+    planets = {name: fs.encounter_rates(kilometre, name) for name in ("earth", "venus")}
+    deep = fs.encounter_rates(large, "earth", 5.96 * fs.R_earth).total.value
+    impact = 1e-6 / planets["earth"].total.value
+    lines = [
+        (f"Earth impacts of H < 17.75 ({len(kilometre)} known), one in (Myr)", "0.5-0.7", impact),
+        (
+            f"Earth passages of NEAs > 420 m ({len(large)} known) in 5.96 R_E, one in (kyr)",
+            "7-8.2",
+            1e-3 / deep,
+        ),
+    ]
+    passages = 0.0
+    for name, rates in planets.items():
+        near = rates.within(10 * rates.planet.radius * u.m).total.value / len(kilometre)
+        passages += near
+        lines.append(
+            (
+                f"{name.capitalize()} passages of one NEA within 10 radii, one in (Myr)",
+                "about 10",
+                1e-6 / near,
+            )
+        )
+    lines.append(("either of the two, one in (Myr)", "5", 1e-6 / passages))
+    print(f"{'figure':75s} {'published':>9s} {'known asteroids':>16s}")
+    for name, figure, value in lines:
+        print(f"{name:75s} {figure:>9s} {value:16.2f}")
+
+
+def nbody(years=3000.0, particles=200, within=0.1):
+    """Passages counted in an N-body integration of known asteroids, and expected from their changing orbits."""
+    import rebound
+
+    orbits, h = catalogue()
+    rows = read("nea_mpc_2026-02.csv.gz")
+    rng = np.random.default_rng(3)
+    near = np.flatnonzero((h < 17.75) & (orbits["a"].value * (1 - orbits["e"]) < 1.0))
+    chosen = rng.choice(near, particles, replace=False)
+    sim = rebound.Simulation()
+    sim.units = ("day", "AU", "Msun")
+    sim.add(m=1.0)
+    names = ("mercury", "venus", "earth", "mars", "jupiter", "saturn", "uranus", "neptune")
+    from flybystab.orbit.elements import GM_SUN
+    from flybystab.orbit.planets import planet
+    from flybystab.population.mean_orbits import MEAN_ORBITS
+
+    for name in names:
+        a, e, inc = MEAN_ORBITS[name]
+        angles = rng.uniform(0, 2 * np.pi, 3)
+        sim.add(
+            m=planet(name).gm / GM_SUN,
+            a=a,
+            e=e,
+            inc=np.radians(inc),
+            Omega=angles[0],
+            omega=angles[1],
+            M=angles[2],
+        )
+    for k in chosen:
+        elements = orbits[k]
+        angles = [np.radians(float(rows[k][key])) for key in ("node_deg", "peri_deg", "M_deg")]
+        sim.add(
+            a=elements["a"].value, e=elements["e"], inc=elements["i"].to_value(u.rad), Omega=angles[0],
+            omega=angles[1], M=angles[2],
+        )  # fmt: skip
+    sim.N_active = len(names) + 1
+    sim.move_to_com()
+    sim.integrator, sim.dt = "whfast", 3.0
+    watched = {"venus": 2, "earth": 3, "mars": 4}
+    counts = dict.fromkeys(watched, 0)
+    expected = dict.fromkeys(watched, 0.0)
+    steps, every = int(years * 365.25 / sim.dt), 10_000
+    xyz = np.empty((sim.N, 3))
+
+    def positions():
+        sim.serialize_particle_data(xyz=xyz)
+        return {name: xyz[len(names) + 1 :] - xyz[k] for name, k in watched.items()}
+
+    start = time.perf_counter()
+    before = {k: v.copy() for k, v in positions().items()}
+    for step in range(steps):
+        if step % every == 0:
+            sun = sim.particles[0]
+            orbits_now = [p.orbit(primary=sun) for p in sim.particles[len(names) + 1 :]]
+            found = np.array([(o.a, o.e, np.degrees(o.inc)) for o in orbits_now])
+            table = QTable(found[(found[:, 1] < 1.0) & (found[:, 0] > 0.0)], names=("a", "e", "i"))
+            span = min(every, steps - step) * sim.dt / 365.25
+            for name, k in watched.items():
+                o = sim.particles[k].orbit(primary=sun)
+                orbit = (o.a * u.au, o.e, o.inc * u.rad)
+                expected[name] += (
+                    fs.encounter_rates(table, name, within * u.au, planet_orbit=orbit).total.value * span
+                )
+        sim.steps(1)
+        now = positions()
+        for name, d1 in now.items():
+            d0 = before[name]
+            change = d1 - d0
+            s = -np.sum(d0 * change, axis=1) / np.sum(change * change, axis=1)
+            least = d0 + s[:, None] * change
+            counts[name] += int(np.sum((s > 0) & (s <= 1) & (np.sum(least * least, axis=1) < within**2)))
+            before[name] = d1.copy()
+    wall = time.perf_counter() - start
+    print(
+        f"{particles} known asteroids (H < 17.75, q < 1 au) with the planets, {years:g} years by WHFast: {wall:.0f} s"
+    )
+    print(f"planet  passages within {within:g} au: counted  expected  ratio  (1 sigma of counting)")
+    for name in watched:
+        n, m = counts[name], expected[name]
+        print(f"{name:8s} {n:31d}  {m:8.0f}  {n / m:5.3f}  ({1 / np.sqrt(m):.3f})")
+
+
+def convergence():
+    """Rates of the Earth against the number of samples; each row with another seed."""
+    orbits, h = catalogue()
+    large = orbits[h < 17.75]
+    print("samples   RESHAPED (1/Myr)  +- sampling   BEYOND MODEL (1/Myr)  +- sampling   time (s)")
+    for k, samples in enumerate((100, 400, 1600, 6400)):
+        start = time.perf_counter()
+        rates = fs.disruption_rates(large, ["earth"], samples=samples, seed=20 + k)
+        wall = time.perf_counter() - start
+        cells = []
+        for verdict in ("RESHAPED", "BEYOND MODEL"):
+            row = rates.table[rates.table["verdict"] == verdict][0]
+            cells += [1e6 * row["rate"].to_value(1 / u.yr), 1e6 * row["rate_error"].to_value(1 / u.yr)]
+        print(
+            f"{samples:7d} {cells[0]:18.3f} {cells[1]:12.3f} {cells[2]:22.3f} {cells[3]:12.3f} {wall:10.1f}"
+        )
+
+
+def scale():
+    """Time and memory of 1e5 orbits, five planets and 1,000 samples each."""
+    import resource
+
+    rng = np.random.default_rng(0)
+    n = 100_000
+    orbits = QTable(
+        {
+            "a": rng.uniform(0.6, 3.5, n) * u.au,
+            "e": rng.uniform(0.1, 0.9, n),
+            "i": rng.rayleigh(12, n) * u.deg,
+        }
+    )
+    start = time.perf_counter()
+    for name in ("mercury", "venus", "earth", "mars", "jupiter"):
+        fs.encounter_rates(orbits, name)
+    middle = time.perf_counter()
+    planets = ("mercury", "venus", "earth", "mars", "jupiter")
+    rates = fs.disruption_rates(orbits, planets, samples=1000, seed=1)
+    end = time.perf_counter()
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f"{n} orbits x {len(planets)} planets: encounter rates {middle - start:.1f} s")
+    print(
+        f"with verdicts of {len(rates.samples)} sampled encounters: {end - middle:.0f} s, peak memory {peak:.0f} MB"
+    )
+
+
+def binaries():
+    """Fate of binaries like 1991 VH by periapsis distance at the Earth, 10 km/s: fractions over 200 phases."""
+    print(
+        "1991 VH: primary of 1.2 km diameter and 1700 kg/m3, mass ratio 0.06, a = 3.26 km, e = 0.05; v_inf 10 km/s"
+    )
+    primary = fs.Body([600, 600, 600] * u.m, 1700 * u.kg / u.m**3, 2.62 * u.h)
+    print("q (R_E)  bound  escape  collision  median e of the bound  sigma of a (relative)")
+    for q in (2, 3, 4, 6, 8, 10, 15, 20, 30, 60):
+        passage = fs.Encounter.hyperbolic(
+            "earth", q * fs.R_earth, 10 * u.km / u.s, start_distance=200 * fs.R_earth
+        )
+        out = fs.binary_flyby(
+            primary, passage, 3.26 * u.km, mass_ratio=0.06, eccentricity=0.05, samples=200, seed=1
+        )
+        bound = out.fate == "bound"
+        e = np.median(out.eccentricity[bound]) if bound.any() else np.nan
+        change = np.std(out.semi_major_axis[bound].to_value(u.km) / 3.26) if bound.any() else np.nan
+        shares = [out.probability(f) for f in ("bound", "escape", "collision")]
+        print(f"{q:7d} {shares[0]:6.3f} {shares[1]:7.3f} {shares[2]:10.3f} {e:22.3f} {change:22.3f}")
+
+
 if __name__ == "__main__":
+    commands = (counts, published, nbody, verdicts, convergence, scale, binaries)
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("what", choices=["counts", "verdicts"])
-    {"counts": counts, "verdicts": verdicts}[parser.parse_args().what]()
+    parser.add_argument("what", choices=[c.__name__ for c in commands])
+    {c.__name__: c for c in commands}[parser.parse_args().what]()

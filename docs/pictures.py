@@ -15,6 +15,7 @@ from matplotlib.figure import Figure
 import flybystab as fs
 from flybystab.cli.main import main
 from flybystab.plots.outcome_map import outcome_map, outcome_plot, target_map, target_plot
+from flybystab.plots.population import population_figure
 from flybystab.plots.scene import animation, scene_plot
 
 DOCS = Path(__file__).resolve().parent
@@ -60,3 +61,8 @@ for script, picture in (
 sys.argv = ["shape_slopes.py", str(IMAGES / "shape_slopes.png")]
 runpy.run_path(str(DOCS.parent / "examples" / "shape_slopes.py"))
 print(IMAGES / "shape_slopes.png")
+
+orbits = fs.known_population()
+planets = ("mercury", "venus", "earth", "mars")
+verdicts = fs.disruption_rates(orbits, planets, diameter=None, samples=2400, seed=1)
+save("population.png", population_figure(verdicts, [fs.encounter_rates(orbits, name) for name in planets]))

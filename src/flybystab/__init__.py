@@ -28,6 +28,7 @@ _HOME = {
     "R_earth": "units",
     "Shape": "body.shape",
     "Verdict": "flybys.verdict",
+    "binary_flyby": "flybys.binary",
     "catalogue": "catalogues.catalogue",
     "encounter_distribution": "encounter.distribution",
     "cite": "io.citation",
@@ -39,6 +40,7 @@ _HOME = {
     "flyby_many": "flybys.flyby_many",
     "flyby_margin": "flybys.margin",
     "infer": "screening.inference",
+    "known_population": "population.model_population",
     "periapsis_axes": "encounter.attitude",
     "read_population": "population.model_population",
     "recovery": "body.recovery",
@@ -63,6 +65,7 @@ if TYPE_CHECKING:
     from flybystab.encounter.distribution import encounter_distribution
     from flybystab.encounter.encounter import Encounter
     from flybystab.errors import FlybystabError
+    from flybystab.flybys.binary import binary_flyby
     from flybystab.flybys.flyby import flyby
     from flybystab.flybys.flyby_many import flyby_many
     from flybystab.flybys.margin import flyby_margin
@@ -75,7 +78,7 @@ if TYPE_CHECKING:
     from flybystab.orbit.orbit import Orbit
     from flybystab.orbit.search.encounter_finder import find_encounters
     from flybystab.population.disruption import disruption_rates
-    from flybystab.population.model_population import read_population
+    from flybystab.population.model_population import known_population, read_population
     from flybystab.population.rates import encounter_rates
     from flybystab.screening.inference import infer
     from flybystab.screening.screening import screen

@@ -145,3 +145,24 @@ def test_weights_multiply_rates():
     table["weight"] = [-1.0, 1.0]
     with pytest.raises(InvalidInput, match="zero or more"):
         fs.encounter_rates(table, "earth")
+
+
+def test_the_known_asteroids_are_those_of_the_mpc(shared):
+    """All of H < 17.75; impacts on the Earth one in 0.5 to 0.7 Myr (published), the known ones one in 0.79 Myr."""
+    import csv
+
+    known = fs.known_population()
+    with gzip.open(shared / "nea_mpc_2026-02.csv.gz", "rt") as file:
+        rows = [r for r in csv.DictReader(file) if r["H"] and float(r["H"]) < 17.75]
+    assert len(known) == len(rows) == 875
+    assert set(known["designation"]) == {r["number"] or r["principal_desig"] for r in rows}
+    interval = 1e-6 / fs.encounter_rates(known, "earth").total.value
+    assert interval == pytest.approx(0.785, abs=0.005)
+
+
+def test_the_limit_of_the_known_asteroids_is_checked():
+    assert len(fs.known_population(20)) == 4783
+    with pytest.raises(InvalidInput, match="at most 20"):
+        fs.known_population(22.0)
+    with pytest.raises(InvalidInput, match="largest asteroid"):
+        fs.known_population(5.0)

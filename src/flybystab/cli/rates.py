@@ -22,7 +22,14 @@ def arguments(sub: argparse.ArgumentParser) -> None:
         "file",
         nargs="?",
         help="catalogue, table with columns a, e, i (and H, weight) of a model population, or law (.toml); "
-        "default: the embedded catalogue",
+        "default: the known near-Earth asteroids brighter than --limit",
+    )
+    sub.add_argument(
+        "--limit",
+        type=float,
+        default=17.75,
+        metavar="H",
+        help="faintest known asteroid, without FILE (17.75: 1 km)",
     )
     sub.add_argument(
         "--columns",
@@ -63,7 +70,7 @@ def run(options: argparse.Namespace) -> None:
 
     orbits = elements_table(_orbits(options))
     planets = options.planet or list(PLANETS)
-    source = options.file or "embedded catalogue"
+    source = options.file or f"known near-Earth asteroids of H < {options.limit:g}"
     if options.verdicts:
         rows, lines, count = _verdicts(options, orbits, planets)
         size = "sizes from H" if options.diameter == "H" else f"bodies of {options.diameter} km"
@@ -186,13 +193,13 @@ def _interval(rate: float) -> str:
 
 
 def _orbits(options: argparse.Namespace) -> Any:
-    """Orbits of a file: a population (table or law), or any catalogue; the embedded catalogue without a file."""
+    """Orbits of a file: a population (table or law), or any catalogue; the known asteroids without a file."""
     from flybystab.catalogues.catalogue import catalogue
-    from flybystab.population.model_population import is_population, read_population
+    from flybystab.population.model_population import is_population, known_population, read_population
 
-    columns = None if options.columns is None else [c.strip() for c in options.columns.split(",")]
     if options.file is None:
-        return catalogue()
+        return known_population(options.limit)
+    columns = None if options.columns is None else [c.strip() for c in options.columns.split(",")]
     if columns is not None or is_population(options.file):
         return read_population(options.file, columns=columns, seed=options.seed)
     return catalogue(options.file)

@@ -83,6 +83,8 @@ def verdict_plot(axes: Any, result: DisruptionRates) -> Any:
     axes.set(ylabel="rate in the population (1/Myr)", yscale="log" if shown else "linear")
     axes.set_title("Verdicts by planet", fontsize=9)
     if shown:
+        least = min(bar.get_height() for bar in axes.patches if bar.get_height() > 0.0)
+        axes.set_ylim(bottom=0.3 * least)
         axes.legend(frameon=False, fontsize=8)
     return axes
 

@@ -1,4 +1,4 @@
-"""Populations of orbits from files: a debiased model as a table, or a law in TOML.
+"""Populations of orbits: the known asteroids, a debiased model as a table, or a law in TOML.
 
 Three kinds of text are read:
 
@@ -23,6 +23,7 @@ A law in TOML gives a distribution of each element::
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from importlib import resources
 from io import StringIO
 from pathlib import Path
 from typing import Any
@@ -47,6 +48,8 @@ NAMES = {
 }
 #: Columns of the realisation of Granvik et al. (2018).
 GRANVIK = ("a", "e", "i", "node", "argument_of_perihelion", "mean_anomaly", "H")
+#: Absolute magnitude of a diameter of 1 km at an albedo of 0.14.
+KILOMETRE = 17.75
 #: Longest rejection sampling of a law: draws per accepted orbit.
 _TRIES = 1000
 
@@ -82,6 +85,39 @@ def read_population(path: str | Path, *, columns: Sequence[str] | None = None, s
     else:
         table = _unnamed(text, path, columns)
     table.meta["source"] = str(path)
+    return table
+
+
+def known_population(limit: float = KILOMETRE) -> QTable:
+    """Orbits of the known near-Earth asteroids brighter than an absolute magnitude (MPC, February 2026).
+
+    Parameters
+    ----------
+    limit : float
+        Largest ``H``, at most 20 (about 350 m at an albedo of 0.14). By default 17.75 (1 km), to which the known
+        asteroids are nearly complete.
+
+    Returns
+    -------
+    QTable
+        ``designation`` (number, or principal designation), ``a`` (au), ``e``, ``i`` (deg), ``H``.
+
+    Raises
+    ------
+    InvalidInput
+    """
+    faintest = 20.0
+    if isinstance(limit, bool) or not isinstance(limit, int | float | np.number) or not limit <= faintest:
+        raise InvalidInput("limit", limit, f"an absolute magnitude of at most {faintest:g}")
+    text = resources.files("flybystab.data").joinpath("orbits.csv").read_text(encoding="utf-8")
+    rows = [line.split(",") for line in text.splitlines()[1:]]
+    rows = [row for row in rows if float(row[4]) < limit]
+    if not rows:
+        raise InvalidInput("limit", limit, "a magnitude fainter than that of the largest asteroid, 9.2")
+    names, *columns = zip(*rows, strict=True)
+    a, e, i, h = (np.array(column, dtype=float) for column in columns)
+    table = QTable({"designation": list(names), "a": a * u.au, "e": e, "i": i * u.deg, "H": h})
+    table.meta["source"] = f"known near-Earth asteroids of H < {limit:g} (MPC, February 2026)"
     return table
 
 

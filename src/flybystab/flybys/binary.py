@@ -1,0 +1,243 @@
+"""Binary asteroids in encounters: change of the mutual orbit, escape and collision of the companion.
+
+Primary and companion are point masses. Their separation ``d`` obeys
+
+    d'' = -G (m1 + m2) d/|d|^3 + K(t) d,
+
+``K`` the tidal tensor of the encounter (planets, Moon, Sun and J2, as for the body). Terms of the next order are
+smaller by ``|d|/R``, ``R`` the distance from the planet: 1e-4 for kilometres at some planetary radii. The oblateness of
+the primary and the rotation of the companion are left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import astropy.units as u
+import numpy as np
+from astropy.units import Quantity
+from numpy.typing import NDArray
+from scipy.integrate import DOP853
+
+from flybystab.body.body import Body
+from flybystab.constants import G
+from flybystab.core.ellipsoid.tide import tensor, tide_at
+from flybystab.encounter.encounter import Encounter
+from flybystab.errors import InvalidInput, NotConverged
+from flybystab.tabular import Tabular
+from flybystab.typing import Array
+from flybystab.units import counted, to_si, whole
+
+BOUND, ESCAPE, COLLISION = "bound", "escape", "collision"
+#: Points of a step at which the distance of the two is checked against contact.
+_CHECKS = np.linspace(0.1, 1.0, 10)
+_MAX_STEPS = 100_000
+#: Relative tolerance of a step.
+_TOLERANCE = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class BinarySample(Tabular):
+    """Mutual orbits of a binary after an encounter; arrays over the sampled phases and orientations.
+
+    Attributes
+    ----------
+    semi_major_axis : Quantity (n,)
+        Negative for hyperbolic orbits, nan after a collision.
+    eccentricity : ndarray (n,)
+    plane_change : Quantity (n,)
+        Angle between the orbital angular momenta before and after.
+    closest : Quantity (n,)
+        Least distance of the two during the encounter.
+    fate : ndarray of str (n,)
+        ``bound``, ``escape`` or ``collision``.
+    tide_at_start : float
+        Tide at the start of the encounter over ``G (m1 + m2)/a^3``: what is left out of the time before.
+    seed : int
+    """
+
+    semi_major_axis: Quantity
+    eccentricity: Array
+    plane_change: Quantity
+    closest: Quantity
+    fate: NDArray[np.str_]
+    tide_at_start: float
+    seed: int
+
+    def __len__(self) -> int:
+        return len(self.fate)
+
+    def probability(self, fate: str) -> float:
+        """Fraction of the sample with a fate."""
+        if fate not in (BOUND, ESCAPE, COLLISION):
+            raise InvalidInput("fate", fate, f"one of {BOUND}, {ESCAPE}, {COLLISION}")
+        return float(np.mean(self.fate == fate))
+
+    def __repr__(self) -> str:
+        return f"<BinarySample {len(self)} phases: {counted(self.fate)}>"
+
+
+def binary_flyby(
+    primary: Body,
+    encounter: Encounter,
+    semi_major_axis: Quantity,
+    *,
+    mass_ratio: float = 0.01,
+    eccentricity: float = 0.0,
+    normal: Quantity | Array | None = None,
+    samples: int = 64,
+    seed: int = 0,
+) -> BinarySample:
+    """Carry the companion of a binary through an encounter, at random phases.
+
+    Parameters
+    ----------
+    primary : Body
+        Its mass, and its mean radius for contact.
+    encounter : Encounter
+        One whose path clears the planet. For wide binaries choose a large ``start_distance``:
+        :attr:`BinarySample.tide_at_start` says what the time before would add.
+    semi_major_axis, eccentricity
+        Of the mutual orbit before the encounter.
+    mass_ratio : float
+        Mass of the companion over that of the primary; it has the density of the primary.
+    normal : array_like (3,), optional
+        Direction of the orbital angular momentum in the frame of the encounter; isotropic by default.
+    samples, seed : int
+        Number of phases (and orientations), and seed.
+
+    Returns
+    -------
+    BinarySample
+
+    Raises
+    ------
+    InvalidInput, UnitMismatch, NotConverged
+    """
+    if not isinstance(primary, Body):
+        raise InvalidInput("primary", primary, "a flybystab.Body")
+    if not isinstance(encounter, Encounter) or encounter.impact:
+        raise InvalidInput("encounter", encounter, "a flybystab.Encounter whose path clears the planet")
+    a = to_si(semi_major_axis, u.m, "semi_major_axis", low=0.0, open_low=True)
+    ratio = to_si(mass_ratio, u.dimensionless_unscaled, "mass_ratio", low=0.0, high=1.0)
+    e = to_si(eccentricity, u.dimensionless_unscaled, "eccentricity", low=0.0, high=1.0, open_high=True)
+    n = whole(samples, "samples", 1)
+    mass = float(primary.mass.to_value(u.kg)) * (1.0 + ratio)
+    contact = float(primary.mean_radius.to_value(u.m)) * (1.0 + np.cbrt(ratio))
+    if a * (1.0 - e) <= contact:
+        raise InvalidInput(
+            "semi_major_axis", semi_major_axis, f"a mutual orbit clear of contact at {contact:.4g} m"
+        )
+    rng = np.random.default_rng(whole(seed, "seed", 0))
+    frames = _frames(normal, n, rng)
+    mean_anomaly = 2.0 * np.pi * rng.random(n)
+    # Units of the mutual orbit: length a, time sqrt(a^3/G m).
+    unit = np.sqrt(a**3 / (G * mass))
+    state = _states(e, mean_anomaly, frames)
+    before = np.cross(state[:, :3], state[:, 3:])
+    state, closest, collided = _carried(state, encounter, unit, contact / a)
+    x, v = state[:, :3], state[:, 3:]
+    after = np.cross(x, v)
+    r = np.linalg.norm(x, axis=1)
+    energy = 0.5 * np.sum(v * v, axis=1) - 1.0 / r
+    vector = np.cross(v, after) - x / r[:, None]
+    fate = np.where(collided, COLLISION, np.where(energy < 0.0, BOUND, ESCAPE))
+    cosine = np.sum(before * after, axis=1) / (np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1))
+    lost = np.where(collided, np.nan, 1.0)
+    return BinarySample(
+        semi_major_axis=-0.5 / energy * a * lost * u.m,
+        eccentricity=np.linalg.norm(vector, axis=1) * lost,
+        plane_change=np.rad2deg(np.arccos(np.clip(cosine, -1.0, 1.0))) * lost * u.deg,
+        closest=closest * a * u.m,
+        fate=fate,
+        tide_at_start=float(np.linalg.norm(_tide(encounter, encounter.t_start)) * unit**2),
+        seed=int(seed),
+    )
+
+
+def _tide(encounter: Encounter, t: float) -> Array:
+    """Tidal tensor (3, 3), 1/s2."""
+    six = np.empty(6)
+    panels = encounter.tide
+    tide_at(panels.tau, panels.start, panels.width, panels.coefficients, t, six)
+    return tensor(six)
+
+
+def _frames(normal: Quantity | Array | None, n: int, rng: np.random.Generator) -> Array:
+    """Axes (towards pericentre, along the motion there, normal) as columns, ``(n, 3, 3)``; pericentre at random."""
+    if normal is None:
+        z = rng.normal(size=(n, 3))
+    else:
+        try:
+            z = np.tile(np.asarray(normal, dtype=float).reshape(3), (n, 1))
+        except (TypeError, ValueError):
+            raise InvalidInput("normal", normal, "a direction, three numbers") from None
+    size = np.linalg.norm(z, axis=1)
+    if not (np.isfinite(size) & (size > 0.0)).all():
+        raise InvalidInput("normal", normal, "a direction, not all zero")
+    z = z / size[:, None]
+    x = rng.normal(size=(n, 3))
+    x -= np.sum(x * z, axis=1)[:, None] * z
+    x /= np.linalg.norm(x, axis=1)[:, None]
+    return np.stack([x, np.cross(z, x), z], axis=2)
+
+
+def _states(e: float, mean_anomaly: Array, frames: Array) -> Array:
+    """Positions and velocities ``(n, 6)`` of orbits with ``a = G m = 1``."""
+    anomaly = mean_anomaly + e * np.sin(mean_anomaly)
+    for _ in range(50):  # Newton; for e close to one the first steps are long
+        step = (anomaly - e * np.sin(anomaly) - mean_anomaly) / (1.0 - e * np.cos(anomaly))
+        anomaly = anomaly - np.clip(step, -1.0, 1.0)
+    b = np.sqrt(1.0 - e * e)
+    r = 1.0 - e * np.cos(anomaly)
+    position = np.column_stack([np.cos(anomaly) - e, b * np.sin(anomaly)])
+    velocity = np.column_stack([-np.sin(anomaly), b * np.cos(anomaly)]) / r[:, None]
+    plane = frames[:, :, :2]
+    return np.concatenate(
+        [np.einsum("nij,nj->ni", plane, position), np.einsum("nij,nj->ni", plane, velocity)], axis=1
+    )
+
+
+def _carried(
+    state: Array, encounter: Encounter, unit: float, contact: float
+) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Integrate all members together; returns states at the end, least distances, and which of them touched.
+
+    A member that touches stays where it is: the others go on from there.
+    """
+    n = len(state)
+    moving = np.ones(n, dtype=bool)
+    closest = np.linalg.norm(state[:, :3], axis=1)
+    t, stop = encounter.t_start / unit, encounter.t_stop / unit
+    scale = unit**2
+
+    def rates(time: float, flat: Array) -> Array:
+        y = flat.reshape(n, 6)
+        x = y[:, :3]
+        out = np.empty_like(y)
+        out[:, :3] = y[:, 3:]
+        r2 = np.sum(x * x, axis=1)
+        out[:, 3:] = -x / (r2 * np.sqrt(r2))[:, None] + x @ (_tide(encounter, time * unit) * scale)
+        out[~moving] = 0.0
+        return out.ravel()
+
+    y = state.ravel()
+    steps = 0
+    while t < stop and moving.any():
+        solver = DOP853(rates, t, y, stop, rtol=_TOLERANCE, atol=1e-3 * _TOLERANCE)
+        touched = False
+        while solver.status == "running" and not touched:
+            message = solver.step()
+            steps += 1
+            if solver.status == "failed" or steps > _MAX_STEPS:
+                raise NotConverged(f"mutual orbit of the binary: {message or 'too many steps'}")
+            dense = solver.dense_output()
+            times = solver.t_old + _CHECKS * (solver.t - solver.t_old)
+            distance = np.linalg.norm(dense(times).reshape(n, 6, -1)[:, :3], axis=1)
+            closest[moving] = np.minimum(closest[moving], distance.min(axis=1)[moving])
+            now = moving & (distance.min(axis=1) <= contact)
+            if now.any():
+                moving &= ~now
+                touched = True
+        t, y = solver.t, solver.y
+    return y.reshape(n, 6), closest, ~moving
