@@ -28,6 +28,7 @@ _HOME = {
     "R_earth": "units",
     "Shape": "body.shape",
     "Verdict": "flybys.verdict",
+    "atlas": "io.atlas",
     "binary_flyby": "flybys.binary",
     "catalogue": "catalogues.catalogue",
     "encounter_distribution": "encounter.distribution",
@@ -74,6 +75,7 @@ if TYPE_CHECKING:
     from flybystab.flybys.surface_change import surface_change
     from flybystab.flybys.survival import survival
     from flybystab.flybys.verdict import Verdict
+    from flybystab.io.atlas import atlas
     from flybystab.io.citation import cite
     from flybystab.orbit.orbit import Orbit
     from flybystab.orbit.search.encounter_finder import find_encounters

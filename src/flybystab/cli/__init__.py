@@ -11,6 +11,7 @@ import argparse
 from typing import Protocol
 
 from flybystab.cli import (
+    atlas,
     bench,
     cite,
     completion,
@@ -52,6 +53,7 @@ COMMANDS: dict[str, Command] = {
     "figure": figure,
     "screen": screen,
     "show": show,
+    "atlas": atlas,
     "infer": infer,
     "rates": rates,
     "bench": bench,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+from typing import TYPE_CHECKING
 
 from flybystab.cli.common import (
     check_computed,
@@ -15,12 +16,33 @@ from flybystab.cli.common import (
     tdb,
 )
 
+if TYPE_CHECKING:
+    from pathlib import Path
+
 HELP = "fly a whole catalogue through its encounters"
 EXAMPLE = "flybystab screen --from 2026-01-01 --to 2036-01-01 --samples 100 --jobs 2"
 
 
 def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
+    study_arguments(sub)
+    sub.add_argument(
+        "--population-default", action="store_true", help="print the default priors as TOML and exit"
+    )
+    sub.add_argument(
+        "--output",
+        default="screening.ecsv",
+        metavar="FILE",
+        help="output table, .ecsv or .parquet (screening.ecsv)",
+    )
+    sub.add_argument(
+        "--overwrite", action="store_true", help="replace finished tables (not needed to resume a run)"
+    )
+    sub.add_argument("--samples-output", metavar="FILE", help="table of all samples, .ecsv or .parquet")
+
+
+def study_arguments(sub: argparse.ArgumentParser) -> None:
+    """Add the arguments of a screening without those of its output."""
     sub.add_argument(
         "asteroids",
         nargs="*",
@@ -42,37 +64,17 @@ def arguments(sub: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="priors of the uncertain inputs, TOML; omitted ones keep their defaults",
     )
-    sub.add_argument(
-        "--population-default", action="store_true", help="print the default priors as TOML and exit"
-    )
     sub.add_argument("--jobs", type=int, default=1, metavar="N", help="number of processes (1)")
     sub.add_argument("--dask", metavar="ADDRESS", help="dask scheduler to use instead of processes")
-    sub.add_argument(
-        "--output",
-        default="screening.ecsv",
-        metavar="FILE",
-        help="output table, .ecsv or .parquet (screening.ecsv)",
-    )
-    sub.add_argument(
-        "--overwrite", action="store_true", help="replace finished tables (not needed to resume a run)"
-    )
-    sub.add_argument("--samples-output", metavar="FILE", help="table of all samples, .ecsv or .parquet")
 
 
 def run(options: argparse.Namespace) -> None:
     """Execute the command."""
     from pathlib import Path
 
-    import astropy.units as u
-
     from flybystab.flybys.document import table_document
-    from flybystab.screening.executors import open_executor
     from flybystab.screening.priors import Population
-    from flybystab.screening.progress import ProgressBar
     from flybystab.screening.results import read_results
-    from flybystab.screening.screening import Screening
-    from flybystab.screening.selection import listed
-    from flybystab.screening.settings import settings
     from flybystab.screening.summary import summary
 
     if options.population_default:
@@ -81,6 +83,34 @@ def run(options: argparse.Namespace) -> None:
     check_table(options.output)
     check_table(options.samples_output)
     output = Path(options.output)
+    run_study(options, output, samples_output=options.samples_output, overwrite=options.overwrite)
+    found = summary(output)
+    show(
+        options,
+        lambda: table_document(read_results(output)),
+        lambda: [
+            found.text(),
+            f"table      {output} (flybystab show {output} --output {output.with_suffix('.png')} plots it)",
+        ],
+    )
+    check_computed(found.rows, found.failed, found.errors)
+
+
+def run_study(
+    options: argparse.Namespace, output: Path, *, samples_output: str | None = None, overwrite: bool = False
+) -> None:
+    """Run the screening of the options of :func:`study_arguments` into a table."""
+    from pathlib import Path
+
+    import astropy.units as u
+
+    from flybystab.screening.executors import open_executor
+    from flybystab.screening.priors import Population
+    from flybystab.screening.progress import ProgressBar
+    from flybystab.screening.screening import Screening
+    from flybystab.screening.selection import listed
+    from flybystab.screening.settings import settings
+
     names = [Path(a) if _is_file(a) else a for a in options.asteroids]
     screening = Screening(
         listed(names or None),
@@ -93,7 +123,7 @@ def run(options: argparse.Namespace) -> None:
             seed=options.seed,
             material=material_of(options),
             population=Population.from_file(options.population) if options.population else None,
-            keep_samples=options.samples_output is not None,
+            keep_samples=samples_output is not None,
         ),
     )
     bar = ProgressBar()
@@ -101,8 +131,8 @@ def run(options: argparse.Namespace) -> None:
         with open_executor(options.jobs, options.dask) as executor:
             screening.run(
                 output,
-                samples_output=options.samples_output,
-                overwrite=options.overwrite,
+                samples_output=samples_output,
+                overwrite=overwrite,
                 executor=executor,
                 progress=bar,
             )
@@ -110,16 +140,6 @@ def run(options: argparse.Namespace) -> None:
         bar.end()
         print(f"flybystab: {output} holds the rows so far; the same command resumes the run", file=sys.stderr)
         raise
-    found = summary(output)
-    show(
-        options,
-        lambda: table_document(read_results(output)),
-        lambda: [
-            found.text(),
-            f"table      {output} (flybystab show {output} --output {output.with_suffix('.png')} plots it)",
-        ],
-    )
-    check_computed(found.rows, found.failed, found.errors)
 
 
 def _is_file(word: str) -> bool:
