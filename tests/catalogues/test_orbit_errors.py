@@ -14,7 +14,7 @@ from flybystab.constants import AU, YEAR
 from flybystab.orbit.elements import GM_SUN
 from flybystab.orbit.kepler import two_body
 from flybystab.orbit.orbit import heliocentric, later
-from flybystab.screening.clones import spread
+from flybystab.screening.clones import orbit_sampling
 from flybystab.screening.encounters import Passage
 
 # MPCORB as of February 2026
@@ -133,7 +133,9 @@ def test_an_error_of_the_velocity_alone_has_a_growth():
 
 def test_a_screening_says_what_is_known():
     rock = mpc("Apophis")
-    note = spread(Passage(rock, "earth", Time("2029-04-13 21:46", scale="tdb"), 3.8e7, 5.8e3), 10, 0).note
+    note = orbit_sampling(
+        Passage(rock, "earth", Time("2029-04-13 21:46", scale="tdb"), 3.8e7, 5.8e3), 10, 0
+    ).note
     assert note == "orbit without errors (known only by the digits and U of its elements)"
 
 

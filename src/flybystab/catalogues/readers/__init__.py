@@ -5,9 +5,7 @@ A module of this package registers a function with :func:`reader`; nothing else 
 
 from __future__ import annotations
 
-import csv
 import importlib
-import io
 import pkgutil
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -16,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flybystab.errors import InvalidInput
-from flybystab.files import read_bytes
+from flybystab.files import csv_rows, read_bytes
 
 if TYPE_CHECKING:
     from flybystab.orbit.covariance import Covariance
@@ -96,9 +94,11 @@ def text_of(path: str | Path) -> str:
 
 
 def header_of(text: str) -> Sequence[str]:
-    """Column names of the first line of a CSV text."""
-    first = text.partition("\n")[0]
-    return [c.strip() for c in next(csv.reader([first]), [])]
+    """Column names of the first line of a CSV text; none if it is not a line of CSV."""
+    try:
+        return [c.strip() for c in next(csv_rows(text.partition("\n")[0], "header", "text"), [])]
+    except InvalidInput:
+        return []
 
 
 def rows_of(text: str, file: str) -> list[dict[str, str]]:
@@ -107,13 +107,15 @@ def rows_of(text: str, file: str) -> list[dict[str, str]]:
     Raises
     ------
     InvalidInput
-        A row has another number of cells than the header.
+        A row has another number of cells than the header, a cell is too long, or the quoting is wrong.
     """
-    table = csv.DictReader(io.StringIO(text, newline=""))
-    columns = list(table.fieldnames or [])
+    rows = csv_rows(text, "catalogue file", file)
+    columns = [c.strip() for c in next(rows, [])]
     out = []
-    for line, row in enumerate(table, start=2):
-        if None in row or None in row.values():
+    for line, row in enumerate(rows, start=2):
+        if not row:
+            continue
+        if len(row) != len(columns):
             raise InvalidInput("row", f"line {line} of {file}", f"{len(columns)} cells, as in the header")
-        out.append({k.strip(): v.strip() for k, v in row.items()})
+        out.append({k: v.strip() for k, v in zip(columns, row, strict=True)})
     return out
