@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 from scenes import PILE, earth, material
 
+from flybystab.body.body import Body, Material
 from flybystab.constants import G
 from flybystab.errors import InvalidInput
 from flybystab.flybys import verdict as verdicts
@@ -156,3 +157,14 @@ def test_the_surface_of_an_intact_body_may_slide():
     near = flyby(PILE.with_(material=material(35, cohesion=1 * u.kPa)), earth(1.2)).surface
     assert near.share_lifted > 0.0
     assert near.share_lifted == near.area[near.greatest > 90 * u.deg].sum() / near.area.sum()
+
+
+@pytest.mark.parametrize(("friction", "settled"), [(0.0, False), (5.0, True)])
+def test_a_body_without_friction_never_settles(friction, settled):
+    """Its pulsation has no end: the verdict depends on the instant (q 1.75 to 1.85), and the result says so."""
+    material = Material(friction_angle=friction * u.deg)
+    body = Body([1000, 1000, 1000] * u.m, 5.5 * u.g / u.cm**3, 1e9 * u.h, material=material)
+    result = flyby(body, earth(1.8, 0.0), error=False, max_axis_ratio=1e3)
+    assert result.settled == settled
+    assert ("not determined" in repr(result)) != settled
+    assert result.energy < 0 * u.J  # it cannot disperse

@@ -14,6 +14,8 @@ from astropy.units import Quantity
 
 from flybystab.body.body import Body
 from flybystab.body.surface_slope import SlopeChange
+from flybystab.constants import G
+from flybystab.core.ellipsoid.potential import carlson_fd
 from flybystab.encounter.encounter import Encounter
 from flybystab.flybys.batch import Judged
 from flybystab.flybys.history import FlybyError, History, history_of, measured_error
@@ -21,7 +23,7 @@ from flybystab.flybys.inputs import FlybyInputs, modelled
 from flybystab.flybys.remnant import body_after, final_attitude
 from flybystab.flybys.robustness import Robustness, surface_verdicts
 from flybystab.flybys.surface_change import slopes_on_the_way
-from flybystab.flybys.verdict import Verdict, letter_of
+from flybystab.flybys.verdict import Verdict, letter_of, settled
 from flybystab.flybys.verdict_margins import VerdictMargins, verdict_margins
 from flybystab.typing import Array
 from flybystab.units import brief
@@ -131,6 +133,27 @@ class FlybyResult:
     def body(self) -> Body:
         """The body afterwards, along its own axes. Its ``state`` says whether it is one whole body at rest."""
         return body_after(self.inputs.body, self._run, self.attitude, self._onset is not None)
+
+    @cached_property
+    def energy(self) -> Quantity:
+        """Kinetic energy in the frame of the centre of mass and energy of self-gravity at the end, J.
+
+        A body without dissipation whose energy is negative cannot grow without limit; one whose energy is positive
+        does.
+        """
+        run, mass = self._run, float(self.inputs.body.mass.to_value(u.kg))
+        flow = run.velocity_gradient @ run.shape @ run.velocity_gradient.T
+        gravity = 0.6 * G * mass**2 * float(carlson_fd(*(run.axes**2))[0])
+        return (0.1 * mass * float(np.trace(flow)) - gravity) * u.J
+
+    @cached_property
+    def settled(self) -> bool:
+        """Whether the body is at rest, disperses for good or has left the model when the run ends.
+
+        Otherwise it still flows or is out of contact, with too little energy to disperse: a body without friction
+        pulsates for ever. Its verdict and bound mass fraction are those of one instant of that motion.
+        """
+        return settled(self._run.verdict, self._run.regime, self.energy.value)
 
     @cached_property
     def onset_time(self) -> Quantity | None:
@@ -270,6 +293,8 @@ class FlybyResult:
         own = brief(self.inputs.body.material.friction_angle)
         need = f"mobilises {brief(phi)} of {own}" if np.isfinite(phi) else "no friction keeps it rigid"
         robust = {None: "", True: ", robust", False: ", depends on the yield surface"}[self.robust]
+        if not self.settled:
+            robust += f", not determined: still {self._run.regime} at the end"
         return (
             f"<FlybyResult {self.verdict}{letter}{robust}: {need}, "
             f"bound {self.bound_fraction:.4g}, then {brief(self.semi_axes, u.m)}, "

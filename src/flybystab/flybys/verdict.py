@@ -105,3 +105,9 @@ def letter_of(verdict: Verdict, bound: float) -> str | None:
     """Class of Richardson et al. (1998) of a verdict: M, B or S; None for bodies that lost nothing."""
     found = class_of(bound)
     return found.letter if found.verdict == verdict else None
+
+
+def settled(verdict: Verdict, regime: str, energy: float) -> bool:
+    """Whether a run ended with a body at rest, dispersing for good (`energy` not negative), or outside the model."""
+    left = (Verdict.BEYOND_MODEL, Verdict.IMPACT, Verdict.NOT_IN_EQUILIBRIUM)
+    return regime == "rigid" or verdict in left or energy >= 0.0
