@@ -101,7 +101,7 @@ def stages(count: int = 1000) -> None:
     """
     asteroids = catalogue(DATA / "nea_mpc_2026-02.csv.gz")
     some = [asteroids[i] for i in np.random.default_rng(1).permutation(len(asteroids))[:count]]
-    find_encounters(some[:2], *SPAN, threads=1)
+    find_encounters(some[:2], *SPAN, workers=1)
     print(f"{count} orbits of the MPC, 1950 to 2050, Earth, {LIMIT} au, one thread, processor time")
     print(
         f"{'error (km)':>10} {'tolerance':>9} {'object-years/s':>14} {'passages':>8} {'lost':>5} {'asteroids':>9} "
@@ -110,7 +110,7 @@ def stages(count: int = 1000) -> None:
     truth = None
     for error in (0.1, 1.0, 1e2, 1e4, 1e5):
         used = time.process_time()
-        table = find_encounters(some, *SPAN, within=LIMIT * u.au, error=error * u.km, threads=1)
+        table = find_encounters(some, *SPAN, within=LIMIT * u.au, error=error * u.km, workers=1)
         used = time.process_time() - used
         index, jd, km = np.array(table["index"]), np.array(table["time"].jd), table["distance"].to_value(u.km)
         truth = truth or (index, jd, km)

@@ -99,7 +99,7 @@ def calls():
         "flyby_margin": (fs.flyby_margin, {"body": bodies, "encounter": encounters, "attitude": plain, "dilatancy": [None, 1.0, *NUMBERS]}),
         "find_encounters": (fs.find_encounters, {"objects": s["orbit"] + ODD, **where, "planets": planets,
             "within": quantities(u.au, 0.05, 1e9), "error": quantities(u.km, 0.1), "tolerance": [None, *tolerance],
-            "ephemeris": [None, "de421", "x", 3], "forces": [None, (), ("x",), 3], "threads": count}),
+            "ephemeris": [None, "de421", "x", 3], "forces": [None, (), ("x",), 3], "workers": count}),
         "from_orbit": (fs.Encounter.from_orbit, {"orbit": s["orbit"] + ODD, "planet": ["earth", "x", None, 3], "time": TIMES + ODD,
             "search": day, "within": [None, *quantities(u.au, 0.05)], "error": quantities(u.km, 0.1)}),
         "encounter_distribution": (fs.encounter_distribution, {"orbit": s["asteroid"] + ODD, "planet": ["earth", "x", 3],

@@ -48,7 +48,7 @@ def test_many_bodies_agree_with_each_alone():
 
 def test_answers_do_not_depend_on_the_threads():
     bodies = sample(40)
-    one, three = (stability_many(bodies, threads=n, depth="second") for n in (1, 3))
+    one, three = (stability_many(bodies, workers=n, depth="second") for n in (1, 3))
     assert np.array_equal(one.energy_second, three.energy_second, equal_nan=True)
     assert np.array_equal(one.names(), three.names())
 
@@ -106,4 +106,4 @@ def test_bad_input_is_named():
     with pytest.raises(InvalidInput, match="one yield surface"):
         stability_many([*sample(1), *sample(1, yield_surface="matsuoka-nakai")])
     with pytest.raises(InvalidInput, match="threads"):
-        stability_many(sample(1), threads=0)
+        stability_many(sample(1), workers=0)

@@ -100,7 +100,7 @@ assert "vulcan point mass" in FORCES and window.gm[BODIES.index("vulcan")] == 1e
 away = mars[:3] + [0.0, 0.0, 5e7] - mars[3:] * 2.5 * 86400.0
 orbit = fs.Orbit.from_state(epoch, (away - 2.5 * 86400.0 * np.array([5e3, 0.0, 0.0])) * u.m,
                             (mars[3:] + [5e3, 0.0, 0.0]) * u.m / u.s, centre="ssb")
-table = fs.find_encounters(orbit, epoch, epoch + 5 * u.d, ["mars", "vulcan"], 0.01 * u.au, ephemeris="de421", threads=1)
+table = fs.find_encounters(orbit, epoch, epoch + 5 * u.d, ["mars", "vulcan"], 0.01 * u.au, ephemeris="de421", workers=1)
 assert sorted(table["planet"]) == ["mars", "vulcan"], table
 assert abs(table["distance"][0] - table["distance"][1]) < 1e-6 * u.km
 assert table["distance"][0] < 1e6 * u.km

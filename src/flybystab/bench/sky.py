@@ -116,7 +116,7 @@ def _speed(chosen: list[Orbit], years: float) -> list[dict[str, Any]]:
 
     def ours(**how: Any) -> tuple[list[Array], float]:
         begin = time.process_time()
-        table = find_encounters(chosen, start, stop, within=WITHIN * u.au, threads=1, **how)
+        table = find_encounters(chosen, start, stop, within=WITHIN * u.au, workers=1, **how)
         used = time.process_time() - begin
         flat = np.column_stack([table["time"].jd - start.jd, table["distance"].to_value(u.m)])
         index = np.array(table["index"])

@@ -5,7 +5,6 @@ The kernels release the interpreter, so that a thread per core shares the rows.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
@@ -24,6 +23,7 @@ from flybystab.core.ellipsoid.potential import carlson_fd
 from flybystab.core.energy import stability_row as columns
 from flybystab.core.energy.potential import GRAVITY
 from flybystab.core.energy.stability_row import classify_many
+from flybystab.core.numerics.threads import worker_count
 from flybystab.errors import InvalidInput, UnknownName
 from flybystab.typing import Array
 from flybystab.units import to_si
@@ -79,6 +79,7 @@ def stability_many(
     friction_angle: Quantity | None = None,
     dilatancy: float = 1.0,
     depth: str = "barrier",
+    workers: int | None = None,
     threads: int | None = None,
 ) -> StabilityTable:
     """Stability of many bodies with one yield surface.
@@ -93,8 +94,10 @@ def stability_many(
         ``beta/min k`` of the test; 1 is associative flow.
     depth : str
         One of :data:`DEPTHS`: how far to go.
+    workers : int, optional
+        Number of threads; one per processor by default.
     threads : int, optional
-        As many as cores by default.
+        Deprecated name of `workers`.
 
     Returns
     -------
@@ -129,7 +132,7 @@ def stability_many(
         np.array([0.0 if k is None else k.to_value(u.Pa) for k in moduli]) / stress,
         dilatancy,
         depth,
-        threads,
+        worker_count(workers, threads),
     )
     return _table(out, stress, stress * length**3, u.Pa, u.J)
 
@@ -144,6 +147,7 @@ def stability_map(
     yield_surface: str = DEFAULT_SURFACE,
     dilatancy: float = 1.0,
     depth: str = "second",
+    workers: int | None = None,
     threads: int | None = None,
 ) -> StabilityTable:
     """Stability over axis ratios and spin, in units of the body itself.
@@ -157,7 +161,7 @@ def stability_map(
         Of the material.
     cohesion : float
         In ``pi G rho^2 a^2``, ``a`` the mean radius.
-    yield_surface, dilatancy, depth, threads
+    yield_surface, dilatancy, depth, workers, threads
         As in :func:`stability_many`.
 
     Returns
@@ -192,7 +196,7 @@ def stability_map(
         np.zeros(n),
         dilatancy,
         depth,
-        threads,
+        worker_count(workers, threads),
     )
     scaled = s / np.cbrt(s.prod(axis=1))[:, None]
     binding = np.array([2.0 * GRAVITY * carlson_fd(*row)[0] if row[0] > 0 else np.nan for row in scaled])
@@ -210,18 +214,15 @@ def _rows(
     kappa: Array,
     dilatancy: float,
     depth: str,
-    threads: int | None,
+    workers: int,
 ) -> Array:
     if depth not in DEPTHS:
         raise UnknownName("depth", str(depth), get_close_matches(str(depth), DEPTHS), f"(known: {DEPTHS})")
     beta = to_si(dilatancy, u.dimensionless_unscaled, "dilatancy", low=0.0, high=1.0)
     n = len(s)
-    cores = threads if threads is not None else (os.cpu_count() or 1)
-    if cores < 1:
-        raise InvalidInput("threads", threads, "a positive integer")
     out = np.empty((n, columns.COLUMNS))
     # Small interleaved chunks: neighbouring cells of a map cost alike, distant ones do not.
-    size = max(1, min(512, -(-n // (8 * cores))))
+    size = max(1, min(512, -(-n // (8 * workers))))
     contiguous = [np.ascontiguousarray(v) for v in (s, spin, phi, cohesion, in_flow, kappa)]
 
     def work(start: int) -> None:
@@ -231,7 +232,7 @@ def _rows(
             s_, spin_, code, phi_, cohesion_, in_flow_, beta, kappa_, DEPTHS.index(depth), out[part]
         )
 
-    with ThreadPoolExecutor(cores) as pool:
+    with ThreadPoolExecutor(workers) as pool:
         list(pool.map(work, range(0, n, size)))
     return out
 

@@ -19,6 +19,7 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 from scipy.stats import binomtest
 
+from flybystab.core.numerics.threads import worker_count
 from flybystab.encounter.linear_target_plane import LinearPlane, ellipse, linear_plane
 from flybystab.encounter.reach import far_enough
 from flybystab.errors import InvalidInput, NoEncounter
@@ -135,6 +136,7 @@ def encounter_distribution(
     within: Quantity | None = None,
     ephemeris: str | Ephemeris | None = None,
     tolerance: float = 1e-12,
+    workers: int | None = None,
     threads: int | None = None,
 ) -> EncounterDistribution:
     """Clones of an orbit through one encounter.
@@ -153,8 +155,10 @@ def encounter_distribution(
         Largest time between the closest approaches of a clone and of the nominal orbit.
     within : Quantity, optional
         Largest distance that counts as an encounter; by default 20 Hill radii, at most 1 au.
-    ephemeris, tolerance, threads
+    ephemeris, tolerance, workers
         As in :func:`flybystab.find_encounters`.
+    threads : int, optional
+        Deprecated name of `workers`.
 
     Raises
     ------
@@ -165,6 +169,7 @@ def encounter_distribution(
     InvalidInput, UnitMismatch, UnknownName
     """
     path = _path(orbit)
+    workers = worker_count(workers, threads)
     checked_time(time, "time")
     body = _planet(planet)
     reach = to_si(search, u.s, "search", low=0.0, open_low=True)
@@ -177,7 +182,7 @@ def encounter_distribution(
         largest * u.m,
         ephemeris=ephemeris,
         tolerance=tolerance,
-        threads=threads,
+        workers=workers,
     )
     if not len(table):
         raise NoEncounter(
@@ -194,7 +199,7 @@ def encounter_distribution(
         within=largest * u.m,
         ephemeris=ephemeris,
         tolerance=tolerance,
-        threads=threads,
+        workers=workers,
     )[0]
 
 
@@ -208,13 +213,13 @@ def distributions(
     within: Quantity | None = None,
     ephemeris: str | Ephemeris | None = None,
     tolerance: float = 1e-12,
-    threads: int | None = None,
+    workers: int | None = None,
 ) -> list[EncounterDistribution]:
     """Clones of an orbit through several encounters, in one integration.
 
     Parameters
     ----------
-    orbit, n, seed, search, within, ephemeris, tolerance, threads
+    orbit, n, seed, search, within, ephemeris, tolerance, workers
         As in :func:`encounter_distribution`.
     table : QTable
         The encounters of the nominal orbit, from :func:`flybystab.find_encounters`.
@@ -240,7 +245,7 @@ def distributions(
         far * u.m,
         ephemeris=ephemeris,
         tolerance=tolerance,
-        threads=threads,
+        workers=workers,
     )
     return [_distribution(path, row, clones, len(points), found, reach) for row in table]
 
@@ -254,7 +259,7 @@ def clone_passages(
     within: Quantity,
     ephemeris: str | Ephemeris | None = None,
     tolerance: float = 1e-12,
-    threads: int | None = None,
+    workers: int | None = None,
 ) -> tuple[Array, Array, Array]:
     """The encounters of some clones that correspond to that of the nominal orbit at `time`.
 
@@ -277,7 +282,7 @@ def clone_passages(
         within,
         ephemeris=ephemeris,
         tolerance=tolerance,
-        threads=threads,
+        workers=workers,
     )
     columns = _belonging(found, body, time, len(clones), reach)
     return columns[:, 0], columns[:, 1], columns[:, 4]

@@ -249,7 +249,7 @@ class Encounter:
             For a bad argument, with its value.
         """
         body = _planet(planet)
-        q = to_si(periapsis, u.m, "periapsis", low=0.0, open_low=True)
+        q = to_si(periapsis, u.m, "periapsis", low=1.0)
         v = to_si(v_inf, u.m / u.s, "v_inf", low=0.0)
         wait = to_si(settle, u.s, "settle", low=0.0)
         if start_distance is None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
@@ -13,6 +12,7 @@ from numpy.typing import NDArray
 
 from flybystab.body.body import Body, check_settled
 from flybystab.core.dynamics import verdict_row as judgement
+from flybystab.core.numerics.threads import worker_count
 from flybystab.encounter.attitude import attitude_matrices
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput, UnsettledBody
@@ -28,7 +28,6 @@ from flybystab.flybys.batch import (
 )
 from flybystab.flybys.table import FlybyTable
 from flybystab.flybys.verdict import Verdict, verdict_of
-from flybystab.units import whole
 
 T = TypeVar("T")
 
@@ -70,7 +69,7 @@ def flyby_many(
     if len(encounters) != n or (attitudes is not None and len(attitudes) != n):
         raise InvalidInput("encounters", len(encounters), f"as many encounters and attitudes as bodies, {n}")
     tolerance, max_axis_ratio = step_tolerance(tolerance), axis_ratio(max_axis_ratio)
-    threads = (os.cpu_count() or 1) if workers is None else whole(workers, "workers", 1)
+    threads = worker_count(workers)
     rotations, failures = attitude_matrices(attitudes, n)
     if n:
         frames = {id(e): e.periapsis_axes.T for e in encounters}

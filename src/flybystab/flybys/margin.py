@@ -138,7 +138,7 @@ def flyby_margin(
         way = tensor(d)
 
     after = body.with_(spin=course.spin[-1])
-    table = stability_many([body, after], dilatancy=beta, depth="barrier", threads=1)
+    table = stability_many([body, after], dilatancy=beta, depth="barrier", workers=1)
     before_after = table.energy_barrier.to_value(u.J)
     barrier = float(before_after.min())
     given = energy * units.energy

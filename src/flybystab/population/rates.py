@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
@@ -14,7 +13,7 @@ from astropy.units import Quantity
 
 from flybystab.catalogues.asteroid import Asteroid
 from flybystab.constants import AU
-from flybystab.core.numerics.threads import in_order
+from flybystab.core.numerics.threads import in_order, worker_count
 from flybystab.errors import InvalidInput
 from flybystab.orbit.elements import GM_SUN
 from flybystab.orbit.orbit import Orbit
@@ -170,7 +169,7 @@ def encounter_rates(
                 to_si(i, u.rad, "planet_orbit[2]", low=0.0, high=np.pi),
             ]
         )
-    threads = (os.cpu_count() or 1) if workers is None else whole(workers, "workers", 1)
+    threads = worker_count(workers)
     sums = np.empty((len(elements), 5))
 
     def part(first: int) -> None:

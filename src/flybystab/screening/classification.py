@@ -125,7 +125,7 @@ def classification(
         bare = Material(yield_surface=material.yield_surface, bulk_modulus=material.bulk_modulus)
         them = [b.with_(material=bare) for b in bodies] if cohesionless else bodies
         return stability_many(
-            them, friction_angle=friction, dilatancy=dilatancy, depth=depth, threads=workers
+            them, friction_angle=friction, dilatancy=dilatancy, depth=depth, workers=workers
         )
 
     own = table("barrier")

@@ -60,7 +60,7 @@ class Clones(NamedTuple):
         p = self.passage
         clones = p.asteroid.orbit.clones(self.samples, self.key, first=first, last=last)
         offset, distance, v_inf = clone_passages(
-            clones, p.planet, self.time, search=_SEARCH, within=self.within * u.m, threads=1
+            clones, p.planet, self.time, search=_SEARCH, within=self.within * u.m, workers=1
         )
         out = []
         for k, orbit in enumerate(clones):
@@ -129,7 +129,7 @@ def orbit_sampling(passage: Passage, samples: int, seed: int) -> OrbitSampling:
             seed=key,
             search=_SEARCH,
             within=within * u.m,
-            threads=1,
+            workers=1,
         )
     except FlybystabError as error:
         return OrbitSampling(None, np.nan, f"orbit without errors ({type(error).__name__}: {error})")

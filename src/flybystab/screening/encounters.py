@@ -128,7 +128,7 @@ def passages(asteroid: Asteroid, settings: Settings) -> list[Passage]:
         Time(settings.stop, format="jd", scale="tdb"),
         planets=list(settings.planets),
         within=settings.within * u.m,
-        threads=1,
+        workers=1,
     )
     found = [
         Passage(

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+import os
+import warnings
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ThreadPoolExecutor
+from numbers import Integral
 from typing import TypeVar
+
+from flybystab.errors import InvalidInput
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -21,3 +26,28 @@ def in_order(work: Callable[[T], R], tasks: Iterable[T], threads: int) -> Iterat
         yield from pool.map(work, tasks)
     finally:
         pool.shutdown(cancel_futures=True)
+
+
+def worker_count(workers: int | None, threads: int | None = None) -> int:
+    """Number of threads to use: `workers`, or one per processor.
+
+    Parameters
+    ----------
+    workers : int or None
+    threads : int, optional
+        Deprecated name of `workers` in some public functions; warns.
+
+    Raises
+    ------
+    InvalidInput
+        Not a positive whole number.
+    """
+    name, value = "workers", workers
+    if threads is not None:
+        warnings.warn("threads is deprecated: use workers", DeprecationWarning, stacklevel=3)
+        name, value = "threads", threads
+    if value is None:
+        return os.cpu_count() or 1
+    if isinstance(value, bool) or not isinstance(value, Integral) or value < 1:
+        raise InvalidInput(name, value, "a whole number, 1 or more")
+    return int(value)

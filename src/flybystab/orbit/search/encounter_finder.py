@@ -6,7 +6,6 @@ threads share the work.
 
 from __future__ import annotations
 
-import os
 from collections.abc import Callable, Iterable, Sequence
 from functools import lru_cache
 from itertools import pairwise
@@ -21,7 +20,7 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.constants import DAY, YEAR
-from flybystab.core.numerics.threads import in_order
+from flybystab.core.numerics.threads import in_order, worker_count
 from flybystab.errors import Impact, InvalidInput, NotConverged
 from flybystab.orbit.almanac import GRID, N_FAST, N_SLOW, SLOT
 from flybystab.orbit.ephemeris import BELT, BODIES, N_BODIES, Ephemeris, Window
@@ -76,8 +75,9 @@ def find_encounters(
     tolerance: float | None = None,
     forces: tuple[str, ...] | None = None,
     growth: bool = False,
-    threads: int | None = None,
+    workers: int | None = None,
     progress: Callable[[int, int, int], None] | None = None,
+    threads: int | None = None,
 ) -> QTable:
     """Every closest approach of every asteroid to every planet below a threshold.
 
@@ -107,10 +107,12 @@ def find_encounters(
         Follow a neighbour of each orbit as well, for the columns ``displacement`` (km, of the neighbour from
         the asteroid at closest approach), ``growth`` (over that at the epoch) and ``predictability``
         (:mod:`flybystab.orbit.predictability`). Up to twice the time.
-    threads : int, optional
-        Number of threads; the processors by default.
+    workers : int, optional
+        Number of threads; one per processor by default.
     progress : callable, optional
         Called with the asteroids searched, all of them, and the encounters found so far.
+    threads : int, optional
+        Deprecated name of `workers`.
 
     Returns
     -------
@@ -134,6 +136,9 @@ def find_encounters(
     UnitMismatch, InvalidInput, UnknownName, NotConverged
     """
     rows = _objects(objects)
+    workers = worker_count(workers, threads)
+    if forces is not None and (isinstance(forces, str) or not isinstance(forces, Iterable)):
+        raise InvalidInput("forces", forces, "a sequence of names")
     for name, value in (("start", start), ("stop", stop)):
         checked_time(value, name)
     if not start < stop:
@@ -234,7 +239,6 @@ def find_encounters(
             parts.append(out[:n].copy())
         return parts
 
-    workers = threads or os.cpu_count() or 1
     # Parts small enough that threads end together, large enough that Python does not count.
     size = max(1, min(64, -(-len(rows) // (4 * workers)))) if workers > 1 else max(len(rows), 1)
     cuts = sorted({*range(0, len(rows), size), *twins, *(i + 1 for i in twins), len(rows)})
