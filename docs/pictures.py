@@ -17,6 +17,7 @@ from flybystab.cli.main import main
 from flybystab.plots.outcome_map import outcome_map, outcome_plot, target_map, target_plot
 from flybystab.plots.population import population_figure
 from flybystab.plots.scene import animation, scene_plot
+from flybystab.plots.shape_map import surface_history_figure
 
 DOCS = Path(__file__).resolve().parent
 IMAGES = DOCS / "images"
@@ -61,6 +62,12 @@ for script, picture in (
 sys.argv = ["shape_slopes.py", str(IMAGES / "shape_slopes.png")]
 runpy.run_path(str(DOCS.parent / "examples" / "shape_slopes.py"))
 print(IMAGES / "shape_slopes.png")
+
+relief = fs.Shape.perturbed([225, 165, 155] * u.m, amplitude=0.06, seed=2)
+body = fs.Body.from_shape(relief, density=1.29 * u.g / u.cm**3, spin_period=30.5 * u.h)
+apophis_like = fs.Encounter.hyperbolic("earth", 38_012 * u.km, 5.841 * u.km / u.s)
+history = fs.surface_history(body, apophis_like, shape=relief)
+save("surface_history.png", surface_history_figure(history, 30 * u.deg))
 
 orbits = fs.known_population()
 planets = ("mercury", "venus", "earth", "mars")

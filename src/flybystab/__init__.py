@@ -49,6 +49,7 @@ _HOME = {
     "spin_sample": "flybys.spin_sample",
     "stability": "body.stability",
     "surface_change": "flybys.surface_change",
+    "surface_history": "flybys.surface_history",
     "survival": "flybys.survival",
 }
 
@@ -73,6 +74,7 @@ if TYPE_CHECKING:
     from flybystab.flybys.result import FlybyResult
     from flybystab.flybys.spin_sample import spin_sample
     from flybystab.flybys.surface_change import surface_change
+    from flybystab.flybys.surface_history import surface_history
     from flybystab.flybys.survival import survival
     from flybystab.flybys.verdict import Verdict
     from flybystab.io.atlas import atlas

@@ -17,7 +17,7 @@ from flybystab.body.mesh import MassProperties, edges_of, mass_properties, self_
 from flybystab.body.shape_files import read_mesh, write_vtk
 from flybystab.constants import G
 from flybystab.core.polyhedron.gravity import polyhedron_gravity
-from flybystab.errors import InvalidInput
+from flybystab.errors import InvalidInput, UnitMismatch
 from flybystab.typing import Array
 from flybystab.units import brief, frozen, to_si, whole
 
@@ -123,7 +123,7 @@ class Shape:
         InvalidInput, UnitMismatch
         """
         vertices, facets = read_mesh(Path(path))
-        return cls(vertices * u.Unit(unit), facets)
+        return cls(vertices * length_unit(unit), facets)
 
     @classmethod
     def from_ellipsoid(cls, semi_axes: Quantity, *, facets: int = FACETS) -> Shape:
@@ -314,6 +314,22 @@ class Shape:
         left, right = self.normals[self._sides[:, 0]], self.normals[self._sides[:, 1]]
         outward_left, outward_right = np.cross(along, left), np.cross(right, along)
         return np.einsum("ni,nj->nij", left, outward_left) + np.einsum("ni,nj->nij", right, outward_right)
+
+
+def length_unit(unit: str | u.UnitBase, name: str = "unit") -> u.UnitBase:
+    """A unit of length, from its name or as it is.
+
+    Raises
+    ------
+    InvalidInput, UnitMismatch
+    """
+    try:
+        found = u.Unit(unit)
+    except (TypeError, ValueError):
+        raise InvalidInput(name, unit, "a unit of length, such as m or km") from None
+    if not found.is_equivalent(u.m):
+        raise UnitMismatch(name, found, "a unit of length, such as m or km")
+    return found
 
 
 def _principal_axes(second: Array) -> Array:

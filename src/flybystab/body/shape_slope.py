@@ -35,8 +35,8 @@ def shape_slopes(shape: Shape, body: Body, tide: Quantity | None = None) -> Surf
     SurfaceSlopes
         At the centroids of the facets.
     """
-    gravity = _gravity(shape, body)
-    slope = _slopes(shape, gravity, _field(body, body.omega, tide_components(tide)))
+    gravity = gravity_at_facets(shape, body)
+    slope = _slopes(shape, gravity, field_matrix(body, body.omega, tide_components(tide)))
     return SurfaceSlopes(shape.centroids, shape.facet_area, np.rad2deg(slope) * u.deg)
 
 
@@ -59,22 +59,23 @@ def shape_slope_change(shape: Shape, body: Body, spin: Quantity, tide: Quantity)
         At the centroids of the facets.
     """
     w, k = spin_and_tide(spin, tide)
-    gravity = _gravity(shape, body)
-    before = _slopes(shape, gravity, _field(body, w[0], k[0]))
+    gravity = gravity_at_facets(shape, body)
+    before = _slopes(shape, gravity, field_matrix(body, w[0], k[0]))
     least, greatest = before.copy(), before.copy()
     for omega, tensor in zip(w[1:], k[1:], strict=True):
-        now = _slopes(shape, gravity, _field(body, omega, tensor))
+        now = _slopes(shape, gravity, field_matrix(body, omega, tensor))
         np.minimum(least, now, out=least)
         np.maximum(greatest, now, out=greatest)
     degrees = [np.rad2deg(v) * u.deg for v in (before, least, greatest)]
     return SlopeChange(shape.centroids, shape.facet_area, *degrees)
 
 
-def _gravity(shape: Shape, body: Body) -> Array:
+def gravity_at_facets(shape: Shape, body: Body) -> Array:
+    """Gravity of the polyhedron at the centroids of its facets, (f, 3), m/s2."""
     return np.asarray(shape.gravity(shape.centroids, body.density)[1].value)
 
 
-def _field(body: Body, omega: Array, tide: Array) -> Array:
+def field_matrix(body: Body, omega: Array, tide: Array) -> Array:
     """Matrix of the tide and the accelerations of the rotating frame, s^-2; no self-gravity."""
     out = np.empty((3, 3))
     effective_field(body.axes**2, 0.0, np.ascontiguousarray(omega), np.ascontiguousarray(tide), out)

@@ -14,6 +14,7 @@ from astropy.time import Time
 from astropy.units import Quantity
 
 from flybystab.body.body import Body, Material
+from flybystab.body.shape import Shape
 from flybystab.catalogues.covariance_files import embedded_covariance
 from flybystab.catalogues.record import BODILY, ORBIT, ORBIT_SI, ORBITAL, SHAPE, Record
 from flybystab.catalogues.tumbling import attitude_matrix, ecliptic_direction, free_spin, tumbling_state
@@ -86,6 +87,32 @@ class Asteroid(Record):
     def with_material(self, material: Material | None) -> Asteroid:
         """The same asteroid of another material (None: unchanged)."""
         return self if material is None else replace(self, material=material)
+
+    def with_shape(self, shape: Shape) -> Asteroid:
+        """The same asteroid with the equivalent ellipsoid of a polyhedral shape (:meth:`Body.from_shape`).
+
+        The semi-axes count as measured. Their relative uncertainties stay those of the row: a shape model does not
+        state its own. A catalogued pole and spin state are those about the principal axes of the shape.
+
+        Raises
+        ------
+        InvalidInput
+            For anything but a Shape. A tumbling solution whose periods the inertia of the shape does not allow raises
+            it when the body is built.
+        """
+        if not isinstance(shape, Shape):
+            raise InvalidInput("shape", shape, "a flybystab.Shape")
+        row = dict(self.row)
+        for column, length in zip(SHAPE, shape.ellipsoid().value.tolist(), strict=True):
+            sigma = column.removesuffix("_m") + "_sigma_m"
+            if self.knows(column, sigma):
+                row[sigma] = repr(self._number(sigma) / self._number(column) * length)
+            row[column] = repr(length)
+        row["shape_kind"] = "measured"
+        row["semi_axes_source"] = f"equivalent ellipsoid of a polyhedron of {len(shape.facets)} facets"
+        row["diameter_m"] = repr(2.0 * float(shape.mean_radius.value))
+        row["assumed"] = ";".join(c for c in self.assumed if not c.startswith(("semi_axis", "diameter")))
+        return replace(self, row=row)
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Without what was built from the row: it is rebuilt where it is needed.

@@ -123,7 +123,9 @@ def asteroid_named(options: argparse.Namespace) -> Any:
 
 def asteroid_of(options: argparse.Namespace) -> Any:
     """The asteroid with the material of the options."""
-    return asteroid_named(options).with_material(material_of(options))
+    from flybystab.cli.shape_options import shaped
+
+    return shaped(asteroid_named(options), options).with_material(material_of(options))
 
 
 def check_picture(path: str | None, endings: tuple[str, ...] = FIGURES) -> None:

@@ -12,6 +12,7 @@ from flybystab.cli.common import (
     material_arguments,
     tdb,
 )
+from flybystab.cli.shape_options import shape_arguments
 
 #: Dates searched for the closest encounter if none is given; all supported ephemerides cover them.
 SPAN = ("2000-01-01", "2050-01-01")
@@ -27,6 +28,7 @@ def passage_arguments(sub: argparse.ArgumentParser) -> None:
     )
     sub.add_argument("--planet", default="earth", help="planet (earth)")
     material_arguments(sub)
+    shape_arguments(sub)
     sub.add_argument(
         "--attitudes", type=int, default=64, metavar="N", help="number of sampled attitudes (64)"
     )

@@ -6,6 +6,7 @@ import argparse
 
 from flybystab.cli.common import check_picture, figure_argument, grains_arguments, show, write_picture
 from flybystab.cli.flown import attitude_words, flown, passage_arguments
+from flybystab.cli.shape_options import check_map, map_argument, surface_of, write_map
 from flybystab.plots.formats import FIGURES, FILMS
 
 HELP = "fly an asteroid through one encounter"
@@ -17,6 +18,7 @@ def arguments(sub: argparse.ArgumentParser) -> None:
     passage_arguments(sub)
     grains_arguments(sub)
     figure_argument(sub, films=True)
+    map_argument(sub)
 
 
 def run(options: argparse.Namespace) -> None:
@@ -24,9 +26,13 @@ def run(options: argparse.Namespace) -> None:
     from flybystab.flybys import document
     from flybystab.io import text
     from flybystab.io.grains_text import grains_lines
+    from flybystab.io.surface_text import extra, surface_lines
 
     check_picture(options.output, FIGURES + FILMS)
+    check_map(options)
     asteroid, result, sample = flown(options)
+    surface = surface_of(options, result)
+    write_map(options, surface)
     encounter = result.encounter
     if options.output:
         write_picture(result, f"{asteroid.label}, {encounter.time.tdb.iso[:10]}", options.output)
@@ -44,6 +50,7 @@ def run(options: argparse.Namespace) -> None:
             if encounter.distance_error is None
             else encounter.distance_error.to_value("km"),
             figure=options.output,
+            **extra(surface),
         ),
         lambda: [
             f"asteroid   {asteroid.label}",
@@ -52,7 +59,9 @@ def run(options: argparse.Namespace) -> None:
             *text.flyby_lines(result),
             *grains_lines(result),
             *text.sample_lines(sample),
+            *([] if surface is None else surface_lines(surface)),
             *text.model_lines(result, asteroid.assumptions),
             *([f"figure     {options.output}"] if options.output else []),
+            *([f"map        {options.map}"] if options.map else []),
         ],
     )

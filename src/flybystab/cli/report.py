@@ -6,6 +6,7 @@ import argparse
 
 from flybystab.cli.common import check_picture, show
 from flybystab.cli.flown import flown, passage_arguments
+from flybystab.cli.shape_options import surface_of
 
 HELP = "HTML report of one encounter"
 EXAMPLE = "flybystab report Apophis --output apophis.html"
@@ -36,6 +37,7 @@ def run(options: argparse.Namespace) -> None:
 
     check_picture(options.output, (".html",))
     asteroid, result, sample = flown(options)
+    surface = surface_of(options, result)
     e = result.encounter
     screened = None
     if options.samples > 1:
@@ -52,7 +54,9 @@ def run(options: argparse.Namespace) -> None:
         )
         screened = table[0] if len(table) == 1 and not table["error"][0] else None
     command = "flybystab " + shlex.join(options.words)
-    path = report(asteroid, result, sample, options.output, screened=screened, command=command)
+    path = report(
+        asteroid, result, sample, options.output, screened=screened, command=command, surface=surface
+    )
     show(
         options,
         lambda: document.flyby_document(result, sample, asteroid=asteroid.label, report=str(path)),

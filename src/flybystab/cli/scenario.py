@@ -27,9 +27,11 @@ def run(options: argparse.Namespace) -> None:
     """Execute the command."""
     from flybystab.flybys import document
     from flybystab.flybys.flyby import flyby
+    from flybystab.flybys.surface_history import surface_history
     from flybystab.io import text
     from flybystab.io.grains_text import grains_lines
     from flybystab.io.scenario import scenario
+    from flybystab.io.surface_text import extra, surface_lines
 
     check_picture(options.output, FIGURES + FILMS)
     script = scenario(options.file)
@@ -43,16 +45,20 @@ def run(options: argparse.Namespace) -> None:
         grains=script.grains,
         seeds=script.piles,
     )
+    surface = None
+    if script.shape is not None:
+        surface = surface_history(script.body, script.encounter, script.attitude, shape=script.shape)
     if figure:
         write_picture(result, script.title, figure)
     show(
         options,
-        lambda: document.flyby_document(result, title=script.title, figure=figure),
+        lambda: document.flyby_document(result, title=script.title, figure=figure, **extra(surface)),
         lambda: [
             f"scenario   {script.title}",
             *text.encounter_lines(script.encounter),
             *text.flyby_lines(result),
             *grains_lines(result),
+            *([] if surface is None else surface_lines(surface)),
             *text.model_lines(result),
             *([f"figure     {figure}"] if figure else []),
         ],

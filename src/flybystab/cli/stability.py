@@ -16,6 +16,7 @@ from flybystab.cli.common import (
     material_of,
     show,
 )
+from flybystab.cli.shape_options import rest_slopes, shape_arguments
 from flybystab.errors import WrongUsage
 
 HELP = "equilibrium and stability of an isolated asteroid, or of a whole catalogue"
@@ -32,11 +33,14 @@ def arguments(sub: argparse.ArgumentParser) -> None:
         help="classify the embedded catalogue or a file (own CSV, JPL SBDB, MPC, NEOCC .ke1)",
     )
     material_arguments(sub)
+    shape_arguments(sub)
     sub.add_argument("--output", metavar="FILE", help="with --all: write the table (.ecsv, .parquet)")
 
 
 def run(options: argparse.Namespace) -> None:
     """Execute the command."""
+    if options.all and options.shape:
+        raise WrongUsage("--shape: expected one NAME with it, not --all")
     if options.all and options.catalogue:
         raise WrongUsage(
             "--catalogue: expected one NAME with it; --all takes its file as stability --all FILE"
@@ -103,9 +107,11 @@ def _asteroid(options: argparse.Namespace) -> None:
     from flybystab.body.equilibrium import spin_limits
     from flybystab.body.stability import stability
     from flybystab.flybys.document import plain
+    from flybystab.io.surface_text import slopes_document, slopes_text
     from flybystab.io.text import equilibrium_lines
 
     asteroid = asteroid_of(options)
+    surface = rest_slopes(options, asteroid.body)
     s = stability(asteroid.body)
     e = s.equilibrium
     limits = spin_limits(asteroid.body).to_value(u.rad / u.s)
@@ -133,6 +139,7 @@ def _asteroid(options: argparse.Namespace) -> None:
                 "spin_mode": s.spin_state.mode,
                 "spin_growth_rate_per_s": s.spin_state.growth_rate.value,
                 "assumed": asteroid.assumptions,
+                **({} if surface is None else {"surface": slopes_document(surface)}),
             }
         ),
         lambda: [
@@ -142,6 +149,7 @@ def _asteroid(options: argparse.Namespace) -> None:
             f"critical strain           {s.critical_strain.second:.3g} (second order), "
             f"{s.critical_strain.third:.3g} (third), {s.critical_strain.barrier:.3g} (barrier)",
             f"admissible spin periods   {_period_range(limits)}",
+            *([] if surface is None else [f"slopes at rest            {slopes_text(surface)}"]),
             *(
                 [f"assumed                   {'; '.join(asteroid.assumptions)}"]
                 if asteroid.assumptions

@@ -7,7 +7,7 @@ from typing import Any
 import astropy.units as u
 import numpy as np
 
-from flybystab.body.body import Body
+from flybystab.body.body import Body, check_body
 from flybystab.body.shape import Shape
 from flybystab.body.shape_slope import shape_slope_change
 from flybystab.body.surface_slope import SlopeChange, slope_change
@@ -39,15 +39,20 @@ def surface_change(
         "Before" is the start of the encounter; `least` and `greatest` are over all instants of the rigid course, so
         that a lasting change of spin counts, too.
     """
-    if shape is not None and not (
-        isinstance(shape, Shape) and np.allclose(shape.ellipsoid().value, body.axes, rtol=1e-6)
-    ):
-        raise InvalidInput("shape", shape, "a Shape whose equivalent ellipsoid is the body (Body.from_shape)")
+    if shape is not None:
+        check_shape(shape, body)
     course = rigid_course(body, encounter, attitude, tolerance=1e-12)
     tide = np.asarray(course.tide.value) / u.s**2
     if shape is not None:
         return shape_slope_change(shape, body, course.spin, tide)
     return slope_change(body, course.spin, tide, count=count)
+
+
+def check_shape(shape: Shape, body: Body) -> None:
+    """Raise InvalidInput for anything but a shape whose equivalent ellipsoid is the body."""
+    check_body(body)
+    if not (isinstance(shape, Shape) and np.allclose(shape.ellipsoid().value, body.axes, rtol=1e-6)):
+        raise InvalidInput("shape", shape, "a Shape whose equivalent ellipsoid is the body (Body.from_shape)")
 
 
 def slopes_on_the_way(inputs: FlybyInputs) -> SlopeChange:

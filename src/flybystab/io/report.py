@@ -18,13 +18,16 @@ import numpy as np
 from astropy.table import Row
 
 from flybystab._version import __version__
+from flybystab.body.surface_history import SurfaceHistory
 from flybystab.catalogues.asteroid import Asteroid
 from flybystab.flybys.result import FlybyResult
 from flybystab.flybys.spin_sample import SpinSample
+from flybystab.io.surface_text import REPOSE, surface_rows
 from flybystab.io.text import MEANING, angle, contact, known, left_out, modelled
 from flybystab.orbit.ephemeris import ephemeris
 from flybystab.plots.flyby import BLUE, flyby_panels
 from flybystab.plots.scene import scene_plot
+from flybystab.plots.shape_map import surface_history_figure
 
 #: Rows of a table: label and text.
 Rows = list[tuple[str, str]]
@@ -41,6 +44,7 @@ def report(
     *,
     screened: Row | None = None,
     command: str = "",
+    surface: SurfaceHistory | None = None,
 ) -> Path:
     """Write the report; returns its path.
 
@@ -57,6 +61,8 @@ def report(
         Row of :func:`flybystab.screen` for the encounter, with sampled inputs.
     command : str
         Command line that made the report, shown under Provenance.
+    surface : SurfaceHistory, optional
+        Surface of the shape through the encounter (:func:`flybystab.surface_history`).
     """
     encounter = result.encounter
     when = "" if encounter.time is None else encounter.time.tdb.iso[:19] + " TDB"
@@ -69,6 +75,7 @@ def report(
         margins=_margin_rows(result, sample),
         sample_text=_sample_text(sample),
         probabilities=None if screened is None else _probability_rows(screened),
+        surface=None if surface is None else surface_rows(surface),
         body=_body_rows(asteroid),
         assumed={_INPUTS[column] for column in asteroid.assumed if column in _INPUTS},
         model=_model_rows(result),
@@ -77,6 +84,7 @@ def report(
             "history": _history_picture(result),
             "sample": _sample_picture(sample),
             "scene": _scene_picture(result),
+            "surface": None if surface is None else _surface_picture(surface),
         },
     )
     target = Path(path)
@@ -294,6 +302,13 @@ def _history_picture(r: FlybyResult) -> str:
     figure = _blank(7.2, 8.0)
     flyby_panels(figure.subplots(4, 1, sharex=True), r)
     return _embedded(figure)
+
+
+def _surface_picture(surface: SurfaceHistory) -> str:
+    figure = surface_history_figure(surface, REPOSE, figure=_blank(8.0, 9.0))
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=120)
+    return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
 
 
 def _scene_picture(r: FlybyResult) -> str:

@@ -14,6 +14,7 @@ from astropy.units import Quantity
 from scipy.spatial.transform import Rotation
 
 from flybystab.body.body import Body, Material
+from flybystab.body.shape import Shape, length_unit
 from flybystab.catalogues.asteroid import Asteroid
 from flybystab.encounter.attitude import periapsis_axes
 from flybystab.encounter.encounter import Encounter
@@ -26,7 +27,7 @@ from flybystab.units import to_si
 #: Allowed keys of each table.
 KEYS: dict[str, tuple[str, ...]] = {
     "": ("title", "body", "material", "encounter", "attitude", "grains", "output"),
-    "body": ("asteroid", "semi_axes", "density", "spin_period", "spin", "phase"),
+    "body": ("asteroid", "semi_axes", "density", "spin_period", "spin", "phase", "shape", "shape_unit"),
     "material": ("friction_angle", "cohesion", "dilatancy", "yield_surface", "brittle"),
     "encounter": (
         "planet",
@@ -56,6 +57,7 @@ class Scenario:
     figure: str | None = None
     grains: int | None = None
     piles: int = 8
+    shape: Shape | None = None
 
 
 def scenario(path: str | Path) -> Scenario:
@@ -79,7 +81,8 @@ def scenario(path: str | Path) -> Scenario:
             raise InvalidInput(table, section, f"a table: [{table}]")
         _check(section, table)
     material = _material(content["material"])
-    asteroid, body = _body(content["body"], material)
+    shape = _shape(content["body"], path.parent)
+    asteroid, body = _body(content["body"], material, shape)
     encounter = _encounter(content["encounter"], asteroid)
     attitude = _attitude(content["attitude"], content["body"], asteroid, encounter)
     title = _typed(content, "", "title", str, path.stem)
@@ -88,7 +91,7 @@ def scenario(path: str | Path) -> Scenario:
         raise InvalidInput("output.figure", figure, f"a file that ends in {' or '.join(FIGURES + FILMS)}")
     number = _typed(content["grains"], "grains", "number", int, 500 if content["grains"] else None)
     piles = _typed(content["grains"], "grains", "piles", int, 8)
-    return Scenario(title, body, encounter, attitude, figure, number, piles)
+    return Scenario(title, body, encounter, attitude, figure, number, piles, shape)
 
 
 def quantity(value: Any, name: str) -> Quantity:
@@ -154,21 +157,36 @@ def _material(section: dict[str, Any]) -> Material:
     return Material(**plain, **units)
 
 
-def _body(section: dict[str, Any], material: Material) -> tuple[Asteroid | None, Body]:
+def _shape(section: dict[str, Any], folder: Path) -> Shape | None:
+    """The polyhedral shape of a scenario; its file is relative to that of the scenario."""
+    name = _typed(section, "body", "shape", str, None)
+    unit = _typed(section, "body", "shape_unit", str, None)
+    if (name is None) != (unit is None):
+        raise InvalidInput("body.shape_unit", unit, "both shape (a file) and shape_unit, such as km")
+    return None if name is None else Shape.read(folder / name, unit=length_unit(unit, "body.shape_unit"))
+
+
+def _body(section: dict[str, Any], material: Material, shape: Shape | None) -> tuple[Asteroid | None, Body]:
     if "asteroid" in section:
-        extra = sorted(set(section) - {"asteroid", "phase"})
+        extra = sorted(set(section) - {"asteroid", "phase", "shape", "shape_unit"})
         if extra:
             raise InvalidInput(
                 f"body.{extra[0]}", section[extra[0]], "no such key together with body.asteroid"
             )
         asteroid = Asteroid.from_catalogue(section["asteroid"])
+        asteroid = asteroid if shape is None else asteroid.with_shape(shape)
         return asteroid, asteroid.body_with(material, phase=_phase(section))
     if "phase" in section:
         raise InvalidInput("body.phase", section["phase"], "no phase without body.asteroid")
     spin = {k: quantity(section[k], f"body.{k}") for k in ("spin_period", "spin") if k in section}
+    density = quantity(_need(section, "body", "density"), "body.density")
+    if shape is not None:
+        if "semi_axes" in section:
+            raise InvalidInput("body.semi_axes", section["semi_axes"], "no such key together with body.shape")
+        return None, Body.from_shape(shape, density=density, material=material, **spin)
     return None, Body(
         semi_axes=quantity(_need(section, "body", "semi_axes"), "body.semi_axes"),
-        density=quantity(_need(section, "body", "density"), "body.density"),
+        density=density,
         material=material,
         **spin,
     )

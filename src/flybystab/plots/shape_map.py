@@ -10,6 +10,7 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.body.shape import Shape
+from flybystab.body.surface_history import SurfaceHistory
 from flybystab.body.surface_slope import SlopeChange
 
 #: Directions of view, with the image's right and up: from +x, +y and +z of the principal frame.
@@ -103,4 +104,53 @@ def slope_change_figure(shape: Shape, change: SlopeChange, repose: Quantity = 35
         figure.colorbar(drawn, ax=list(row), label=label)
     share = 100.0 * change.share_passing(repose)
     figure.suptitle(f"{share:.2g} % of the area passes {repose.to_value(u.deg):g} deg", fontsize=10)
+    return figure
+
+
+def surface_history_figure(
+    history: SurfaceHistory, repose: Quantity = 35 * u.deg, *, figure: Any = None
+) -> Any:
+    """Slopes before closest approach, at it and after it in three views each, and their course in time.
+
+    Parameters
+    ----------
+    history : SurfaceHistory
+        Of :func:`flybystab.surface_history`.
+    repose : Quantity
+        Angle of repose, for the share of the area that is steeper.
+    figure : matplotlib Figure, optional
+        To draw on.
+
+    Returns
+    -------
+    matplotlib Figure
+    """
+    from matplotlib.figure import Figure
+
+    figure = Figure(figsize=(9.0, 9.5), layout="constrained") if figure is None else figure
+    grid = figure.add_gridspec(4, 3, height_ratios=(1.0, 1.0, 1.0, 0.8))
+    slope, change = history.slope.to_value(u.deg), history.change.to_value(u.deg)
+    largest = float(max(np.abs(change).max(), 1e-3))
+    rows = (
+        ("slope before (deg)", slope[0], (0.0, float(slope.max())), "viridis"),
+        ("change at closest approach (deg)", change[history.closest], (-largest, largest), "RdBu_r"),
+        ("change after (deg)", change[-1], (-largest, largest), "RdBu_r"),
+    )
+    for i, (label, values, limits, cmap) in enumerate(rows):
+        places = [figure.add_subplot(grid[i, j]) for j in range(3)]
+        for axes, (view, _, _) in zip(places, VIEWS, strict=True):
+            drawn = shape_map(axes, history.shape, values, view, limits=limits, cmap=cmap)
+        figure.colorbar(drawn, ax=places, label=label)
+    hours = history.time.to_value(u.h)
+    left, right = figure.add_subplot(grid[3, :2]), figure.add_subplot(grid[3, 2])
+    for percent in (1, 50, 99):
+        left.plot(hours, np.percentile(change, percent, axis=1), label=f"{percent} %")
+    left.axvline(0.0, color="0.5", lw=0.8, ls="--")
+    left.set_xlabel("time from closest approach (h)")
+    left.set_ylabel("change of slope (deg)")
+    left.legend(title="percentile of the facets", loc="upper left", fontsize=8, title_fontsize=8)
+    right.plot(hours, 100.0 * history.share_past(repose))
+    right.set_xlabel("time (h)")
+    right.set_ylabel(f"steeper than {repose.to_value(u.deg):g} deg (% of area)")
+    right.set_ylim(bottom=0.0, top=None if np.any(history.share_past(repose)) else 1.0)
     return figure
