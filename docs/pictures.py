@@ -67,7 +67,7 @@ relief = fs.Shape.perturbed([225, 165, 155] * u.m, amplitude=0.06, seed=2)
 body = fs.Body.from_shape(relief, density=1.29 * u.g / u.cm**3, spin_period=30.5 * u.h)
 apophis_like = fs.Encounter.hyperbolic("earth", 38_012 * u.km, 5.841 * u.km / u.s)
 history = fs.surface_history(body, apophis_like, shape=relief)
-save("surface_history.png", surface_history_figure(history, 30 * u.deg))
+save("surface_history.png", surface_history_figure(history, 20 * u.deg))
 
 orbits = fs.known_population()
 planets = ("mercury", "venus", "earth", "mars")
