@@ -25,6 +25,7 @@ _HOME = {
     "FlybystabError": "errors",
     "Material": "body.body",
     "Orbit": "orbit.orbit",
+    "Pile": "body.pile",
     "R_earth": "units",
     "Shape": "body.shape",
     "Verdict": "flybys.verdict",
@@ -58,6 +59,7 @@ __all__ = ["__version__", *_HOME]
 if TYPE_CHECKING:
     from flybystab.body.body import Body, Material
     from flybystab.body.equilibrium import equilibrium
+    from flybystab.body.pile import Pile
     from flybystab.body.recovery import recovery
     from flybystab.body.shape import Shape
     from flybystab.body.stability import stability

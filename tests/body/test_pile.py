@@ -6,9 +6,12 @@ import pytest
 
 from flybystab.body import pile as piles
 from flybystab.body.body import Body, Material
-from flybystab.body.pile import contact_friction, friction_table, make_pile
+from flybystab.body.grain_calibration import contact_friction, friction_table
+from flybystab.body.grain_sizes import GrainSizes, grain_sizes
+from flybystab.body.pile import Pile, make_pile
+from flybystab.body.shape import Shape
 from flybystab.core.grains.clumps import moments, semi_axes, spin_of
-from flybystab.errors import InvalidInput
+from flybystab.errors import InvalidInput, UnitMismatch, UnknownName, UnsettledBody
 
 
 @pytest.fixture(autouse=True)
@@ -108,7 +111,125 @@ def test_bad_input_is_refused():
         make_pile(body(), 3)
     with pytest.raises(InvalidInput, match="at most"):
         make_pile(body(), 10**9)
-    with pytest.raises(InvalidInput, match="cohesion"):
-        make_pile(body(material=Material(cohesion=10 * u.Pa)), 100)
+    # contacts of little friction have no patch that could carry an attraction
+    with pytest.raises(InvalidInput, match=r"cohesion = .*31\.9 to 42\.7 deg"):
+        make_pile(body(material=Material(friction_angle=20 * u.deg, cohesion=10 * u.Pa)), 100)
+    with pytest.raises(InvalidInput, match="times the central pressure"):
+        make_pile(body(material=Material(cohesion=10 * u.MPa)), 100)
+    with pytest.raises(InvalidInput, match="brittle"):
+        make_pile(body(material=Material(cohesion=10 * u.Pa, brittle=True)), 100)
     with pytest.raises(InvalidInput, match="friction_angle"):
         make_pile(body(material=Material(friction_angle=60 * u.deg)), 100)
+
+
+def test_a_public_pile_has_quantities_of_the_body():
+    b = body()
+    pile = Pile(b, 200, 3)
+    assert pile.positions.shape == (200, 3)
+    np.testing.assert_allclose(pile.masses.sum(), b.mass, rtol=1e-12)
+    np.testing.assert_allclose(
+        (pile.masses[:, None] * pile.positions).sum(axis=0) / b.mass, 0 * u.m, atol=1e-6 * u.m
+    )
+    np.testing.assert_allclose(pile.semi_axes, b.semi_axes, rtol=0.02)
+    np.testing.assert_allclose(pile.spin_vector[2], 2 * np.pi * u.rad / (6 * u.h), rtol=1e-9)
+    assert 0.25 < pile.porosity < 0.45  # random packings of spheres
+    ratio = pile.radii.max() / pile.radii.min()
+    assert 1.8 < ratio < 1.4 / 0.6
+    assert "200 grains, seed 3" in repr(pile)
+    # the state is a copy: advancing it leaves the pile as it was
+    before = pile.positions
+    pile.state().simulation.advance(0.1)
+    np.testing.assert_array_equal(pile.positions, before)
+
+
+def test_a_pile_has_the_form_of_a_polyhedron():
+    shape = Shape.contact_binary([600, 450, 400] * u.m, [400, 350, 300] * u.m, facets=1000)
+    pile = Pile(shape, 300, 1, density=2 * u.g / u.cm**3, spin_period=8 * u.h)
+    # bulk density over the volume of the polyhedron
+    np.testing.assert_allclose(pile.masses.sum() / shape.volume, 2 * u.g / u.cm**3, rtol=1e-9)
+    inertia = shape.inertia.to_value(u.m**2)
+    axes = np.sqrt(2.5 * (inertia.sum() - 2 * inertia))
+    np.testing.assert_allclose(pile.semi_axes.to_value(u.m), axes, rtol=0.03)
+    # the large lobe lies on the same side, and the neck holds as little: third moment and mass about the neck along x
+    x, m = pile.positions.to_value(u.m)[:, 0], (pile.masses / pile.masses.sum()).value
+    corners = shape.vertices.value[shape.facets]
+    cone = (
+        np.einsum("fi,fi->f", corners[:, 0], np.cross(corners[:, 1], corners[:, 2])) / 6.0
+    )  # volumes from the origin
+    third = (cone * (1.0 / 20.0) * _sum_of_products(corners[:, :, 0])).sum() / cone.sum()
+    assert abs(third) ** (1 / 3) > 100.0
+    assert m @ x**3 == pytest.approx(third, rel=0.35)
+    np.testing.assert_allclose(pile.spin_vector[2], 2 * np.pi * u.rad / (8 * u.h), rtol=1e-6)
+
+
+def _sum_of_products(x):
+    """``a b c`` summed over all multisets of three out of the three corners of a facet: 20 times the mean of x^3 in the
+    cone from the origin over it."""
+    a, b, c = x.T
+    return (
+        a**3 + b**3 + c**3 + a * a * b + a * a * c + b * b * a + b * b * c + c * c * a + c * c * b + a * b * c
+    )
+
+
+@pytest.mark.parametrize("index", [-1.0, 0.0, 2.0, 3.0])
+def test_sizes_follow_the_power_law(index):
+    sizes = grain_sizes("power law", index, (1.0, 5.0))
+    r = sizes.draw(40_000, np.random.default_rng(1))
+    assert 1.0 <= r.min() < 1.001
+    assert 4.95 < r.max() <= 5.0
+    # cumulative counts at three radii, five standard errors
+    for x in (1.3, 2.0, 3.5):
+        if index == 0.0:
+            share = 1.0 - np.log(x) / np.log(5.0)
+        else:
+            share = (x**-index - 5.0**-index) / (1.0 - 5.0**-index)
+        assert (r > x).mean() == pytest.approx(share, abs=5 * np.sqrt(share * (1 - share) / len(r)))
+    assert grain_sizes() == GrainSizes()
+
+
+def test_a_pile_with_a_power_law_of_sizes():
+    pile = Pile(body(), 200, 1, "power law", index=3.0, size_range=(1, 4))
+    r = pile.radii / np.median(pile.radii)
+    assert r.max() > 2.0
+    assert (r < 1.3).mean() > 0.65
+    np.testing.assert_allclose(pile.semi_axes, body().semi_axes, rtol=0.03)
+    assert "power law 3" in repr(pile)
+
+
+def test_the_friction_angle_of_a_pile_is_measured():
+    pile = Pile(body(), 100, 1)
+    found, error = pile.friction_angle.to_value(u.deg), pile.friction_angle_error.to_value(u.deg)
+    assert 0.3 < error < 4.0
+    assert abs(found - 35.0) < 3.0 * error
+    loose = Pile(body(material=Material(friction_angle=18 * u.deg)), 100, 1).friction_angle.to_value(u.deg)
+    assert loose < found - 8.0
+
+
+def test_bad_piles_are_refused_by_name():
+    shape = Shape.from_ellipsoid([3, 2, 1] * u.km, facets=200)
+    rho = 2 * u.g / u.cm**3
+    for name, make in {
+        "source": lambda: Pile("Apophis"),
+        "density": lambda: Pile(shape),
+        "spin_period": lambda: Pile(body(), spin_period=3 * u.h),
+        "material": lambda: Pile(shape, density=rho, material="sand"),
+        "grains": lambda: Pile(body(), 7),
+        "seed": lambda: Pile(body(), seed=-1),
+        "index": lambda: Pile(body(), index=3.0),
+        "size_range": lambda: Pile(body(), size_range=(1.0, 20.0)),
+        "friction_angle": lambda: Pile(body(material=Material(friction_angle=70 * u.deg))),
+    }.items():
+        with pytest.raises(InvalidInput, match=name):
+            make()
+    for wrong in ((2.0, 1.0), (0.0, 1.0), (1.0,), "wide", (1.0, np.nan)):
+        with pytest.raises(InvalidInput, match="size_range"):
+            Pile(body(), size_range=wrong)
+    for wrong in ("3", np.nan, True, 11.0):
+        with pytest.raises(InvalidInput, match="index"):
+            Pile(body(), size_distribution="power law", index=wrong)
+    with pytest.raises(UnknownName, match="power law"):
+        Pile(body(), size_distribution="powerlaw")
+    with pytest.raises(UnitMismatch, match="density"):
+        Pile(shape, density=2.0)
+    with pytest.raises(UnsettledBody):
+        Pile(body(state="flowing"))

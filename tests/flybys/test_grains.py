@@ -186,3 +186,44 @@ def test_bad_input_is_refused_and_few_grains_warn():
         fs.flyby(stiff, e, model="grains")
     with pytest.warns(UserWarning, match="40 grains"):
         fs.flyby(BODY, earth(5.96), grains=40, seeds=1, model="grains")
+
+
+def test_a_pile_is_carried_through_an_encounter_as_it_is():
+    pile = fs.Pile(BODY, 100, seed=5)
+    r = fs.flyby(pile, earth(1.9))
+    assert r.rung == "grains"
+    (run,) = r.grains.runs
+    assert run.seed == 5
+    same = fs.flyby(BODY, earth(1.9), grains=100, seeds=[5], model="grains").grains.runs[0]
+    np.testing.assert_array_equal(run.course.positions.value, same.course.positions.value)
+    two = fs.flyby(pile, earth(5.96), seeds=2).grains.runs
+    assert [x.seed for x in two] == [5, 6]
+    coarse = fs.flyby(fs.Pile(BODY, 100, 5, "power law"), earth(1.9)).grains.runs[0]
+    assert coarse.radius.max() / coarse.radius.min() > same.radius.max() / same.radius.min()
+    for options, name in (({"grains": 200}, "grains"), ({"model": "ellipsoid"}, "model")):
+        with pytest.raises(InvalidInput, match=name):
+            fs.flyby(pile, earth(1.9), **options)
+
+
+def test_a_contact_binary_parts_at_its_neck():
+    lobes = np.array([[600, 450, 400], [400, 350, 300]])
+    shape = fs.Shape.contact_binary(*(lobes * u.m), facets=500)
+    pile = fs.Pile(shape, 150, 1, density=2 * u.g / u.cm**3, spin_period=8 * u.h)
+    assert fs.flyby(pile, earth(8.0)).verdict == "INTACT"
+    parted = fs.flyby(pile, earth(4.0))
+    assert parted.bound_fraction == 1.0
+    expected = np.prod(lobes, axis=1) / np.prod(lobes, axis=1).sum()
+    np.testing.assert_allclose(parted.fragments["mass_fraction"], expected, atol=0.05)
+    assert parted.fragments["bound_to"].tolist() == [-1, 0]
+    assert fs.flyby(pile, earth(1.3)).largest_fraction < 0.4
+
+
+def test_cohesion_holds_a_pile_together():
+    # the ellipsoid yields at 50 Pa and stays rigid at 200 Pa; so do grains
+    def pile(cohesion):
+        return BODY.with_(material=fs.Material(cohesion=cohesion * u.Pa))
+
+    weak, strong = (fs.flyby(pile(c), earth(1.9), grains=150, seeds=[1], model="grains") for c in (20, 300))
+    assert weak.largest_fraction < 0.9
+    assert strong.verdict == fs.flyby(pile(300), earth(1.9)).verdict == "INTACT"
+    assert "cohesion 300 Pa" in "; ".join(strong.modelled)

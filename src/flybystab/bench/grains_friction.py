@@ -12,11 +12,8 @@ from pathlib import Path
 
 import numpy as np
 
-from flybystab.body.pile import settled_pile
-from flybystab.core.ellipsoid.rigid_stress import demand, rigid_stress
-from flybystab.core.grains.clumps import moments, semi_axes, spin_of
-from flybystab.core.grains.simulation import Simulation
-from flybystab.core.material.surfaces import code_of
+from flybystab.body.packing import settled_pile
+from flybystab.body.pile_strength import spin_up
 from flybystab.core.numerics.threads import in_order
 from flybystab.typing import Array
 
@@ -31,47 +28,14 @@ POINTS = (
     (0.6, 0.45),
     (0.6, 0.7),
 )
-#: Increment of ``omega^2/(pi G rho)`` and time between two increments (scaled).
-INCREMENT, REST = 0.03, 4.0
-#: First ``omega^2/(pi G rho)``, where friction of 5 deg is mobilised.
-FIRST = 0.24
-
-
-def mobilised(sim: Simulation) -> tuple[float, float, Array]:
-    """Friction angle (deg, compression cone) required by a rigid ellipsoid with the inertia and spin of the pile.
-
-    Also ``omega^2/(pi G rho)`` and the semi-axes, scaled units. A pile in flow need not be in equilibrium.
-    """
-    mass, _, _, inertia, momentum = moments(sim.grains, sim.grains.mass > 0.0)
-    axes, vectors = semi_axes(mass, inertia)
-    spin = vectors.T @ spin_of(inertia, momentum)
-    rho = 3.0 / (4.0 * np.pi * np.prod(axes))
-    stress = np.empty(6)
-    s = axes**2
-    rigid_stress(s[0], s[1], s[2], float(rho), float(np.pi * rho), spin, np.zeros(6), stress)
-    angle, _ = demand(code_of("drucker-prager"), 0.0, 0.0, stress)
-    return float(np.rad2deg(angle)), float(spin @ spin / (np.pi * rho)), axes
 
 
 def friction_angle(mu_s: float, beta: float, seed: int, grains: int = 528) -> tuple[float, Array]:
     """Largest friction angle (deg) that a sphere mobilises in a spin-up, and the course.
 
-    Columns of the course: ``omega^2/(pi G rho)``, mobilised angle, axis ratio c/a. The spin-up ends where c/a falls
-    below 0.8.
+    Columns of the course as of :func:`flybystab.body.pile_strength.spin_up`.
     """
-    sim = settled_pile(np.ones(3), grains, seed, mu_s, beta)
-    course = []
-    for w2 in np.arange(FIRST, 1.8, INCREMENT):
-        mass, _, _, inertia, momentum = moments(sim.grains, sim.grains.mass > 0.0)
-        axes, _ = semi_axes(mass, inertia)
-        rate = np.sqrt(w2 * np.pi * 3.0 / (4.0 * np.pi * np.prod(axes)))
-        sim.add_spin(np.array([0.0, 0.0, rate]) - spin_of(inertia, momentum))
-        sim.advance(REST)
-        angle, reached, axes = mobilised(sim)
-        course.append((reached, angle, axes[2] / axes[0]))
-        if axes[2] / axes[0] < 0.8:
-            break
-    rows = np.array(course)
+    rows = spin_up(settled_pile(np.ones(3), grains, seed, mu_s, beta), surface="drucker-prager")
     return float(rows[:, 1].max()), rows
 
 

@@ -1,95 +1,49 @@
-"""Rubble piles of grains with the shape, density, spin and friction angle of a body.
+"""Rubble piles of grains with the shape, density, spin, friction angle and cohesion of a body.
 
-A pile is made in scaled units (:mod:`flybystab.core.grains.state`), where one without cohesion has neither size nor
-density, and kept on disk by its inputs. Recipe: spheres fall together with little friction in a central field whose
-level surfaces are similar to the ellipsoid; the wanted number is carved out; friction is switched on, and the pile
-settles under its own gravity, at first with a drag. A spinning pile is spun up rigidly and relaxes.
+A pile is made in scaled units (:mod:`flybystab.body.packing`), where one without cohesion has neither size nor density,
+and kept on disk by its inputs. Cohesion is switched on in the settled pile; a spinning one is spun up rigidly and
+relaxes.
 """
 
 from __future__ import annotations
 
-import csv
-import hashlib
-import json
 import os
-import tempfile
-import zipfile
-from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cache
-from importlib.resources import files
-from pathlib import Path
+from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any
 
 import astropy.units as u
 import numpy as np
-from numpy.typing import NDArray
+from astropy.units import Quantity
 
-from flybystab.body.body import Body
+from flybystab.body.body import Body, Material, check_settled
+from flybystab.body.grain_calibration import Friction, contact_cohesion, contact_friction
+from flybystab.body.grain_sizes import GrainSizes, grain_sizes
+from flybystab.body.packing import settled_pile, simulation_of
+from flybystab.body.pile_cache import stored_pile
+from flybystab.body.pile_strength import spin_up
+from flybystab.body.shape import Shape
 from flybystab.constants import G
 from flybystab.core.grains.clumps import moments, semi_axes, spin_of
-from flybystab.core.grains.neighbours import Pairs, empty_pairs
 from flybystab.core.grains.simulation import Simulation
-from flybystab.core.grains.state import Grains, contact_parameters
+from flybystab.core.numerics.threads import in_order
 from flybystab.errors import InvalidInput
 from flybystab.typing import Array
+from flybystab.units import whole
 
-#: Changes with the recipe, so that piles made by an older one are not taken for new ones.
-RECIPE = 1
-#: Radii of grains, over their mean.
-SIZES = (0.6, 1.4)
-#: Sum of the grains' volumes over that of the ellipsoid, of the first guess.
-_PACKING = 0.6
-#: Grains in the cloud, over those wanted.
-_SURPLUS = 1.35
-#: Size of the cloud, over that of the ellipsoid.
-_CLOUD = 1.75
 #: Fewer grains than this resolve no shape, more than this need hours.
 LEAST, MOST = 20, 200_000
-
-
-@dataclass(frozen=True)
-class Friction:
-    """Contact friction with the friction angle that a pile of such grains has."""
-
-    mu_s: float
-    beta: float
-    angle: float  #: deg
-
-
-@cache
-def friction_table() -> tuple[Friction, ...]:
-    """Calibrated friction, by angle: spin-up of spheres, ``flybystab bench grains``."""
-    lines = [x for x in files("flybystab.data").joinpath("grains_friction.csv").read_text().splitlines() if x]
-    rows = csv.DictReader(x for x in lines if not x.startswith("#"))
-    found = [Friction(float(r["mu_s"]), float(r["beta"]), float(r["friction_angle_deg"])) for r in rows]
-    return tuple(sorted(found, key=lambda f: f.angle))
-
-
-def contact_friction(angle: float) -> Friction:
-    """Contact friction of a pile with a friction angle (rad), interpolated in the calibrated table.
-
-    Raises
-    ------
-    InvalidInput
-        The angle is beyond the table.
-    """
-    table, degrees = friction_table(), float(np.rad2deg(angle))
-    angles = [f.angle for f in table]
-    if not angles[0] - 1e-9 <= degrees <= angles[-1] + 1e-9:
-        raise InvalidInput(
-            "friction_angle",
-            f"{degrees:g} deg",
-            f"an angle for which grains are calibrated: {angles[0]:.1f} to {angles[-1]:.1f} deg",
-        )
-    mu_s = float(np.interp(degrees, angles, [f.mu_s for f in table]))
-    beta = float(np.interp(degrees, angles, [f.beta for f in table]))
-    return Friction(mu_s, beta, degrees)
+#: Memory of a pile, bytes a grain.
+_BYTES = 4000
+#: Time in which a cohesive pile comes to rest before it is spun up (scaled), and the drag in it.
+_COHERED, _DRAG = 1.0, 3.0
+#: Spheres that measure a friction angle.
+_SPHERES = 3
 
 
 @dataclass
-class Pile:
-    """A pile of grains in scaled units, with its body's scale.
+class PileState:
+    """A pile at the start of an encounter, in scaled units, with the scale of its body.
 
     Attributes
     ----------
@@ -117,17 +71,31 @@ class Pile:
         return len(self.simulation.grains.mass)
 
 
-def make_pile(body: Body, grains: int = 500, seed: int = 0, **options: Any) -> Pile:
-    """A pile with the shape, density, spin and friction angle of a body.
+def make_pile(
+    body: Body,
+    grains: int = 500,
+    seed: int = 0,
+    friction: Friction | None = None,
+    *,
+    shape: Shape | None = None,
+    sizes: GrainSizes | None = None,
+    **options: Any,
+) -> PileState:
+    """A pile with the shape, density, spin, friction angle and cohesion of a body.
 
     Parameters
     ----------
     body : Body
-        Its cohesion must be zero.
     grains : int
         Number of grains.
     seed : int
         Piles of different seeds differ in the places and sizes of all grains.
+    friction : Friction, optional
+        Contact friction instead of that calibrated for the body's friction angle.
+    shape : Shape, optional
+        Carved out instead of the ellipsoid; the body is the one that stands for it.
+    sizes : GrainSizes, optional
+        Of the grains.
     **options
         Of :class:`flybystab.core.grains.simulation.Simulation`, for tests of the numerics; and `overlap`, the mean
         overlap that sets the stiffness. Not for piles from the cache.
@@ -135,52 +103,83 @@ def make_pile(body: Body, grains: int = 500, seed: int = 0, **options: Any) -> P
     Raises
     ------
     InvalidInput
-        A friction angle beyond the calibrated range, cohesion, or a number of grains out of range.
+        A friction angle beyond the calibrated range, cohesion that is not calibrated, or a number of grains out of
+        range.
     """
-    check_grains(body, grains)
-    friction = contact_friction(body.material.phi)
-    shape = body.axes / np.cbrt(np.prod(body.axes))
-    settled = _cached(
-        {"shape": shape, "grains": grains, "seed": seed, "mu_s": friction.mu_s, "beta": friction.beta},
-        lambda: settled_pile(shape, grains, seed, friction.mu_s, friction.beta),
+    if friction is None:
+        check_grains(body, grains)
+    friction = friction or contact_friction(body.material.phi)
+    axes = body.axes / np.cbrt(np.prod(body.axes))
+    inputs: dict[str, Any] = {
+        "shape": axes, "grains": grains, "seed": seed, "mu_s": friction.mu_s, "beta": friction.beta,
+    }  # fmt: skip
+    if sizes is not None and sizes != GrainSizes():
+        inputs |= {"sizes": [sizes.low, sizes.high, sizes.index], "distribution": sizes.distribution}
+    if shape is not None:
+        points = shape.vertices.value / shape.mean_radius.value
+        inputs |= {"facets": shape.facets.ravel(), "vertices": points.ravel()}
+    settled = stored_pile(
+        inputs, lambda: settled_pile(axes, grains, seed, friction.mu_s, friction.beta, sizes, shape)
     )
-    sim = simulation_of(settled, friction.mu_s, friction.beta, **options)
-    return spun(sim, body, friction)
+    strength = body.material.c_pa / _pressure_unit(body)
+    cohesion = contact_cohesion(body.material.c_pa, friction, _central_pressure(body)) / _pressure_unit(body)
+    sim = simulation_of(
+        settled, friction.mu_s, friction.beta, cohesion=cohesion, strength=strength, **options
+    )
+    if cohesion > 0.0:
+        sim.advance(_COHERED, drag=_DRAG)
+        sim.centre()
+    return spun(sim, body, friction, 1.0 if shape is None else _spread_out(shape))
+
+
+def _spread_out(shape: Shape) -> float:
+    """Size of the ellipsoid with the inertia of a shape over that of the equivalent ellipsoid of equal volume."""
+    return float(np.sqrt(2.5 * np.sum(shape.inertia.value) / np.sum(shape.ellipsoid().value ** 2)))
+
+
+def _pressure_unit(body: Body) -> float:
+    """Unit of pressure of the simulation, ``G M^2/R^4``, Pa."""
+    return float(G * body.mass.to_value(u.kg) ** 2 / np.prod(body.axes) ** (4.0 / 3.0))
+
+
+def _central_pressure(body: Body) -> float:
+    """Pressure in the middle of the sphere of equal mass and volume, Pa."""
+    return float(2.0 / 3.0 * np.pi * G * body.rho**2 * np.prod(body.axes) ** (2.0 / 3.0))
 
 
 def check_grains(body: Body, grains: int) -> None:
     """Refuse a number of grains, or a body, for which no pile is made."""
     if not isinstance(grains, int | np.integer) or isinstance(grains, bool) or not grains >= LEAST:
         raise InvalidInput("grains", grains, f"a whole number of grains, {LEAST} or more")
-    most = min(MOST, int(_memory() / 4000))
+    most = min(MOST, int(_memory() / _BYTES))
     if grains > most:
         raise InvalidInput(
             "grains", grains, f"at most {most} grains, for the memory and the time that they take"
         )
-    if body.material.c_pa > 0.0:
-        raise InvalidInput(
-            "cohesion",
-            body.material.cohesion,
-            "no cohesion: that of grains is not calibrated against the bulk's",
-        )
-    contact_friction(body.material.phi)
+    friction = contact_friction(body.material.phi)
+    contact_cohesion(body.material.c_pa, friction, _central_pressure(body))
+    if body.material.brittle and body.material.c_pa > 0.0:
+        raise InvalidInput("brittle", True, "False: contacts of grains that meet again cohere again")
 
 
 def _memory() -> float:
-    """Bytes of memory of this machine; unlimited where it does not say."""
+    """Bytes of memory of this machine; infinite where it is not known."""
     try:
         return float(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES"))
     except (AttributeError, ValueError, OSError):
         return np.inf
 
 
-def spun(sim: Simulation, body: Body, friction: Friction) -> Pile:
-    """The pile spun up to the body's spin, relaxed and turned back to body axes."""
+def spun(sim: Simulation, body: Body, friction: Friction, size: float = 1.0) -> PileState:
+    """The pile spun up to the body's spin, relaxed and turned back to body axes.
+
+    `size` is that of the ellipsoid with the pile's inertia over that of the body.
+    """
     g = sim.grains
     everything = g.mass > 0.0
     mass, _, _, inertia, _ = moments(g, everything)
     axes, _ = semi_axes(mass, inertia)
-    length = float(np.cbrt(np.prod(body.axes) / np.prod(axes)))
+    length = size * float(np.cbrt(np.prod(body.axes) / np.prod(axes)))
     unit = float(np.sqrt(length**3 / (G * body.mass.to_value(u.kg))))
     spin = body.omega * unit
     start = g.x.copy()
@@ -196,144 +195,159 @@ def spun(sim: Simulation, body: Body, friction: Friction) -> Pile:
     mass, _, _, inertia, momentum = moments(g, everything)
     axes, _ = semi_axes(mass, inertia)
     sim.time = 0.0
-    return Pile(sim, length, unit, friction, axes * length, spin_of(inertia, momentum) / unit)
+    return PileState(sim, length, unit, friction, axes * length, spin_of(inertia, momentum) / unit)
 
 
-def settled_pile(shape: Array, grains: int, seed: int, mu_s: float, beta: float) -> Simulation:
-    """A pile at rest with semi-axes in the ratios of `shape` (longest first, product one), scaled units."""
-    generator = np.random.default_rng(np.random.SeedSequence([seed, grains]))
-    cloud = round(_SURPLUS * grains) + 20
-    radius = generator.uniform(*SIZES, cloud)
-    radius *= np.cbrt(_PACKING / (grains * np.mean(radius**3)))
-    x = _scattered(shape * _CLOUD, radius, generator)
-    mass = radius**3 / (grains * np.mean(radius**3))
-    falling = Grains(x, np.zeros_like(x), np.zeros_like(x), radius, mass)
-    loose = contact_parameters(float(radius.mean()), mu_s=0.2, beta=0.0)
-    sim = Simulation.of(falling, loose)
-    field = np.array([1.0, *(1.0 / shape**2)])
-    sim.advance(3.5, gravity=False, pull=field, drag=0.6)
-    sim.advance(1.5, gravity=False, pull=field, drag=3.0)
-    chosen = _carved(sim.grains, shape, grains)
-    g = Grains(*(a[chosen].copy() for a in sim.grains))
-    g = g._replace(mass=g.mass / g.mass.sum())
-    everything = np.ones(grains, np.bool_)
-    m, _, _, inertia, _ = moments(g, everything)
-    axes, turn = semi_axes(m, inertia)
-    g.x[:] /= np.cbrt(np.prod(axes))
-    g.radius[:] /= np.cbrt(np.prod(axes))
-    g.v[:], g.w[:] = 0.0, 0.0
-    sim = Simulation.of(g, contact_parameters(float(g.radius.mean()), mu_s=mu_s, beta=beta))
-    sim.centre()
-    sim.advance(1.9, drag=3.0)
-    sim.advance(1.9)
-    sim.centre()
-    m, _, _, inertia, momentum = moments(g, everything)
-    sim.add_spin(-spin_of(inertia, momentum))
-    _, turn = semi_axes(m, inertia)
-    sim.rotate(turn.T)
-    return sim
+@dataclass(frozen=True, eq=False)
+class Pile:
+    """A rubble pile of grains.
 
+    Parameters
+    ----------
+    source : Body or Shape
+        The pile has its shape: an ellipsoid, or a polyhedron in its principal axes.
+    grains : int
+        Number of grains.
+    seed : int
+        Piles of different seeds differ in the places and sizes of all grains.
+    size_distribution : str
+        ``"uniform"`` in the radius, or ``"power law"``: the number of grains larger than ``r`` goes as ``r^-index``.
+    index : float, optional
+        Exponent of the power law, 3 by default.
+    size_range : (float, float), optional
+        Smallest and largest radius in any unit, at most 1:10; 0.6 to 1.4 (uniform) or 0.5 to 2 by default.
+    density, spin_period, spin, material
+        Of a pile with the shape of a polyhedron, as for :meth:`Body.from_shape`; a body has its own.
 
-def _scattered(axes: Array, radius: Array, generator: np.random.Generator) -> Array:
-    """Places of spheres at random in an ellipsoid, none overlapping, the largest placed first."""
-    x = np.empty((len(radius), 3))
-    order = np.argsort(-radius)
-    for k, i in enumerate(order):
-        placed = order[:k]
-        while True:
-            p = generator.uniform(-1.0, 1.0, 3)
-            if p @ p > 1.0:
-                continue
-            p = p * axes
-            gap = ((x[placed] - p) ** 2).sum(axis=1) - (radius[placed] + radius[i]) ** 2
-            if not (gap < 0.0).any():
-                x[i] = p
-                break
-    return x
+    Raises
+    ------
+    InvalidInput, UnknownName, UnitMismatch, UnsettledBody
 
-
-def _carved(g: Grains, shape: Array, count: int) -> NDArray[np.int64]:
-    """The `count` grains inside an ellipsoid, its axes such that those of the grains' inertia have the right ratios."""
-    axes = shape.copy()
-    chosen = np.arange(count)
-    for _ in range(30):
-        order = np.argsort(((g.x / axes) ** 2).sum(axis=1), kind="stable")
-        chosen = np.sort(order[:count])
-        member = np.zeros(len(g.mass), np.bool_)
-        member[chosen] = True
-        x, m = g.x[member], g.mass[member]
-        x = x - m @ x / m.sum()
-        # second moments along the axes of the ellipsoid, the grains' own included
-        a2 = 5.0 * (m @ x**2 + 0.2 * m @ g.radius[member] ** 2) / m.sum()
-        found = np.sqrt(a2 / np.cbrt(np.prod(a2)))
-        axes *= np.sqrt(shape / found)
-        axes /= np.cbrt(np.prod(axes))
-    return chosen
-
-
-def cache_folder() -> Path:
-    """Folder of the stored piles: ``$FLYBYSTAB_CACHE``, or ``flybystab`` in the user's cache folder."""
-    own = os.environ.get("FLYBYSTAB_CACHE")
-    if own:
-        return Path(own) / "piles"
-    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "flybystab" / "piles"
-
-
-def _cached(inputs: dict[str, Any], make: Callable[[], Simulation]) -> dict[str, Array]:
-    """The arrays of a settled pile, read from disk if they are there and whole."""
-    plain = {k: [round(float(x), 9) for x in np.atleast_1d(v)] for k, v in inputs.items()}
-    key = hashlib.sha256(json.dumps([RECIPE, plain], sort_keys=True).encode()).hexdigest()[:32]
-    path = cache_folder() / f"{key}.npz"
-    n = int(inputs["grains"])
-    try:
-        with np.load(path, allow_pickle=False) as stored:
-            found = {k: stored[k] for k in _STORED}
-        if found["x"].shape == (n, 3) and all(np.all(np.isfinite(a)) for a in found.values()):
-            return found
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
-        pass
-    arrays = _arrays(make())
-    try:
-        path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".part", delete=False) as file:
-            np.savez(file, **arrays)  # type: ignore[arg-type]
-        os.replace(file.name, path)
-    except OSError:  # a cache that cannot be written is none
-        pass
-    return arrays
-
-
-_STORED = ("x", "v", "w", "radius", "mass", "first", "other", "spring", "touching")
-
-
-def _arrays(sim: Simulation) -> dict[str, Array]:
-    p, last = sim.pairs, sim.pairs.first[-1]
-    return {
-        **sim.grains._asdict(),
-        "first": p.first,
-        "other": p.other[:last],
-        "spring": p.spring[:last],
-        "touching": p.touching[:last],
-    }
-
-
-def simulation_of(
-    arrays: dict[str, Array], mu_s: float, beta: float, overlap: float | None = None, **options: Any
-) -> Simulation:
-    """A simulation from stored arrays, with the history of its contacts.
-
-    With another `overlap` than the pile was made with, springs keep their forces.
+    Notes
+    -----
+    The pile is made when a property is first asked for, or read from the cache. ``flyby(pile, encounter)`` carries it
+    through an encounter.
     """
-    g = Grains(*(np.array(arrays[k], dtype=float) for k in ("x", "v", "w", "radius", "mass")))
-    n, last = len(g.mass), len(arrays["other"])
-    pairs: Pairs = empty_pairs(n)
-    pairs.first[:] = arrays["first"]
-    pairs.other[:last] = arrays["other"]
-    pairs.spring[:last] = arrays["spring"]
-    pairs.touching[:last] = arrays["touching"]
-    contact = contact_parameters(float(g.radius.mean()), mu_s=mu_s, beta=beta)
-    if overlap is not None:
-        contact_of = contact_parameters(float(g.radius.mean()), mu_s=mu_s, beta=beta, overlap=overlap)
-        pairs.spring[:last] *= contact.k_n / contact_of.k_n
-        contact = contact_of
-    return Simulation(g, contact, pairs, **options)
+
+    source: Body | Shape
+    grains: int = 500
+    seed: int = 0
+    size_distribution: str = "uniform"
+    index: float | None = None
+    size_range: tuple[float, float] | None = None
+    density: Quantity | None = field(default=None, kw_only=True)
+    spin_period: Quantity | None = field(default=None, kw_only=True)
+    spin: Quantity | None = field(default=None, kw_only=True)
+    material: Material | None = field(default=None, kw_only=True)
+
+    body: Body = field(init=False, repr=False)  #: the ellipsoid that stands for the pile
+    sizes: GrainSizes = field(init=False, repr=False)
+
+    def __post_init__(self) -> None:
+        given = {k: getattr(self, k) for k in ("density", "spin_period", "spin", "material")}
+        if isinstance(self.source, Body):
+            for name, value in given.items():
+                if value is not None:
+                    raise InvalidInput(name, value, "the one of the body: body.with_(...) changes it")
+            body = self.source
+        elif isinstance(self.source, Shape):
+            if self.density is None:
+                raise InvalidInput("density", None, "the bulk density: a shape has none")
+            body = Body.from_shape(self.source, **given)
+        else:
+            raise InvalidInput("source", self.source, "a Body or a Shape")
+        check_settled(body)
+        check_grains(body, self.grains)
+        whole(self.seed, "seed", 0)
+        object.__setattr__(self, "body", body)
+        sizes = grain_sizes(self.size_distribution, self.index, self.size_range)
+        object.__setattr__(self, "sizes", sizes)
+
+    def state(self, seed: int | None = None) -> PileState:
+        """A copy for a simulation: of this pile, or of another seed."""
+        return make_pile(
+            self.body,
+            self.grains,
+            self.seed if seed is None else seed,
+            shape=self.source if isinstance(self.source, Shape) else None,
+            sizes=self.sizes,
+        )
+
+    @cached_property
+    def _state(self) -> PileState:
+        return self.state()
+
+    @property
+    def positions(self) -> Quantity:
+        """Centres of the grains from the centre of mass, ``(n, 3)``, body axes, m."""
+        return self._state.simulation.grains.x * self._state.length * u.m
+
+    @property
+    def radii(self) -> Quantity:
+        """Radii of the grains, ``(n,)``, m."""
+        return self._state.simulation.grains.radius * self._state.length * u.m
+
+    @property
+    def masses(self) -> Quantity:
+        """Masses of the grains, ``(n,)``, kg."""
+        return self._state.simulation.grains.mass * self.body.mass
+
+    @property
+    def semi_axes(self) -> Quantity:
+        """Semi-axes of the ellipsoid with the inertia of the pile, longest first, m."""
+        return self._state.axes * u.m
+
+    @property
+    def spin_vector(self) -> Quantity:
+        """Angular velocity of the rigid body with the pile's inertia and angular momentum, body axes, rad/s."""
+        return self._state.spin * u.rad / u.s
+
+    @property
+    def porosity(self) -> float:
+        """Share of the body's volume that the grains do not fill."""
+        return 1.0 - float((4.0 / 3.0 * np.pi * (self.radii**3).sum() / self.body.volume).to_value(u.one))
+
+    @cached_property
+    def _measured(self) -> tuple[float, float]:
+        friction = contact_friction(self.body.material.phi)
+
+        def course(seed: int) -> Array:
+            sim = settled_pile(np.ones(3), self.grains, seed, friction.mu_s, friction.beta, self.sizes)
+            return spin_up(sim, _first(0.6 * self.body.material.phi))
+
+        seeds = range(self.seed, self.seed + _SPHERES)
+        courses = list(in_order(course, seeds, min(_SPHERES, os.cpu_count() or 1)))
+        peaks = np.array([c[:, 1].max() for c in courses])
+        # the peak lies between two increments of the spin
+        increment = max(float(np.diff(c[: c[:, 1].argmax() + 1, 1])[-1:].sum()) for c in courses)
+        return float(peaks.mean()), float(np.hypot(peaks.std(ddof=1) / np.sqrt(_SPHERES), 0.5 * increment))
+
+    @property
+    def friction_angle(self) -> Quantity:
+        """Friction angle of piles of such grains, deg, measured as the largest that spheres mobilise in a spin-up.
+
+        The spheres have the number, sizes and contact friction of the grains of this pile, and its seed and the next
+        two. The first access takes about as long as thirty encounters.
+        """
+        return self._measured[0] * u.deg
+
+    @property
+    def friction_angle_error(self) -> Quantity:
+        """Error of :attr:`friction_angle`, deg: standard error over the spheres, and half an increment of the spin."""
+        return self._measured[1] * u.deg
+
+    def __repr__(self) -> str:
+        kind = (
+            "" if self.size_distribution == "uniform" else f", {self.size_distribution} {self.sizes.index:g}"
+        )
+        return f"<Pile {self.grains} grains{kind}, seed {self.seed}, {repr(self.source)[1:-1]}>"
+
+
+def _first(angle: float) -> float:
+    """``omega^2/(pi G rho)`` at which a sphere mobilises a friction angle (rad) of Mohr-Coulomb.
+
+    Mean pressures ``(rho a^2/5)(4/3 pi G rho - omega^2)`` across the spin and ``(rho a^2/5)(4/3 pi G rho)`` along it,
+    in the ratio ``(1 - sin phi)/(1 + sin phi)``.
+    """
+    sin = np.sin(angle)
+    return float(4.0 / 3.0 * (1.0 - (1.0 - sin) / (1.0 + sin)))

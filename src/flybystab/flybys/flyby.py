@@ -6,11 +6,12 @@ from collections.abc import Sequence
 from typing import Any
 
 from flybystab.body.body import YIELD_SURFACES, Body, check_settled
+from flybystab.body.pile import Pile
 from flybystab.encounter.attitude import attitude_matrix
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput, NotConverged
 from flybystab.flybys.batch import TOLERANCE, Judged, axis_ratio, one_row, step_tolerance
-from flybystab.flybys.grains_flyby import SEEDS, handed_on, request
+from flybystab.flybys.grains_flyby import handed_on, request
 from flybystab.flybys.inputs import FlybyInputs
 from flybystab.flybys.result import FlybyResult
 from flybystab.flybys.robustness import phases_of, robustness_of
@@ -22,7 +23,7 @@ ROWS = 20_000
 
 
 def flyby(
-    body: Body,
+    body: Body | Pile,
     encounter: Encounter,
     attitude: Any = None,
     *,
@@ -33,14 +34,15 @@ def flyby(
     max_axis_ratio: float = 6.0,
     robustness: bool | int = False,
     grains: int | str | None = None,
-    seeds: int | Sequence[int] = SEEDS,
+    seeds: int | Sequence[int] | None = None,
     model: str | None = None,
 ) -> FlybyResult:
     """Follow a body through an encounter.
 
     Parameters
     ----------
-    body : Body
+    body : Body or Pile
+        A pile of grains is run as such, whatever its ellipsoid says.
     encounter : Encounter
         From :meth:`Encounter.hyperbolic` or :meth:`Encounter.from_orbit`.
     attitude : array_like (3, 3) or scipy Rotation, optional
@@ -64,7 +66,8 @@ def flyby(
         Number of grains of the piles that answer where the ellipsoid ends (beyond `max_axis_ratio`, with loss of
         mass, out of contact); ``"always"`` runs 500 grains whatever the ellipsoid says.
     seeds : int or sequence of int
-        How many piles, or which; their outcomes are the distribution ``result.grains``.
+        How many piles, or which; their outcomes are the distribution ``result.grains``. 8 for a body; of a pile that
+        one alone, or as many from its seed on.
     model : str, optional
         ``"grains"`` forces grains, ``"ellipsoid"`` excludes them.
 
@@ -81,6 +84,8 @@ def flyby(
     NotConverged
         If the integrator cannot go on; the message says where.
     """
+    pile = body if isinstance(body, Pile) else None
+    body = body.body if isinstance(body, Pile) else body
     check_settled(body)
     if not isinstance(encounter, Encounter):
         raise InvalidInput("encounter", encounter, "a flybystab.Encounter")
@@ -90,7 +95,7 @@ def flyby(
         if not isinstance(value, bool):
             raise InvalidInput(name, value, "True or False")
     tolerance, max_axis_ratio = step_tolerance(tolerance), axis_ratio(max_axis_ratio)
-    asked, phases = request(grains, seeds, model), phases_of(robustness)
+    asked, phases = request(grains, seeds, model, pile), phases_of(robustness)
     rotation = encounter.periapsis_axes.T @ attitude_matrix(attitude)
     inputs = FlybyInputs(body, encounter, rotation, tolerance, max_axis_ratio)
     row = one_row(body, encounter, rotation)
@@ -106,7 +111,7 @@ def flyby(
     result = FlybyResult(inputs, run, comparison, verdicts)
     if phases:
         result = result.with_(robustness=robustness_of(inputs, run, phases))
-    return handed_on(result, body, encounter, rotation, asked)
+    return handed_on(result, body, encounter, rotation, asked, pile)
 
 
 def _comparison(inputs: FlybyInputs, row: tuple[Any, ...]) -> Judged:

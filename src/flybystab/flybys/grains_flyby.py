@@ -24,7 +24,7 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.body.body import DENSITY_RANGE, Body
-from flybystab.body.pile import Pile, check_grains, make_pile
+from flybystab.body.pile import Pile, PileState, check_grains, make_pile
 from flybystab.core.dynamics.ground import Ground, no_ground
 from flybystab.core.ellipsoid.tide import TidePanels
 from flybystab.core.grains.clumps import LINK, bound_clumps, friends_of_friends, moments, semi_axes, spin_of
@@ -248,13 +248,14 @@ def grains_flyby(
     grains: int = 500,
     seeds: int | Sequence[int] = SEEDS,
     threads: int | None = None,
+    pile: Pile | None = None,
 ) -> GrainsOutcome:
     """Carry piles of grains through an encounter.
 
     Parameters
     ----------
     body : Body
-        Without cohesion, with a friction angle in the calibrated range.
+        With a friction angle and a cohesion in the calibrated range.
     encounter : Encounter
         One whose path clears the planet.
     rotation : ndarray (3, 3)
@@ -265,6 +266,8 @@ def grains_flyby(
         How many piles, or which.
     threads : int, optional
         At a time; all cores by default. Results do not depend on it.
+    pile : Pile, optional
+        Of this body: gives the shape and the sizes of the grains.
 
     Raises
     ------
@@ -287,7 +290,9 @@ def grains_flyby(
     cores = os.cpu_count() or 1
     runs = tuple(
         in_order(
-            lambda seed: one_pile(make_pile(body, grains, seed), body, encounter, rotation, seed),
+            lambda seed: one_pile(
+                pile.state(seed) if pile else make_pile(body, grains, seed), body, encounter, rotation, seed
+            ),
             chosen,
             threads or cores,
         )
@@ -298,12 +303,14 @@ def grains_flyby(
         rows.add_column(np.full(len(rows), run.seed), name="seed", index=0)
         tables.append(rows)
     friction = np.rad2deg(body.material.phi)
+    strength = body.material.c_pa
+    cohesion = f"cohesion {strength:g} Pa (calibrated by pulling and shearing)" if strength else "no cohesion"
     low, high = (np.percentile([r.end_time.to_value(u.h) for r in runs], q) for q in (0, 100))
     unsettled = sum(not r.settled for r in runs)
     modelled = (
         *encounter.forces,
         f"{len(runs)} piles of {grains} grains, soft spheres, direct sum of gravity",
-        f"friction angle {friction:g} deg (calibrated by spin-up), no cohesion",
+        f"friction angle {friction:g} deg (calibrated by spin-up), {cohesion}",
         f"until clumps had not changed for {QUIET:g} dynamical times, {low:.1f} to {high:.1f} h after closest approach"
         + (f"; in {unsettled} runs they still did" if unsettled else ""),
     )
@@ -326,7 +333,7 @@ def _seeds(seeds: int | Sequence[int]) -> list[int]:
     return chosen
 
 
-def one_pile(pile: Pile, body: Body, encounter: Encounter, rotation: Array, seed: int = 0) -> GrainsRun:
+def one_pile(pile: PileState, body: Body, encounter: Encounter, rotation: Array, seed: int = 0) -> GrainsRun:
     """Carry one pile through an encounter (see :func:`grains_flyby`)."""
     begun = clock.perf_counter()
     sim, unit = pile.simulation, pile.time
@@ -401,7 +408,7 @@ def _tide(encounter: Encounter, unit: float) -> TidePanels:
     return TidePanels(tide.tau / unit, tide.start, tide.width, tide.coefficients * unit**2)
 
 
-def _ground(encounter: Encounter, body: Body, pile: Pile) -> Ground:
+def _ground(encounter: Encounter, body: Body, pile: PileState) -> Ground:
     """The ground on the scaled clock; none where no part of a stretched body gets there."""
     ground = ground_near(encounter, _REACH * float(body.axes[0]))
     if ground.coefficients.shape[0] == 0:
@@ -479,7 +486,7 @@ def _quiet(rows: list[tuple[float, ...]], masses: list[Array]) -> bool:
     return False
 
 
-def _fragments(sim: Simulation, pile: Pile) -> tuple[QTable, NDArray[np.int64]]:
+def _fragments(sim: Simulation, pile: PileState) -> tuple[QTable, NDArray[np.int64]]:
     """Table of the clumps, the most massive first, and the row of each grain."""
     g = _at_positions(sim)
     sizes, label = _clumps(g)
@@ -542,8 +549,10 @@ class Request(NamedTuple):
     seeds: list[int]
 
 
-def request(grains: int | str | None, seeds: int | Sequence[int], model: str | None) -> Request:
-    """Check ``grains=``, ``seeds=`` and ``model=``.
+def request(
+    grains: int | str | None, seeds: int | Sequence[int] | None, model: str | None, pile: Pile | None = None
+) -> Request:
+    """Check ``grains=``, ``seeds=`` and ``model=``; a pile is always run, by default alone.
 
     Raises
     ------
@@ -551,7 +560,16 @@ def request(grains: int | str | None, seeds: int | Sequence[int], model: str | N
     """
     if model not in (None, "ellipsoid", "grains"):
         raise InvalidInput("model", model, "'ellipsoid', 'grains', or None for the first that can answer")
-    chosen = _seeds(seeds)
+    if pile is not None:
+        if grains is not None:
+            raise InvalidInput("grains", grains, "none beside a Pile, which has its own")
+        if model == "ellipsoid":
+            raise InvalidInput("model", model, "'grains' or None for a Pile; pile.body is the ellipsoid")
+        if seeds is None:
+            return Request(pile.grains, True, [pile.seed])
+        numbered = isinstance(seeds, int | np.integer)
+        return Request(pile.grains, True, [k + pile.seed if numbered else k for k in _seeds(seeds)])
+    chosen = _seeds(SEEDS if seeds is None else seeds)
     if grains is None and model != "grains":
         return Request(0, False, chosen)
     if model == "ellipsoid":
@@ -563,7 +581,12 @@ def request(grains: int | str | None, seeds: int | Sequence[int], model: str | N
 
 
 def handed_on(
-    result: FlybyResult, body: Body, encounter: Encounter, rotation: Array, asked: Request
+    result: FlybyResult,
+    body: Body,
+    encounter: Encounter,
+    rotation: Array,
+    asked: Request,
+    pile: Pile | None = None,
 ) -> FlybyResult:
     """The result of the ellipsoid, or of grains where it hands on to them or they are forced.
 
@@ -579,7 +602,7 @@ def handed_on(
     needed = result.verdict in HANDED_ON or (apart and result.verdict != Verdict.IMPACT)
     if encounter.impact or not (asked.always or needed):
         return result
-    outcome = grains_flyby(body, encounter, rotation, grains=asked.grains, seeds=asked.seeds)
+    outcome = grains_flyby(body, encounter, rotation, grains=asked.grains, seeds=asked.seeds, pile=pile)
     run, verdict = outcome.median, outcome.verdict
     return result.with_(
         verdict=verdict,

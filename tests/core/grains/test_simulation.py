@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from flybystab.body.pile import settled_pile
+from flybystab.body.packing import settled_pile
 from flybystab.core.ellipsoid.tide import TidePanels
 from flybystab.core.grains.gravity import direct_sum
 from flybystab.core.grains.neighbours import empty_pairs, find_pairs

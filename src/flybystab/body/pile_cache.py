@@ -1,0 +1,75 @@
+"""Settled piles on disk, by their inputs."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from flybystab.core.grains.simulation import Simulation
+from flybystab.typing import Array
+
+#: Changes with the recipe, so that piles made by an older one are not taken for new ones.
+RECIPE = 1
+_STORED = ("x", "v", "w", "radius", "mass", "first", "other", "spring", "touching")
+
+
+def cache_folder() -> Path:
+    """Folder of the stored piles: ``$FLYBYSTAB_CACHE``, or ``flybystab`` in the user's cache folder."""
+    own = os.environ.get("FLYBYSTAB_CACHE")
+    if own:
+        return Path(own) / "piles"
+    return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "flybystab" / "piles"
+
+
+def stored_pile(inputs: dict[str, Any], make: Callable[[], Simulation]) -> dict[str, Array]:
+    """The arrays of a settled pile, read from disk if they are there and whole.
+
+    Parameters
+    ----------
+    inputs : dict
+        What determines the pile: numbers, arrays of numbers or texts; `grains`, their number, among them.
+    make : callable
+        Makes the pile where it is not there.
+    """
+    plain = {
+        k: v if isinstance(v, str) else [round(float(x), 9) for x in np.atleast_1d(v)]
+        for k, v in inputs.items()
+    }
+    key = hashlib.sha256(json.dumps([RECIPE, plain], sort_keys=True).encode()).hexdigest()[:32]
+    path = cache_folder() / f"{key}.npz"
+    n = int(inputs["grains"])
+    try:
+        with np.load(path, allow_pickle=False) as stored:
+            found = {k: stored[k] for k in _STORED}
+        if found["x"].shape == (n, 3) and all(np.all(np.isfinite(a)) for a in found.values()):
+            return found
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
+        pass
+    arrays = _arrays(make())
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".part", delete=False) as file:
+            np.savez(file, **arrays)  # type: ignore[arg-type]
+        os.replace(file.name, path)
+    except OSError:  # without a cache the pile is made anew at every use
+        pass
+    return arrays
+
+
+def _arrays(sim: Simulation) -> dict[str, Array]:
+    p, last = sim.pairs, sim.pairs.first[-1]
+    return {
+        **sim.grains._asdict(),
+        "first": p.first,
+        "other": p.other[:last],
+        "spring": p.spring[:last],
+        "touching": p.touching[:last],
+    }
