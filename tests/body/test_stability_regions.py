@@ -105,5 +105,5 @@ def test_bad_input_is_named():
         stability_map(1, 0.8, -0.1, 30 * u.deg)
     with pytest.raises(InvalidInput, match="one yield surface"):
         stability_many([*sample(1), *sample(1, yield_surface="matsuoka-nakai")])
-    with pytest.raises(InvalidInput, match="threads"):
+    with pytest.raises(InvalidInput, match="workers"):
         stability_many(sample(1), workers=0)
