@@ -92,6 +92,27 @@ def test_ctrl_c_leaves_a_valid_file(tmp_path, reference):
     same(read_results(out), reference)
 
 
+@pytest.mark.parametrize("pause", [0.0, 0.05, 0.3])
+def test_a_second_ctrl_c_ends_a_run_at_once_and_nothing_is_lost(tmp_path, reference, pause):
+    out = tmp_path / "c.ecsv"
+    run = subprocess.Popen(
+        [sys.executable, HERE / "scripted.py", out, "2"],
+        stderr=subprocess.PIPE,
+        text=True,
+        start_new_session=True,
+        env=os.environ | {"HOLD": str(tmp_path / "never")},
+    )
+    wait_for(lambda: lines(tmp_path / "c.ecsv.journal") > 5)
+    for _ in range(2):
+        os.killpg(run.pid, signal.SIGINT)
+        time.sleep(pause)
+    _, said = run.communicate(timeout=30)
+    assert run.returncode != 0
+    assert "multiprocessing" not in said  # no traceback of a worker
+    screening(16, slow, samples=3, seed=4).run(out)
+    same(read_results(out), reference)
+
+
 def test_workers_end_with_a_killed_parent(tmp_path):
     marks = tmp_path / "marks"
     marks.mkdir()

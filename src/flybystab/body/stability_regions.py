@@ -6,7 +6,6 @@ The kernels release the interpreter, so that a thread per core shares the rows.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, fields
 from difflib import get_close_matches
 from typing import Any
@@ -23,7 +22,7 @@ from flybystab.core.ellipsoid.potential import carlson_fd
 from flybystab.core.energy import stability_row as columns
 from flybystab.core.energy.potential import GRAVITY
 from flybystab.core.energy.stability_row import classify_many
-from flybystab.core.numerics.threads import worker_count
+from flybystab.core.numerics.threads import in_order, worker_count
 from flybystab.errors import InvalidInput, UnknownName
 from flybystab.typing import Array
 from flybystab.units import to_si
@@ -232,8 +231,7 @@ def _rows(
             s_, spin_, code, phi_, cohesion_, in_flow_, beta, kappa_, DEPTHS.index(depth), out[part]
         )
 
-    with ThreadPoolExecutor(workers) as pool:
-        list(pool.map(work, range(0, n, size)))
+    list(in_order(work, range(0, n, size), workers))
     return out
 
 

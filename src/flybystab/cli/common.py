@@ -6,6 +6,7 @@ import argparse
 import json
 import os
 import sys
+import unicodedata
 from collections.abc import Callable, Mapping
 from typing import Any
 
@@ -56,7 +57,20 @@ def show(options: argparse.Namespace, document: Callable[[], Any], lines: Callab
     if options.json:
         print(json.dumps(document(), indent=1, allow_nan=False))
     else:
-        print("\n".join(_coloured(line) for line in lines()))
+        print("\n".join(_coloured(printable(line)) for line in lines()))
+
+
+def printable(text: str) -> str:
+    """The text with control characters and changes of writing direction as escapes: names come from files.
+
+    Without this an ESC sequence in the name of an asteroid could change the terminal or hide other text.
+    """
+    return "".join(
+        c
+        if c in "\n\t" or unicodedata.category(c) not in ("Cc", "Cf")
+        else c.encode("unicode_escape").decode()
+        for c in text
+    )
 
 
 def check_computed(rows: int, failed: int, reasons: Mapping[str, int]) -> None:

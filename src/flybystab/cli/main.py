@@ -18,6 +18,7 @@ from typing import Any
 from flybystab._version import __version__
 from flybystab.cli import COMMANDS
 from flybystab.cli.arguments import check_arguments
+from flybystab.cli.common import printable
 from flybystab.cli.tab_completion import ASTEROID, FILE
 from flybystab.errors import FlybystabError, WrongUsage
 
@@ -58,15 +59,15 @@ def main(argv: Sequence[str] | None = None) -> int:
                 COMMANDS[options.command].run(options)
         sys.stdout.flush()
     except WrongUsage as reason:
-        print(f"flybystab {options.command}: {reason} (see --help)", file=sys.stderr)
+        print(printable(f"flybystab {options.command}: {reason} (see --help)"), file=sys.stderr)
         return 2
     except FlybystabError as reason:
-        print(f"flybystab: {reason}", file=sys.stderr)
+        print(printable(f"flybystab: {reason}"), file=sys.stderr)
         return 1
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except OSError as reason:
-        print(f"flybystab: {reason}", file=sys.stderr)
+        print(printable(f"flybystab: {reason}"), file=sys.stderr)
         return 1
     except KeyboardInterrupt:
         print("flybystab: stopped", file=sys.stderr)

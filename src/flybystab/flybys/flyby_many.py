@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from concurrent.futures import ThreadPoolExecutor
 from typing import Any, TypeVar
 
 import astropy.units as u
@@ -12,7 +11,7 @@ from numpy.typing import NDArray
 
 from flybystab.body.body import Body, check_settled
 from flybystab.core.dynamics import verdict_row as judgement
-from flybystab.core.numerics.threads import worker_count
+from flybystab.core.numerics.threads import in_order, worker_count
 from flybystab.encounter.attitude import attitude_matrices
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput, UnsettledBody
@@ -93,8 +92,7 @@ def flyby_many(
             part(rows)
     else:  # rows that flow take longer: more parts than threads
         parts = min(len(rows), 16 * threads)
-        with ThreadPoolExecutor(threads) as pool:
-            list(pool.map(part, [rows[k::parts].copy() for k in range(parts)]))
+        list(in_order(part, [rows[k::parts].copy() for k in range(parts)], threads))
     found = [verdict_of(int(row[judgement.VERDICT]), row[judgement.BOUND]) for row in out]
     names = np.array(["FAILED" if v is None else str(v) for v in found], dtype="U20")
     for lost in map(int, np.flatnonzero(names == "FAILED")):

@@ -43,3 +43,39 @@ def test_searches_take_workers_and_the_old_keyword():
         fs.find_encounters(apophis, *span, forces=3)
     with pytest.raises(InvalidInput, match="periapsis"):
         fs.Encounter.hyperbolic("earth", 1e-300 * u.km, 6 * u.km / u.s)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
+def test_a_fork_while_threads_compute_is_warned_of():
+    """The child of such a fork may hang: in a process of its own, which ends in any case."""
+    import subprocess
+    import sys
+
+    script = """
+import os, threading, warnings
+from flybystab.core.numerics.threads import in_order
+begun, go = threading.Event(), threading.Event()
+def wait(_):
+    begun.set(); go.wait()
+def compute():
+    list(in_order(wait, [1, 2], 2))
+thread = threading.Thread(target=compute); thread.start(); begun.wait()
+with warnings.catch_warnings(record=True) as caught:
+    warnings.simplefilter("always")
+    child = os.fork()
+    if child == 0:
+        os._exit(0)
+    os.waitpid(child, 0)
+go.set(); thread.join()
+with warnings.catch_warnings(record=True) as quiet:
+    warnings.simplefilter("always")
+    child = os.fork()
+    if child == 0:
+        os._exit(0)
+    os.waitpid(child, 0)
+print(sum("may hang" in str(w.message) for w in caught), sum("may hang" in str(w.message) for w in quiet))
+"""
+    done = subprocess.run(
+        [sys.executable, "-c", script], capture_output=True, text=True, timeout=120, check=True
+    )
+    assert done.stdout.split() == ["1", "0"]

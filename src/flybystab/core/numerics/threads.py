@@ -9,10 +9,29 @@ from concurrent.futures import ThreadPoolExecutor
 from numbers import Integral
 from typing import TypeVar
 
-from flybystab.errors import InvalidInput
+from flybystab.errors import FlybystabWarning, InvalidInput
 
 T = TypeVar("T")
 R = TypeVar("R")
+
+
+#: Thread pools that are computing now.
+_active: set[ThreadPoolExecutor] = set()
+
+
+def _warn_before_fork() -> None:
+    """Warn of a fork while threads compute: locks that they hold stay locked in the child, which may hang."""
+    if _active:
+        warnings.warn(
+            "this process forks while threads of flybystab compute: the child may hang. Start processes by spawn "
+            '(multiprocessing.get_context("spawn"))',
+            FlybystabWarning,
+            stacklevel=2,
+        )
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(before=_warn_before_fork)
 
 
 def in_order(work: Callable[[T], R], tasks: Iterable[T], threads: int) -> Iterator[R]:
@@ -22,10 +41,12 @@ def in_order(work: Callable[[T], R], tasks: Iterable[T], threads: int) -> Iterat
         yield from map(work, tasks)
         return
     pool = ThreadPoolExecutor(threads)
+    _active.add(pool)
     try:
         yield from pool.map(work, tasks)
     finally:
         pool.shutdown(cancel_futures=True)
+        _active.discard(pool)
 
 
 def worker_count(workers: int | None, threads: int | None = None) -> int:
