@@ -1,9 +1,9 @@
 """Stability margin of a flyby: the energy that the encounter gives the body against its energy barrier.
 
-A quick estimate from the rigid course alone: where the stress that rigidity needs passes the yield surface, the body
-slides (:mod:`flybystab.core.energy.newmark`), and the tide does work on it. A body with a barrier above that work
-comes to rest
-as a recognisable body; ``python benchmarks/margin.py`` counts how often this is wrong, and on which side.
+An estimate from the rigid course: where the stress that rigidity needs passes the yield surface, the body
+deforms along one direction of strain (:mod:`flybystab.core.energy.newmark`), and tide and torque do work on it. A
+body whose barrier is above that work comes to rest inside the model; ``python benchmarks/margin.py`` counts how often
+this is wrong, and on which side.
 """
 
 from __future__ import annotations
@@ -16,12 +16,12 @@ import numpy as np
 from astropy.units import Quantity
 
 from flybystab.body.body import Body
-from flybystab.body.stability import body_units
+from flybystab.body.stability import body_units, flow_cohesion
 from flybystab.body.stability_regions import stability_many
 from flybystab.core.ellipsoid.tide import tensor
 from flybystab.core.energy.newmark import driving_stress, slide
 from flybystab.core.energy.perturbation import pile, rate_of_strain, slope_of_flow
-from flybystab.core.energy.potential import MASS, velocity_gradient
+from flybystab.core.energy.potential import MASS
 from flybystab.core.energy.stability_row import first_to_flow
 from flybystab.encounter.encounter import Encounter
 from flybystab.flybys.rigid_course import Course, rigid_course
@@ -123,18 +123,16 @@ def flyby_margin(
     way = np.full((3, 3), np.nan)
     yields = bool(excess[worst] > 0.0)
     if yields:
-        scene = pile(s[0], s[1], s[2], spin[0], m.surface_code, m.phi, cohesion, beta, 0.0)
+        scene = pile(
+            s[0], s[1], s[2], spin[0], m.surface_code, m.phi, flow_cohesion(body) / units.stress, beta, 0.0
+        )
         x = np.empty(5)
         first_to_flow(scene._replace(stress=deviator[worst].copy(), pressure=float(pressure[worst])), x)
-        g, trace = slope_of_flow(scene, x)
-        d, gradient = np.empty(6), np.empty((3, 3))
+        _, trace = slope_of_flow(scene, x)
+        d = np.empty(6)
         rate_of_strain(x, trace, d)
-        velocity_gradient(s[0], s[1], s[2], d, gradient)
-        mass = MASS / 5.0 * float(np.trace(gradient @ np.diag(s) @ gradient.T))
-        along = deviator @ x
-        power = MASS * (along - g * (scene.sin * pressure + scene.cohesion))
-        drive = MASS * (along - along[0] - trace * (pressure - pressure[0]))
-        energy, kinetic, strain, duration = slide(course.time.value / units.time, power, drive, mass)
+        momenta = MASS / 5.0 * (np.sum(scene.s) - scene.s) * spin
+        energy, kinetic, strain, duration = slide(scene, x, course.time.value / units.time, momenta, tide)
         way = tensor(d)
 
     after = body.with_(spin=course.spin[-1])

@@ -110,11 +110,13 @@ def depends_on_pressure(flow: Flow, volume: float) -> bool:
 
 
 @kernel
-def power(flow: Flow, volume: float, gradient: Array, axes: PrincipalAxes) -> tuple[float, float]:
+def power(
+    flow: Flow, volume: float, gradient: Array, axes: PrincipalAxes, tide: Array
+) -> tuple[float, float]:
     """Power of the stress at ``V/V0`` per unit rate of strain, and what the square of that rate adds to it.
 
-    ``gradient[3, 3]`` is the part of ``L`` that keeps the volume. It and the body `axes` are used where the pressure
-    matters only.
+    ``gradient[3, 3]`` is the part of ``L`` that keeps the volume, ``tide[6]`` a tidal tensor in the frame of the
+    path. They and the body `axes` are used where the pressure matters only.
     """
     cohesive = 5.0 * flow.cohesion * volume
     m = flow.support
@@ -130,6 +132,11 @@ def power(flow: Flow, volume: float, gradient: Array, axes: PrincipalAxes) -> tu
         p = 5.0 * volume * (flow.pressure - flow.kappa * np.log(volume))
         return scale * ((flow.sin - e) * max(p, apex) + cohesive), 0.0
     one, two, load = _reaction(flow, e, axes)
+    for k in range(6):
+        i = k if k < 3 else (0 if k < 5 else 1)
+        j = k if k < 3 else (k - 2 if k < 5 else 2)
+        b = (1.0 if i == j else 0.0) - e * flow.section[i, j]
+        load += (1.0 if k < 3 else 2.0) * b * tide[k]
     denominator = one - flow.sin * two
     if denominator <= 0.0:
         return np.inf, 0.0

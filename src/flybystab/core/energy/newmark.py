@@ -1,14 +1,18 @@
-"""The slide of a body that a passing tide drives beyond its friction, along one direction of strain.
+"""Deformation of a body that a passing tide drives beyond its friction, along one direction of strain.
 
-Newmark's sliding block (1965), made for dams under earthquakes: the body stays what it was, and a rate of strain ``e``
-along a fixed direction ``D`` follows
+Newmark's sliding block (1965), made for dams under earthquakes, on the path of one direction of strain ``D``: the
+strain ``e`` follows
 
-    M edot = P1(t) while e > 0, or P1 > 0;    M = tr(L I L^T),    P1 = -V (sigma* - sigma(t)):D
+    (1/2 M edot^2)' = edot [F(t, e) - y(e)]    while edot > 0 or F > y,    M = tr(L S L^T) m/5
 
-with the stress ``sigma(t)`` that rigidity would need at that instant and the flow stress ``sigma*`` (theory,
-section 5). The tide and the changed spin do the work ``int e V (sigma(t) - sigma_0):D dt`` on it, ``sigma_0`` being
-the stress of the free body: that energy is what a barrier, friction and gained potential, has to be held against.
-Units as in :mod:`flybystab.core.energy.potential`.
+with the loss ``y`` of the free body along its path (:mod:`flybystab.core.energy.perturbation`: potential at fixed
+angular momentum and power of the stress with its reaction pressure) and the force ``F`` of tide and torque,
+
+    F = (m/5) K_t:(L S) - [y(e; H(t), K_t) - y(e; H_0, 0)].
+
+Shape, pressure and potential are those of the deformed body; its attitude and its angular momentum ``H(t)`` are those
+of the rigid course, and the direction of strain stays. The work ``int F de`` is the energy that a barrier has to be
+held against. Units as in :mod:`flybystab.core.energy.potential`.
 """
 
 from __future__ import annotations
@@ -16,12 +20,25 @@ from __future__ import annotations
 import numpy as np
 
 from flybystab.core.ellipsoid.rigid_stress import overload, rigid_stress
-from flybystab.core.energy.perturbation import LONGEST, direction
+from flybystab.core.energy.flow_work import growth_at, power, volume_at
+from flybystab.core.energy.perturbation import (
+    BEYOND_EDGE,
+    EDGE,
+    LONGEST,
+    NO_TIDE,
+    Path,
+    Pile,
+    direction,
+    mobility,
+    path_along,
+)
+from flybystab.core.energy.potential import MASS, energy_along
 from flybystab.core.numerics.jit import kernel
+from flybystab.core.numerics.tensors import unpack
 from flybystab.typing import Array
 
 #: Steps between two instants.
-STEPS = 24
+STEPS = 6
 
 
 @kernel
@@ -46,34 +63,85 @@ def driving_stress(
 
 
 @kernel
-def slide(time: Array, power: Array, drive: Array, mass: float) -> tuple[float, float, float, float]:
-    """Energy given, largest kinetic energy, strain and duration of the slide.
+def tidal_power(gradient: Array, growth: float, shape: Array, tide: Array) -> float:
+    """``(M/5) K:(L S)`` per unit rate of strain: the power of a tidal tensor ``tide[6]`` on a deformation.
 
-    ``power[n]`` is ``P1`` and ``drive[n]`` the work rate of tide and spin at unit rate of strain, at ``time[n]``;
-    both are linear in between. Ends where the strain passes `LONGEST`: the body has long left its shape by then.
+    ``gradient[3, 3]`` is the part of ``L`` that keeps the volume, `growth` its trace; ``shape[6]`` is ``S``.
     """
-    rate = 0.0
-    strain = 0.0
-    work = 0.0
-    given = 0.0
-    kinetic = 0.0
-    moving = 0.0
+    s = np.empty((3, 3))
+    k = np.empty((3, 3))
+    unpack(shape, s)
+    unpack(tide, k)
+    total = 0.0
+    for i in range(3):
+        for j in range(3):
+            flow = growth / 3.0 * s[i, j]
+            for n in range(3):
+                flow += gradient[i, n] * s[n, j]
+            total += k[i, j] * flow
+    return MASS / 5.0 * total
+
+
+@kernel
+def forces_at(
+    b: Pile, path: Path, strain: float, momentum: Array, tide: Array
+) -> tuple[float, float, float, float]:
+    """Rate of loss of the free body, force of tide and torque, mobility and squared axis ratio at a strain."""
+    flow = path.flow
+    volume = volume_at(flow.trace, strain)
+    growth = growth_at(flow.trace, volume)
+    _, slope, _ = energy_along(path.rates, path.frame, b.momentum, strain, volume, growth, path.axes)
+    free = slope + power(flow, volume, path.gradient, path.axes, NO_TIDE)[0]
+    _, slope, ratio2 = energy_along(path.rates, path.frame, momentum, strain, volume, growth, path.axes)
+    now = slope + power(flow, volume, path.gradient, path.axes, tide)[0]
+    drive = free - now + tidal_power(path.gradient, growth, path.axes.shape, tide)
+    return free, drive, mobility(path, strain, volume, growth), ratio2
+
+
+@kernel
+def slide(b: Pile, x: Array, time: Array, momentum: Array, tide: Array) -> tuple[float, float, float, float]:
+    """Energy given, largest kinetic energy, strain and duration of the deformation along the path of ``x[5]``.
+
+    ``momentum[n, 3]`` and ``tide[n, 6]`` are those of the rigid course at ``time[n]``, body axes, linear in between.
+    It ends at the axis ratio where the homogeneous model does, or at the strain `LONGEST`.
+    """
+    path = path_along(b, x)
+    edge = max(EDGE * EDGE, BEYOND_EDGE * (np.max(b.s) / np.min(b.s)))
+    h = np.empty(3)
+    k = np.empty(6)
+    rate = strain = work = given = kinetic = moving = 0.0
     for i in range(time.size - 1):
-        if rate == 0.0 and power[i] <= 0.0 and power[i + 1] <= 0.0:
-            continue
-        h = (time[i + 1] - time[i]) / STEPS
+        if rate == 0.0:
+            free, drive, m, _ = forces_at(b, path, strain, momentum[i], tide[i])
+            ahead, more, _, _ = forces_at(b, path, strain, momentum[i + 1], tide[i + 1])
+            if drive <= free and more <= ahead:
+                continue
+        dt = (time[i + 1] - time[i]) / STEPS
         for j in range(STEPS):
-            x = (j + 0.5) / STEPS
-            p = power[i] + x * (power[i + 1] - power[i])
-            new = max(0.0, rate + h * p / mass)
+            y = (j + 0.5) / STEPS
+            for n in range(3):
+                h[n] = momentum[i, n] + y * (momentum[i + 1, n] - momentum[i, n])
+            for n in range(6):
+                k[n] = tide[i, n] + y * (tide[i + 1, n] - tide[i, n])
+            middle = strain + 0.5 * rate * dt
+            free, drive, m, ratio2 = forces_at(b, path, middle, h, k)
+            if not free < np.inf:
+                rate = 0.0
+                continue
+            new = max(0.0, rate + dt * (drive - free) / m)
             mean = 0.5 * (rate + new)
             if mean > 0.0:
-                strain += mean * h
-                work += mean * h * (drive[i] + x * (drive[i + 1] - drive[i]))
-                moving += h
+                work += mean * dt * drive
+                strain += mean * dt
+                moving += dt
+                volume = volume_at(path.flow.trace, strain)
+                later = mobility(path, strain, volume, growth_at(path.flow.trace, volume))
+                volume = volume_at(path.flow.trace, strain - mean * dt)
+                m = mobility(path, strain - mean * dt, volume, growth_at(path.flow.trace, volume))
+                new *= np.sqrt(m / later)
+                kinetic = max(kinetic, 0.5 * later * new * new)
             rate = new
             given = max(given, work)
-            kinetic = max(kinetic, 0.5 * mass * rate * rate)
-            if strain > LONGEST:
+            if ratio2 > edge or strain > LONGEST:
                 return given, kinetic, strain, moving
     return given, kinetic, strain, moving

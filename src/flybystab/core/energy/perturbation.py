@@ -58,6 +58,9 @@ from flybystab.typing import Array
 
 SQRT2 = np.sqrt(2.0)
 
+#: Tidal tensor of a free body.
+NO_TIDE = np.zeros(6)
+
 #: Longest strain along which a barrier is looked for.
 LONGEST = 3.0
 
@@ -286,11 +289,11 @@ def state_at(b: Pile, path: Path, t: float) -> tuple[float, float, float]:
     volume = volume_at(path.flow.trace, t)
     growth = growth_at(path.flow.trace, volume)
     phi, slope, ratio2 = energy_along(path.rates, path.frame, b.momentum, t, volume, growth, path.axes)
-    return phi, slope + power(path.flow, volume, path.gradient, path.axes)[0], ratio2
+    return phi, slope + power(path.flow, volume, path.gradient, path.axes, NO_TIDE)[0], ratio2
 
 
 @kernel
-def _mobility(path: Path, t: float, volume: float, growth: float) -> float:
+def mobility(path: Path, t: float, volume: float, growth: float) -> float:
     """``tr(L S L^T) M/5``: twice the kinetic energy at unit rate of strain."""
     total = 0.0
     for k in range(3):
@@ -337,10 +340,10 @@ def _work(b: Pile, path: Path, start: float, end: float, inertia: float) -> tupl
             if depends_on_pressure(flow, volume):
                 _, slope, _ = energy_along(path.rates, path.frame, b.momentum, t, volume, growth, path.axes)
                 reacts = True
-            rate, square = power(flow, volume, path.gradient, path.axes)
+            rate, square = power(flow, volume, path.gradient, path.axes, NO_TIDE)
             work += weight * h * rate
             lost[i] = slope + rate
-            added[i] = 2.0 * square / _mobility(path, t, volume, growth) if square != 0.0 else 0.0
+            added[i] = 2.0 * square / mobility(path, t, volume, growth) if square != 0.0 else 0.0
         if reacts and inertia >= 0.0:
             for i in range(3):
                 _, weight = gauss(i)
