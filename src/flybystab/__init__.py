@@ -47,6 +47,7 @@ _HOME = {
     "read_population": "population.model_population",
     "recovery": "body.recovery",
     "screen": "screening.screening",
+    "shape_spin": "flybys.shape_spin",
     "spin_sample": "flybys.spin_sample",
     "stability": "body.stability",
     "surface_change": "flybys.surface_change",
@@ -74,6 +75,7 @@ if TYPE_CHECKING:
     from flybystab.flybys.flyby_many import flyby_many
     from flybystab.flybys.margin import flyby_margin
     from flybystab.flybys.result import FlybyResult
+    from flybystab.flybys.shape_spin import shape_spin
     from flybystab.flybys.spin_sample import spin_sample
     from flybystab.flybys.surface_change import surface_change
     from flybystab.flybys.surface_history import surface_history

@@ -17,6 +17,7 @@ from flybystab.body.mesh import MassProperties, edges_of, mass_properties, self_
 from flybystab.body.shape_files import read_mesh, write_vtk
 from flybystab.constants import G
 from flybystab.core.polyhedron.gravity import polyhedron_gravity
+from flybystab.core.polyhedron.moments import third_moments
 from flybystab.errors import InvalidInput, UnitMismatch
 from flybystab.typing import Array
 from flybystab.units import brief, frozen, to_si, whole
@@ -215,6 +216,16 @@ class Shape:
         """Principal moments of inertia over the mass, ``J/m``, m2, smallest first."""
         second = np.diag(self._mass.second_moment) / self._mass.volume
         return (second.sum() - second) * u.m**2
+
+    @cached_property
+    def second_moments(self) -> Array:
+        """Principal second moments over the volume, ``int x_i^2 dV/V``, shape (3,), m2, greatest first."""
+        return np.diag(self._mass.second_moment) / self._mass.volume
+
+    @cached_property
+    def third_moments(self) -> Array:
+        """Third moments over the volume, ``int x_i x_j x_k dV/V``, shape (3, 3, 3), m3, principal frame."""
+        return third_moments(self.vertices.value, self.facets) / self._mass.volume
 
     @property
     def mean_radius(self) -> Quantity:
