@@ -22,6 +22,8 @@ from scipy.spatial.transform import Rotation
 from flybystab.bench.jpl import SHARED
 from flybystab.body.body import Body, Material
 from flybystab.body.pile import make_pile
+from flybystab.core.grains.gravity import direct_sum
+from flybystab.core.grains.tree import opening, tree_sum
 from flybystab.core.numerics.threads import in_order
 from flybystab.encounter.encounter import Encounter
 from flybystab.flybys.flyby import flyby
@@ -155,6 +157,40 @@ def resolution(
     return out
 
 
+def gravity_cost(
+    counts: tuple[int, ...] = (500, 1000, 2000, 5000, 20000), errors: tuple[float, ...] = (1e-2, 1e-3, 1e-4)
+) -> list[dict[str, Any]]:
+    """Time and error of gravity by the direct sum and by the tree, for grains at random in an ellipsoid."""
+    generator = np.random.default_rng(0)
+
+    def best(call: Any) -> float:
+        times = []
+        for _ in range(4):
+            begun = time.thread_time()
+            call()
+            times.append(time.thread_time() - begun)
+        return min(times)
+
+    out = []
+    for n in counts:
+        x = generator.normal(size=(3, n))
+        x *= generator.uniform(size=n) ** (1 / 3) / np.linalg.norm(x, axis=0)
+        place, mass = np.ascontiguousarray(x * [[1.5], [0.9], [0.75]]), generator.uniform(0.2, 2.7, n) / n
+        true, found = np.empty((3, n)), np.empty((3, n))
+        direct = best(lambda p=place, m=mass, a=true: direct_sum(p, m, a))
+        for asked in errors:
+            theta = opening(asked)
+            cpu = best(lambda p=place, m=mass, t=theta, a=found: tree_sum(p, m, t, a))
+            error = np.sqrt(((true - found) ** 2).sum() / (true**2).sum())
+            out.append(
+                {
+                    "table": "gravity", "grains": n, "direct_ms": 1e3 * direct, "error_asked": asked,
+                    "tree_ms": 1e3 * cpu, "error": float(error),
+                }
+            )  # fmt: skip
+    return out
+
+
 def against_reference(seeds: int = 4, path: Path = REFERENCE, *, only: Any = None) -> list[dict[str, Any]]:
     """Flybys of the reference data as distributions; empty where the file is not there."""
     if not path.is_file():
@@ -203,7 +239,9 @@ def against_reference(seeds: int = 4, path: Path = REFERENCE, *, only: Any = Non
 
 def rows(figure: str | Path | None = None, seeds: int = 4) -> list[dict[str, Any]]:
     """All tables; the figure shows the largest clump and the stretch against periapsis."""
-    found = cost() + numerics(seeds=seeds) + resolution(seeds=seeds) + against_reference(seeds)
+    found = (
+        cost() + gravity_cost() + numerics(seeds=seeds) + resolution(seeds=seeds) + against_reference(seeds)
+    )
     if figure is not None:
         draw([r for r in found if r["table"] == "reference"], figure)
     return found
@@ -232,7 +270,10 @@ def draw(reference: list[dict[str, Any]], target: str | Path) -> None:
 def lines(rows: list[dict[str, Any]]) -> list[str]:
     """The tables as text."""
     out = []
-    tables = {t: [r for r in rows if r["table"] == t] for t in ("cost", "numerics", "grains", "reference")}
+    tables = {
+        t: [r for r in rows if r["table"] == t]
+        for t in ("cost", "gravity", "numerics", "grains", "reference")
+    }
     if tables["cost"]:
         out += [
             f"{GRAINS} grains, one core",
@@ -243,6 +284,18 @@ def lines(rows: list[dict[str, Any]]) -> list[str]:
             f"{r['grain_step_ns']:14.0f} {r['largest']:8.3f} {r['bound']:6.3f} {r['stretch']:8.3f}"
             for r in tables["cost"]
         ]
+    if tables["gravity"]:
+        out += [
+            "",
+            "gravity: processor time (ms) of the direct sum and of the tree, rms error",
+            "grains   direct",
+        ]
+        for n in dict.fromkeys(r["grains"] for r in tables["gravity"]):
+            some = [r for r in tables["gravity"] if r["grains"] == n]
+            out.append(
+                f"{n:6d} {some[0]['direct_ms']:8.2f}   "
+                + "   ".join(f"{r['error_asked']:.0e}: {r['tree_ms']:.2f} ({r['error']:.1e})" for r in some)
+            )
     if tables["numerics"]:
         out += [
             "",

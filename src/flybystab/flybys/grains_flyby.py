@@ -28,7 +28,7 @@ from flybystab.body.pile import Pile, PileState, check_grains, make_pile
 from flybystab.core.dynamics.ground import Ground, no_ground
 from flybystab.core.ellipsoid.tide import TidePanels
 from flybystab.core.grains.clumps import LINK, bound_clumps, friends_of_friends, moments, semi_axes, spin_of
-from flybystab.core.grains.simulation import Simulation
+from flybystab.core.grains.simulation import GRAVITY_ERROR, TREE_FROM, Simulation
 from flybystab.core.grains.state import Grains
 from flybystab.core.numerics.threads import in_order
 from flybystab.encounter.encounter import Encounter
@@ -305,11 +305,14 @@ def grains_flyby(
     friction = np.rad2deg(body.material.phi)
     strength = body.material.c_pa
     cohesion = f"cohesion {strength:g} Pa (calibrated by pulling and shearing)" if strength else "no cohesion"
+    gravity = (
+        "direct sum of gravity" if grains < TREE_FROM else f"gravity by a tree (error {GRAVITY_ERROR:g})"
+    )
     low, high = (np.percentile([r.end_time.to_value(u.h) for r in runs], q) for q in (0, 100))
     unsettled = sum(not r.settled for r in runs)
     modelled = (
         *encounter.forces,
-        f"{len(runs)} piles of {grains} grains, soft spheres, direct sum of gravity",
+        f"{len(runs)} piles of {grains} grains, soft spheres, {gravity}",
         f"friction angle {friction:g} deg (calibrated by spin-up), {cohesion}",
         f"until clumps had not changed for {QUIET:g} dynamical times, {low:.1f} to {high:.1f} h after closest approach"
         + (f"; in {unsettled} runs they still did" if unsettled else ""),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from flybystab.core.grains.gravity import potential_at
 from flybystab.core.grains.state import Grains
 from flybystab.core.numerics.jit import kernel
 from flybystab.typing import Array
@@ -67,8 +68,7 @@ def bound_clumps(g: Grains, label: NDArray[np.int64], largest: int) -> NDArray[n
         total = mass[bound].sum()
         velocity = mass[bound] @ v[bound] / total
         rest = np.flatnonzero(~bound)
-        distance = np.linalg.norm(x[rest, None, :] - g.x[None, inside, :], axis=2)
-        potential = -(g.mass[inside] / distance).sum(axis=1)
+        potential = potential_at(x[rest], g.x[inside], g.mass[inside])
         energy = 0.5 * ((v[rest] - velocity) ** 2).sum(axis=1) + potential * (1.0 + mass[rest] / total)
         joins = rest[energy < 0.0]
         if len(joins) == 0:

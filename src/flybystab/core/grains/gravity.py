@@ -53,3 +53,14 @@ def potential_energy(x: Array, mass: Array) -> float:
                 d0, d1, d2 = x[j, 0] - x[i, 0], x[j, 1] - x[i, 1], x[j, 2] - x[i, 2]
                 total -= mass[i] * mass[j] / np.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
     return total
+
+
+@kernel
+def potential_at(places: Array, x: Array, mass: Array) -> Array:
+    """Potential at ``places[k, 3]`` of point masses at ``x[n, 3]``, G = 1; shape (k,)."""
+    out = np.zeros(places.shape[0])
+    for i in range(places.shape[0]):
+        for j in range(x.shape[0]):
+            d0, d1, d2 = x[j, 0] - places[i, 0], x[j, 1] - places[i, 1], x[j, 2] - places[i, 2]
+            out[i] -= mass[j] / np.sqrt(d0 * d0 + d1 * d1 + d2 * d2)
+    return out

@@ -16,6 +16,7 @@ from flybystab.core.grains.contact import contact_forces
 from flybystab.core.grains.gravity import direct_sum
 from flybystab.core.grains.neighbours import MOVED, Pairs, find_pairs
 from flybystab.core.grains.state import Contact, Grains
+from flybystab.core.grains.tree import tree_sum
 from flybystab.core.numerics.jit import kernel
 from flybystab.typing import Array
 
@@ -165,8 +166,8 @@ def _kick_and_drift(
 @kernel
 def advance(
     g: Grains, contact: Contact, p: Pairs, tide: TidePanels, ground: Ground, t: float, dt: float, steps: int,
-    every: int, skin: float, gravity: bool, pull: Array, drag: float, u: Array, s: Array, ledger: Array,
-    count: NDArray[np.int64],
+    every: int, skin: float, gravity: bool, theta: float, pull: Array, drag: float, u: Array, s: Array,
+    ledger: Array, count: NDArray[np.int64],
 ) -> int:  # fmt: skip
     """Advance grains by a number of steps.
 
@@ -180,6 +181,8 @@ def advance(
         Skin of the neighbour list.
     gravity : bool
         Whether the grains attract each other.
+    theta : float
+        Opening of the tree that sums gravity (:mod:`flybystab.core.grains.tree`); zero for the direct sum.
     pull : ndarray (4,)
         Strength of a central field and ``1/a_i^2`` of its level surfaces; strength zero for none.
     drag : float
@@ -217,7 +220,10 @@ def advance(
             for i in range(n):
                 for k in range(3):
                     place[k, i] = g.x[i, k] + ahead * u[i, k]
-            direct_sum(place, g.mass, field)
+            if theta > 0.0:
+                tree_sum(place, g.mass, theta, field)
+            else:
+                direct_sum(place, g.mass, field)
         tide_at(tide.tau, tide.start, tide.width, tide.coefficients, now, k_t)
         contact_forces(g, u, s, contact, p, dt, force, torque, ledger)
         fastest = _kick_and_drift(g, k_t, field, pull, drag, dt, force, torque, u, s)

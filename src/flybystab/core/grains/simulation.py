@@ -13,11 +13,15 @@ from flybystab.core.grains.gravity import potential_energy
 from flybystab.core.grains.motion import DONE, NO_ROOM, advance
 from flybystab.core.grains.neighbours import SKIN, Pairs, empty_pairs
 from flybystab.core.grains.state import STEPS_PER_CONTACT, Contact, Grains, time_step
+from flybystab.core.grains.tree import opening
 from flybystab.errors import NotConverged
 from flybystab.typing import Array
 
 #: Time between evaluations of gravity, scaled: 10 s at 2000 kg/m3.
 GRAVITY_INTERVAL = 0.0075
+#: Error of gravity by a tree (rms over the grains, relative to the rms acceleration), and the number of grains from
+#: which a tree of this error is faster than the direct sum (``flybystab bench grains``).
+GRAVITY_ERROR, TREE_FROM = 1e-3, 2000
 _NO_LEDGER = np.zeros(0)
 _NO_PULL = np.zeros(4)
 
@@ -36,6 +40,10 @@ class Simulation:
         Steps in half a period of the stiffest contact.
     gravity_interval : float
         Time between evaluations of gravity; zero for every step.
+    gravity_error : float
+        Error of gravity where a tree sums it (:func:`flybystab.core.grains.tree.opening`).
+    tree_from : int
+        Number of grains from which it does.
     skin : float
         Skin of the neighbour list, mean radii.
     """
@@ -48,6 +56,8 @@ class Simulation:
     ground: Ground = field(default_factory=no_ground)
     steps_per_contact: float = STEPS_PER_CONTACT
     gravity_interval: float = GRAVITY_INTERVAL
+    gravity_error: float = GRAVITY_ERROR
+    tree_from: int = TREE_FROM
     skin: float = SKIN
     ledger: Array = field(default_factory=lambda: _NO_LEDGER)
     counts: NDArray[np.int64] = field(default_factory=lambda: np.zeros(2, np.int64))
@@ -76,10 +86,11 @@ class Simulation:
         """
         steps = max(1, round(duration / self.dt))
         every = max(1, round(self.gravity_interval / self.dt))
+        theta = opening(self.gravity_error) if len(self.grains.mass) >= self.tree_from else 0.0
         while True:
             outcome = advance(
                 self.grains, self.contact, self.pairs, self.tide, self.ground, self.time, self.dt, steps, every,
-                self.reach, gravity, pull, drag, self.u, self.s, self.ledger, self.counts,
+                self.reach, gravity, theta, pull, drag, self.u, self.s, self.ledger, self.counts,
             )  # fmt: skip
             if outcome == DONE:
                 break
