@@ -78,9 +78,9 @@ def test_neocc_orbit(tmp_path):
     assert a.epoch.jd == 2461000.5
     assert a.quantity("a_au").value == 2.5158372264739257
     assert a.quantity("A2_au_d2").value == pytest.approx(-2.9e-14)
-    assert "notes" not in a.row
     path.write_text(KE1.replace(" NGR   0.0", " NGR   0.2"))
-    assert "radiation pressure" in catalogue(path)[0].row["notes"]
+    with pytest.raises(InvalidInput, match="AMRAT"):  # radiation pressure is not in the force model
+        catalogue(path)
     path.write_text(KE1.replace("ECLM", "EQUM"))
     with pytest.raises(InvalidInput, match="OEF2"):
         catalogue(path)

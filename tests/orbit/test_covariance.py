@@ -17,11 +17,13 @@ WEEKS = Time("2029-04-06", scale="tdb"), Time("2029-04-20", scale="tdb")
 UNITS = {
     "cometary": (u.one, u.au, u.d, u.deg, u.deg, u.deg),
     "keplerian": (u.au, u.one, u.deg, u.deg, u.deg, u.deg),
+    "equinoctial": (u.au, *[u.one] * 4, u.deg),
     "cartesian": (*[u.km] * 3, *[u.mm / u.s] * 3),
 }
 VALUES = {
     "cometary": (0.3, 0.9, 50.0, 10.0, 20.0, 5.0),
     "keplerian": (1.3, 0.3, 5.0, 10.0, 20.0, 40.0),
+    "equinoctial": (1.3, 0.15, 0.26, 0.0076, 0.043, 70.0),
     "cartesian": (1.5e8, 2e7, 1e6, -3e6, 2.9e7, 1e6),
 }
 

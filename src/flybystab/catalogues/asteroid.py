@@ -16,7 +16,7 @@ from astropy.units import Quantity
 from flybystab.body.body import Body, Material
 from flybystab.body.shape import Shape
 from flybystab.catalogues.covariance_files import embedded_covariance
-from flybystab.catalogues.record import BODILY, ORBIT, ORBIT_SI, ORBITAL, SHAPE, Record
+from flybystab.catalogues.record import BODILY, ORBIT, ORBIT_SI, ORBITAL, PERIHELION, SHAPE, Record
 from flybystab.catalogues.tumbling import attitude_matrix, ecliptic_direction, free_spin, tumbling_state
 from flybystab.errors import InvalidInput
 from flybystab.units import to_si
@@ -141,6 +141,8 @@ class Asteroid(Record):
     def orbit(self) -> Orbit:
         """The orbit, from the elements of the row with every digit, and A1, A2, A3 (zero where not known).
 
+        The elements are a, e, i, node, peri, M, or q and the time of perihelion in place of a and M.
+
         Its covariance is the asteroid's own; else the one embedded for it; else the diagonal of the row's
         1-sigmas, marked as uncorrelated; else what digits and U say (:mod:`flybystab.catalogues.orbit_errors`);
         else None.
@@ -149,14 +151,27 @@ class Asteroid(Record):
         from flybystab.orbit.orbit import Orbit
 
         epoch = self.epoch
-        elements = [self._number(c) * unit for c, unit in zip(ORBIT[1:], ORBIT_SI.tolist(), strict=True)]
         a1, a2, a3 = (
             au_per_day2(self._number(c)) if self.row.get(c) else 0.0
             for c in ("A1_au_d2", "A2_au_d2", "A3_au_d2")
         )
         push = NonGravitational((a1, a2, a3), self.row.get("nongrav_law") or "asteroid")
         _ = push.constants  # refuses an unknown law
+        if self.knows(*PERIHELION) and not self.knows("a_au", "M_deg"):
+            state = self._state_by_perihelion()
+            r, v = state[:3] * u.m, state[3:] * u.m / u.s
+            return Orbit(epoch, r, v, nongrav=push, name=self.name, covariance=self.covariance)
+        elements = [self._number(c) * unit for c, unit in zip(ORBIT[1:], ORBIT_SI.tolist(), strict=True)]
         return Orbit._from_si_elements(epoch, elements, push, self.name, self._covariance(epoch))
+
+    def _state_by_perihelion(self) -> np.ndarray:
+        """Heliocentric state (m, m/s), shape (6,), by the distance and the time of perihelion; any conic."""
+        from flybystab.constants import AU, DAY
+        from flybystab.orbit.elements import state_from_elements
+
+        i, node, peri = (float(np.radians(self._number(c))) for c in ("i_deg", "node_deg", "peri_deg"))
+        since = (self._number("epoch_jd_tdb") - self._number("tp_jd_tdb")) * DAY
+        return state_from_elements(self._number("q_au") * AU, self._number("e"), i, node, peri, since)
 
     def _covariance(self, epoch: Time) -> Covariance | None:
         if self.covariance is not None:

@@ -13,11 +13,11 @@ import numpy as np
 from astropy.table import QTable
 
 from flybystab.catalogues.asteroid import CATALOGUE_DATE, Asteroid
-from flybystab.catalogues.designations import unpacked
-from flybystab.catalogues.readers import reader_of, text_of
+from flybystab.catalogues.designations import name_columns
+from flybystab.catalogues.readers import FRAME, header_of, reader_names, reader_of, text_of
 from flybystab.catalogues.readers.native import read_native
 from flybystab.catalogues.record import TEXTS, UNITS, key_of
-from flybystab.errors import UnknownName
+from flybystab.errors import InvalidInput, UnknownName
 
 __all__ = ["CATALOGUE_DATE", "TEXTS", "UNITS", "Asteroid", "catalogue", "catalogue_table", "find", "key_of"]
 
@@ -29,10 +29,10 @@ def find(asteroids: Sequence[Asteroid], name: str | int, where: str) -> Asteroid
         for n in a.names:
             index.setdefault(key_of(n), a)
     wanted = key_of(name)
-    if wanted not in index:
-        wanted = key_of(unpacked(str(name).strip()))
-    if wanted in index:
-        return index[wanted]
+    parts = name_columns(str(name)) if wanted not in index else {}
+    for other in (wanted, *(key_of(parts[c]) for c in ("number", "designation", "name") if parts.get(c))):
+        if other in index:
+            return index[other]
     near = get_close_matches(wanted, index, n=8, cutoff=0.6)
     near += [k for k in index if len(wanted) >= 3 and wanted in k]
     suggestions = list(dict.fromkeys(index[k].name for k in near))[:5]
@@ -44,8 +44,18 @@ def find(asteroids: Sequence[Asteroid], name: str | int, where: str) -> Asteroid
 def _read(text: str, file: str, name: str) -> tuple[Asteroid, ...]:
     """Asteroids of a text, by the reader of its format."""
     found = reader_of(text)
-    entries = found.read(text, name) if found else read_native(text, file)
-    return tuple(Asteroid(row, file=file, covariance=covariance) for row, covariance in entries)
+    if found is None:
+        if not {*TEXTS, *UNITS} & set(header_of(text)):
+            raise InvalidInput(
+                "catalogue file",
+                name,
+                f"the columns of the catalogue, or a file of {', '.join(reader_names())}",
+            )
+        return tuple(Asteroid(row, file=file) for row, _ in read_native(text, file))
+    source = {"frame": FRAME, "orbit_source": f"{found.name} ({name})"}
+    return tuple(
+        Asteroid(source | row, file=file, covariance=covariance) for row, covariance in found.read(text, name)
+    )
 
 
 @lru_cache(maxsize=1)

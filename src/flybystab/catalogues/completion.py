@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
@@ -40,5 +41,8 @@ def with_physical_data(asteroids: Sequence[Asteroid]) -> tuple[Asteroid, ...]:
 
 
 def foreign(asteroid: Asteroid) -> bool:
-    """Whether a row comes from a table of orbits: its body is then completed from the embedded tables."""
-    return asteroid.row.get("orbit_source", "").startswith(("JPL SBDB (", "MPC (", "ESA NEOCC ("))
+    """Whether an orbit comes from a file of another publisher: its body is then completed from the embedded tables.
+
+    Sources of such orbits end with the name of the file (:func:`flybystab.catalogues.catalogue.catalogue`).
+    """
+    return asteroid.row.get("orbit_source", "").endswith(f"({Path(asteroid.file).name})")

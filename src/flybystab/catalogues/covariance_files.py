@@ -7,7 +7,7 @@ from importlib import resources
 from typing import TYPE_CHECKING
 
 from flybystab.catalogues.readers.oef import from_neocc
-from flybystab.catalogues.readers.sbdb import from_sbdb_answer
+from flybystab.catalogues.readers.sbdb_answer import from_sbdb_answer
 
 if TYPE_CHECKING:
     from flybystab.orbit.covariance import Covariance

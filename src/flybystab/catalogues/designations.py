@@ -24,26 +24,92 @@ def names_of(number: str) -> tuple[str, str]:
 
 
 _DIGITS = "0123456789ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz"
+_SURVEYS = {"PLS": "P-L", "T1S": "T-1", "T2S": "T-2", "T3S": "T-3"}
+_LETTERS = "ABCDEFGHJKLMNOPQRSTUVWXYZ"
 
 
 def unpacked(text: str) -> str:
-    """Number or provisional designation from its packed form; other texts as they are.
+    """Number or designation from its packed form; other texts as they are.
 
-    ``K04M04N`` is 2004 MN4, ``a0001`` 360001, ``~0K8Q`` 697402 (620000 and a number in base 62)
+    ``K04M04N`` is 2004 MN4, ``a0001`` 360001, ``~0K8Q`` 697402 (620000 and a number in base 62), ``_QC0000``
+    2026 CA620, ``PLS2040`` 2040 P-L, ``CK20F030`` C/2020 F3, ``0001P`` 1P
     (https://minorplanetcenter.net/iau/info/PackedDes.html).
     """
     if re.fullmatch(r"[IJK]\d\d[A-HJ-Y][0-9A-Za-z]\d[A-HJ-Z]", text):
-        year = 100 * _DIGITS.index(text[0]) + int(text[1:3])
         cycle = 10 * _DIGITS.index(text[4]) + int(text[5])
-        return f"{year} {text[3]}{text[6]}{cycle or ''}"
+        return f"{_year(text)} {text[3]}{text[6]}{cycle or ''}"
+    if re.fullmatch(r"_[0-9A-Za-z][A-HJ-Y][0-9A-Za-z]{4}", text):
+        order = _base62(text[3:])  # from cycle 620 on: 15,500 designations of the half-month are behind
+        year = 2000 + _DIGITS.index(text[1])
+        return f"{year} {text[2]}{_LETTERS[order % 25]}{620 + order // 25}"
+    if re.fullmatch(r"(PLS|T[123]S)\d{4}", text):
+        return f"{text[3:]} {_SURVEYS[text[:3]]}"
     if re.fullmatch(r"~[0-9A-Za-z]{4}", text):
-        n = 0
-        for c in text[1:]:
-            n = 62 * n + _DIGITS.index(c)
-        return str(620000 + n)
+        return str(620000 + _base62(text[1:]))
     if re.fullmatch(r"[0-9A-Za-z]\d{4}", text):
         return str(10000 * _DIGITS.index(text[0]) + int(text[1:]))
+    if re.fullmatch(r"\d{4}[PDI]([a-z]{1,2})?", text):
+        fragment = f"-{text[5:].upper()}" if text[5:] else ""
+        return f"{int(text[:4])}{text[4]}{fragment}"
+    if re.fullmatch(r"(\d{4})?[CPDXAI][IJK]\d\d[A-HJ-Y][0-9A-Za-z]\d[0-9a-zA-Z]", text):
+        number, kind, body = text[:-8], text[-8], text[-7:]
+        if number:
+            return f"{int(number)}{kind}" + (f"-{body[6].upper()}" if body[6].islower() else "")
+        order = 10 * _DIGITS.index(body[4]) + int(body[5])
+        if body[6].isupper():  # first named as a minor planet: C/2016 AA1
+            return f"{kind}/{_year(body)} {body[3]}{body[6]}{order or ''}"
+        fragment = f"-{body[6].upper()}" if body[6] != "0" else ""
+        return f"{kind}/{_year(body)} {body[3]}{order}{fragment}"
     return text
+
+
+def _year(packed: str) -> int:
+    return 100 * _DIGITS.index(packed[0]) + int(packed[1:3])
+
+
+def _base62(text: str) -> int:
+    n = 0
+    for c in text:
+        n = 62 * n + _DIGITS.index(c)
+    return n
+
+
+def is_comet(designation: str) -> bool:
+    """Whether a designation is that of a comet: 67P, C/2020 F3, 73P-B."""
+    return bool(re.match(r"(\d+[PCDI](-|/|$)|[PCDXI]/)", designation.strip()))
+
+
+def name_columns(text: str) -> dict[str, str]:
+    """Number, name and designation of a full name: ``99942 Apophis (2004 MN4)``, ``(433) Eros``, ``1P/Halley``.
+
+    Packed forms are unpacked. The number of a comet stays in its designation, its name is the full one.
+    """
+    full = " ".join(text.split())
+    plain = unpacked(full)
+    if is_comet(plain):
+        kept = re.match(
+            r"(\d+[PCDI](?:-[A-Z]{1,2})?|[PCDXI]/-?\d+ [A-Z]{1,2}\d*(?:-[A-Z]{1,2})?)(?:/|\s*\(|$)", plain
+        )
+        if kept is None:
+            return {"number": "", "name": plain, "designation": plain}
+        return {"number": "", "name": plain, "designation": kept[1]}  # many comets are called LINEAR or SOHO
+    provisional = r"(?:[A-Z]?\d{3,4} [A-Z]{2}\d*|\d{4} (?:P-L|T-[123]))"
+    if bare := re.fullmatch(rf"\(?({provisional})\)?", plain):
+        return {"number": "", "name": bare[1], "designation": bare[1]}
+    found = re.fullmatch(rf"(?:\((\d+)\)|(\d+))?\s*(.*?)\s*(?:\(({provisional})\))?", plain)
+    if found is None:
+        return {"number": "", "name": plain, "designation": ""}
+    number = found[1] or found[2] or ""
+    name, designation = found[3] or "", found[4] or ""
+    if re.fullmatch(provisional, name):
+        name, designation = "", designation or name
+    known = names_of(number) if number else ("", "")
+    designation = designation or known[1]
+    return {
+        "number": number,
+        "name": name or known[0] or designation or number or plain,
+        "designation": designation,
+    }
 
 
 def unpacked_date(text: str) -> float:

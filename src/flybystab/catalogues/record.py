@@ -31,6 +31,7 @@ UNITS: Mapping[str, u.UnitBase] = MappingProxyType(
     | dict.fromkeys(("pole_ecl_lon_deg", "pole_ecl_lat_deg", *_ANGLES), u.deg)
     | {"sigma_" + c: u.deg for c in _ANGLES}
     | {"H_mag": u.mag, "amplitude_mag": u.mag, "epoch_jd_tdb": u.d, "a_au": u.au, "sigma_a_au": u.au}
+    | {"q_au": u.au, "tp_jd_tdb": u.d}
     | dict.fromkeys(("A1_au_d2", "A2_au_d2", "A3_au_d2"), u.au / u.d**2)
     | dict.fromkeys(
         ("e", "sigma_e", "inertia_a_over_c", "inertia_b_over_c", "condition_code"), u.dimensionless_unscaled
@@ -58,9 +59,21 @@ TEXTS = (
 #: Epoch and elements, and the factors of the elements to SI.
 ORBIT = ("epoch_jd_tdb", "a_au", "e", "i_deg", "node_deg", "peri_deg", "M_deg")
 ORBIT_SI = np.array([UNITS[c].si.scale for c in ORBIT[1:]])
+#: Perihelion distance and time, which take the place of a and M in rows without them (parabolas).
+PERIHELION = ("q_au", "tp_jd_tdb")
 #: Columns of an orbit: kept as they are when a row is completed from another.
 ORBITAL = frozenset(
-    {*ORBIT, "A1_au_d2", "A2_au_d2", "A3_au_d2", "frame", "sigma_source", "nongrav_source", "nongrav_law"}
+    {
+        *ORBIT,
+        *PERIHELION,
+        "A1_au_d2",
+        "A2_au_d2",
+        "A3_au_d2",
+        "frame",
+        "sigma_source",
+        "nongrav_source",
+        "nongrav_law",
+    }
     | {"sigma_" + c for c in ORBIT[1:]}
     | {"orbit_solution", "orbit_source", "condition_code", "condition_code_source"}
 )
@@ -80,6 +93,7 @@ LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType(
     | {"density_kg_m3": DENSITY_RANGE, "e": (0.0, np.inf), "amplitude_mag": (0.0, 5.0)}
     | {"i_deg": (0.0, 180.0), "pole_ecl_lat_deg": (-90.0, 90.0)}
     | {"H_mag": (-5.0, 45.0), "a_au": (-1e6, 1e6), "epoch_jd_tdb": (0.0, 1e7)}
+    | {"q_au": (0.0, 1e4), "tp_jd_tdb": (-1e7, 1e7)}
     # A third of the Sun's gravity at 1 au; the largest accelerations of comets are 1e-6 au/d2.
     | dict.fromkeys(("A1_au_d2", "A2_au_d2", "A3_au_d2"), (-1e-4, 1e-4))
 )

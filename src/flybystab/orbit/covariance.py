@@ -21,18 +21,22 @@ from flybystab.orbit.elements import GM_SUN, state_from_elements
 from flybystab.typing import Array
 from flybystab.units import to_si
 
-#: The sets of elements: cometary (JPL), Keplerian (NEOCC and catalogues), or a state with ICRF axes. ``tp`` is
-#: the time of perihelion less the epoch.
+#: The sets of elements: cometary (JPL), Keplerian (NEOCC and catalogues), equinoctial (NEODyS), or a state with ICRF
+#: axes. ``tp`` is the time of perihelion less the epoch; ``h, k = e sin, e cos`` of the longitude of perihelion,
+#: ``P, Q = tan(i/2) sin, cos`` of the node, ``L`` the mean longitude (Broucke & Cefola 1972; where they
+#: are p and q).
 SETS: Mapping[str, tuple[str, ...]] = {
     "cometary": ("e", "q", "tp", "node", "peri", "i"),
     "keplerian": ("a", "e", "i", "node", "peri", "M"),
+    "equinoctial": ("a", "h", "k", "P", "Q", "L"),
     "cartesian": ("x", "y", "z", "vx", "vy", "vz"),
 }
 PUSHES = ("A1", "A2", "A3")
 _SI: Mapping[str, u.UnitBase] = (
     dict.fromkeys(("a", "q", "x", "y", "z"), u.m)
     | dict.fromkeys(("vx", "vy", "vz"), u.m / u.s)
-    | dict.fromkeys(("i", "node", "peri", "M"), u.rad)
+    | dict.fromkeys(("i", "node", "peri", "M", "L"), u.rad)
+    | dict.fromkeys(("h", "k", "P", "Q"), u.dimensionless_unscaled)
     | dict.fromkeys(PUSHES, u.m / u.s**2)
     | {"e": u.dimensionless_unscaled, "tp": u.s}
 )
@@ -193,6 +197,9 @@ class Covariance:
         kind = self.elements
         if kind == "cartesian":
             return np.ones(len(parameters), dtype=bool)
+        if kind == "equinoctial":
+            a, h, k = (self._column(parameters, n) for n in ("a", "h", "k"))
+            return np.asarray((a > 0.0) & (h * h + k * k < 1.0))
         e = self._column(parameters, "e")
         if kind == "cometary":
             return np.asarray((e >= 0.0) & (self._column(parameters, "q") > 0.0))
@@ -204,13 +211,19 @@ class Covariance:
         if self.elements == "cartesian":
             order = [self.names.index(n) for n in SETS["cartesian"]]
             return np.array(parameters[:, order])
-        e, i, node, peri = (self._column(parameters, n) for n in ("e", "i", "node", "peri"))
+        if self.elements == "equinoctial":
+            e, i, node, peri, mean = keplerian_angles(
+                *(self._column(parameters, n) for n in ("h", "k", "P", "Q", "L"))
+            )
+        else:
+            e, i, node, peri = (self._column(parameters, n) for n in ("e", "i", "node", "peri"))
+            mean = self._column(parameters, "M") if self.elements == "keplerian" else np.zeros(len(e))
         if self.elements == "cometary":
             q, since = self._column(parameters, "q"), -self._column(parameters, "tp")
         else:
             a = self._column(parameters, "a")
             q = a * (1.0 - e)
-            since = self._column(parameters, "M") * np.sqrt(np.abs(a) ** 3 / GM_SUN)
+            since = mean * np.sqrt(np.abs(a) ** 3 / GM_SUN)
         columns = zip(q, e, i, node, peri, since, strict=True)
         return np.array([state_from_elements(*row) for row in columns])
 
@@ -231,3 +244,12 @@ class Covariance:
         kind = f", {self.caveat}" if self.caveat else ""
         when = f"{self.epoch.tdb.iso[:10]} TDB"
         return f"<Covariance of {', '.join(self.names)} at {when}, {self.source or 'no source'}{kind}>"
+
+
+def keplerian_angles(
+    h: Array, k: Array, p: Array, q: Array, longitude: Array
+) -> tuple[Array, Array, Array, Array, Array]:
+    """Eccentricity, inclination, node, argument of perihelion and mean anomaly (rad) of equinoctial elements."""
+    node = np.arctan2(p, q)
+    perihelion = np.arctan2(h, k)
+    return np.hypot(h, k), 2.0 * np.arctan(np.hypot(p, q)), node, perihelion - node, longitude - perihelion

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from flybystab.constants import OBLIQUITY_J2000
-from flybystab.orbit.kepler import states_at_times
+from flybystab.orbit.kepler import states_at_times, time_at_anomaly
 from flybystab.orbit.planets import PLANETS
 from flybystab.typing import Array
 
@@ -44,3 +44,44 @@ def state_from_elements(
     w = np.array([-cn * sw - sn * cw * ci, -sn * sw + cn * cw * ci, cw * si])
     turn = ecliptic_to_icrf()
     return np.concatenate([turn @ (x * p + y * w), turn @ (vx * p + vy * w)])
+
+
+def elements_from_state(state: Array, gm: float = GM_SUN) -> tuple[float, float, float, float, float, float]:
+    """Elements of the J2000 ecliptic from a heliocentric ICRF state: the inverse of :func:`state_from_elements`.
+
+    Parameters
+    ----------
+    state : ndarray, shape (6,)
+        m and m/s; any conic with angular momentum.
+    gm : float
+        m3/s2.
+
+    Returns
+    -------
+    q, e, i, node, peri, since : float
+        m, 1, rad and s. The node of an orbit in the ecliptic and the perihelion of a circle are zero. `since` is
+        within half a revolution of perihelion.
+    """
+    turn = ecliptic_to_icrf().T
+    x, v = turn @ state[:3], turn @ state[3:]
+    r = float(np.linalg.norm(x))
+    h = np.cross(x, v)
+    momentum = float(np.linalg.norm(h))
+    normal = h / momentum
+    across = float(np.hypot(normal[0], normal[1]))
+    i = float(np.arctan2(across, normal[2]))
+    node = float(np.arctan2(normal[0], -normal[1])) % (2.0 * np.pi) if across > 0.0 else 0.0
+    towards_node = np.array([np.cos(node), np.sin(node), 0.0])
+    vector = np.cross(v, h) / gm - x / r
+    e = float(np.linalg.norm(vector))
+    perihelion = vector / e if e > 1e-15 else towards_node
+    q = momentum**2 / gm / (1.0 + e)
+    # 1 - e = q / a has all its digits near the parabola, where the length of the vector has lost them.
+    inverse = 2.0 / r - float(v @ v) / gm
+    f = -q * inverse if abs(q * inverse) < 0.01 else e - 1.0
+    peri = np.arctan2(perihelion @ np.cross(normal, towards_node), perihelion @ towards_node) % (2.0 * np.pi)
+    anomaly = float(np.arctan2(x @ np.cross(normal, perihelion), x @ perihelion))
+    w = np.sqrt(q / (2.0 + f)) * np.tan(0.5 * anomaly)
+    z = np.sqrt(abs(f) / q) * w
+    ratio = (np.arctan(z) if f < 0.0 else np.arctanh(z)) / z if z else 1.0
+    return q, 1.0 + f, i, node, float(peri), float(time_at_anomaly(gm, q, f, 2.0 * w * ratio))

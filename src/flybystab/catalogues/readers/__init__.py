@@ -72,6 +72,12 @@ def reader_of(text: str) -> Reader | None:
     return next((r for r in READERS.values() if r.identify(text)), None)
 
 
+def reader_names() -> tuple[str, ...]:
+    """Names of the formats."""
+    _load()
+    return tuple(READERS)
+
+
 def text_of(path: str | Path) -> str:
     """Text of a file, decompressed if it is gzipped.
 

@@ -1,114 +1,227 @@
-"""Orbit files in the format OEF2.0 of OrbFit (ESA NEOCC)."""
+"""Orbit files of OrbFit, format OEF2.0: ESA NEOCC, NEODyS and AstDyS (``.ke0 .ke1 .eq0 .eq1``, ``neodys.cat``).
+
+Elements: ``KEP`` a (au), e, i, node, peri, M (deg); ``EQU`` a (au), h, k, p, q, mean longitude (deg); ``COM`` q (au),
+e, i, node, peri (deg), time of perihelion (MJD); ``CAR`` state of the ecliptic (au, au/d). ``COV`` is the upper
+triangle, row by row, in the same units, then 1e-10 au/d2 for A2 (OrbFit 5.0, module ``orbit_elements``, and the
+description of the files at https://neo.ssa.esa.int/computer-access; checked against the ``RMS`` lines).
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 
-from flybystab.catalogues.designations import names_of
+import numpy as np
+
+from flybystab.catalogues.designations import is_comet, name_columns
 from flybystab.catalogues.readers import FRAME, reader
+from flybystab.catalogues.readers.conversion import (
+    MJD,
+    covariance_of,
+    epoch_row,
+    number,
+    perihelion_row,
+    printed_covariance,
+    state_of,
+    state_row,
+)
+from flybystab.catalogues.readers.parameters import check_parameters
 from flybystab.errors import InvalidInput
 
 if TYPE_CHECKING:
-    import astropy.units as u
-
     from flybystab.catalogues.readers import Entry
     from flybystab.orbit.covariance import Covariance
 
+_SETS: Mapping[str, tuple[str, ...]] = {
+    "KEP": ("a", "e", "i", "node", "peri", "M"),
+    "EQU": ("a", "h", "k", "P", "Q", "L"),
+    "COM": ("q", "e", "i", "node", "peri", "tp"),
+    "CAR": ("x", "y", "z", "vx", "vy", "vz"),
+}
+_COLUMNS = ("a_au", "e", "i_deg", "node_deg", "peri_deg", "M_deg")
+#: Parameters of the force models in the order of the LSP and NGR lines; only model 1 is that of asteroids.
+_PARAMETERS: Mapping[str, tuple[str, ...]] = {"0": (), "1": ("AMRAT", "A2")}
+_UNIT = 1e-10  # au/d2, of A2
 
-@reader("OEF2.0", lambda text: bool(re.match(r"\s*(format\s*=.*OEF2|(KEP|EQU|CAR) )", text)))
+
+def _is_oef(text: str) -> bool:
+    return bool(re.match(r"\s*(format\s*=\s*'OEF2|(KEP|EQU|CAR|COM) )", text))
+
+
+@reader("OEF2.0", _is_oef)
 def read_oef(text: str, file: str) -> list[Entry]:
-    """The orbit of an OEF2.0 file."""
-    return [from_neocc(text, file)]
-
-
-def from_neocc(text: str, file: str) -> tuple[dict[str, str], Covariance | None]:
-    """An orbit file of ESA's NEO Coordination Centre (OEF2, Keplerian elements, ``.ke0`` and ``.ke1``).
-
-    Returns
-    -------
-    dict
-        A catalogue row.
-    Covariance or None
-        Upper triangle of its ``COV`` lines: au, degrees, and 1e-10 au/d2 for A2, as the ``RMS`` line shows.
+    """Orbits of a file, one or many.
 
     Raises
     ------
     InvalidInput
-        The file is not one, or its covariance is not that of the parameters that it lists.
     """
-    lines = [line.strip() for line in text.splitlines()]
-    try:
-        body = lines[lines.index("END_OF_HEADER") + 1 :]
-        if "ECLM J2000" not in text:
-            raise ValueError
-        designation = next(line for line in body if line and not line.startswith("!"))
-        words = {line.split()[0]: line.split()[1:] for line in body if line and not line.startswith("!")}
-        kep = words["KEP"]
-        day, scale = float(words["MJD"][0]), words["MJD"][1]
-        if len(kep) != 6 or scale not in ("TDT", "TT", "TDB"):
-            raise ValueError
-    except (ValueError, KeyError, IndexError, StopIteration):
-        raise InvalidInput("orbit file", file, "an OEF2.0 file with Keplerian elements, ECLM J2000") from None
-    out = dict(zip(("a_au", "e", "i_deg", "node_deg", "peri_deg", "M_deg"), kep, strict=True))
-    if designation.isdigit():
-        out["number"] = designation
-        name, out["designation"] = names_of(designation)
+    header, _, body = text.partition("END_OF_HEADER")
+    system = re.search(r"refsys\s*=\s*(\w+)\s+(\w+)", header)
+    if not body or system is None or system.groups() != ("ECLM", "J2000"):
+        raise InvalidInput("orbit file", file, "an OEF2.0 file with a header and refsys = ECLM J2000")
+    if re.search(r"rectype\s*=\s*'1L", header):
+        kind = re.search(r"elem\s*=\s*'(\w+)'", header)
+        if kind is None or kind[1] != "KEP":
+            raise InvalidInput("orbit file", file, "rows of Keplerian elements (elem = 'KEP')")
+        lines = [line for line in body.splitlines() if line.strip() and not line.startswith("!")]
+        return [_row(line, file) for line in lines]
+    found = [_solution(name, lines, file) for name, lines in _blocks(body)]
+    if not found:
+        raise InvalidInput("orbit file", file, "an OEF2.0 file with elements (KEP, EQU, COM, CAR)")
+    return found
+
+
+def from_neocc(text: str, file: str) -> Entry:
+    """The first orbit of an OEF2.0 file: a row, and its covariance or None."""
+    return read_oef(text, file)[0]
+
+
+def _blocks(body: str) -> Iterator[tuple[str, list[str]]]:
+    """Name and lines of each orbit; comments are left out, but for the line of the RMS."""
+    name, lines = "", list[str]()
+    for raw in body.splitlines():
+        line = raw.strip()
+        if line.startswith("!"):
+            line = line[1:].strip() if line[1:].split()[:1] == ["RMS"] else ""
+        if not line:
+            continue
+        if len(line.split()) <= 2 and not re.match(
+            r"(KEP|EQU|COM|CAR|MJD|MAG|LSP|NGR|RMS|COV|COR|NOR)\b", line
+        ):
+            if lines:
+                yield name, lines
+            name, lines = line, []
+        else:
+            lines.append(line)
+    if lines:
+        yield name, lines
+
+
+def _identity(text: str) -> dict[str, str]:
+    """Name columns of an OrbFit name, which has no spaces: 2018VP1, 433, 2040P-L."""
+    spaced = re.sub(r"^(\d{4})([A-Z]{2}\d*|P-L|T-[123])$", r"\1 \2", text.strip("' "))
+    return name_columns(spaced)
+
+
+def _solution(name: str, lines: Sequence[str], file: str) -> Entry:
+    words: dict[str, list[str]] = {}
+    for line in lines:
+        key, *rest = line.split()
+        words.setdefault(key, []).extend(rest)
+    kinds = [k for k in _SETS if k in words]
+    if len(kinds) != 1 or "MJD" not in words or len(words[kinds[0]]) != 6 or len(words["MJD"]) < 2:
+        raise InvalidInput("orbit file", file, "one line of six elements and an epoch (MJD) for each object")
+    day, scale = words["MJD"][:2]
+    if scale not in ("TDT", "TT", "TDB"):
+        raise InvalidInput("epoch", scale, f"TDT, TT or TDB in {file}")
+    if any(k in words for k in ("COR", "NOR")) and "COV" not in words:
+        raise InvalidInput("orbit file", file, "COV lines (not COR or NOR alone)")
+    jd = number(day, "epoch", file) + MJD
+    names, texts = _SETS[kinds[0]], words[kinds[0]]
+    values = [number(t, n, file) for n, t in zip(names, texts, strict=True)]
+    if "tp" in names:
+        values[5] += MJD - jd
+    row = _identity(name) | {"orbit_solution": "NEOCC OEF2", "frame": FRAME}
+    row["orbit_source"] = f"ESA NEOCC ({file})" if kinds[0] == "KEP" else f"OrbFit {kinds[0]} ({file})"
+    if kinds[0] == "KEP":
+        row |= dict(zip(_COLUMNS, texts, strict=True)) | epoch_row(jd)
+    elif kinds[0] == "COM":
+        row |= perihelion_row(jd, values[:5], -values[5])
     else:
-        name, out["designation"] = "", f"{designation[:4]} {designation[4:]}".strip()
-    out["name"] = name or out["designation"] or designation
-    # TT and TDB differ by less than 2 ms.
-    out["epoch_jd_tdb"] = repr(day + 2400000.5)
-    if "MAG" in words:
-        out["H_mag"] = words["MAG"][0]
-    if len(words.get("NGR", [])) == 2:
-        out["A2_au_d2"] = repr(float(words["NGR"][1]) * 1e-10)
-        if float(words["NGR"][0]) != 0.0:
-            out["notes"] = f"solar radiation pressure is left out (area-to-mass ratio {words['NGR'][0]} m2/t)"
-    out |= {"frame": FRAME, "orbit_source": f"ESA NEOCC ({file})", "orbit_solution": "NEOCC OEF2"}
-    return out, _neocc_covariance(body, words, out, file)
+        row |= state_row(jd, state_of(names, values))
+    if "MAG" in words and number(words["MAG"][0], "MAG", file) > -9.0:
+        row["H_mag"] = words["MAG"][0]
+    parameters = _parameters(words, name, file)
+    if "A2" in parameters:
+        row |= {"A2_au_d2": repr(parameters["A2"] * _UNIT), "nongrav_law": "asteroid"}
+    covariance = _covariance(jd, names, values, words, parameters, row["orbit_source"], file)
+    if covariance is None and kinds[0] != "KEP":
+        covariance = printed_covariance(
+            jd, names, texts, jd - MJD if "tp" in names else 0.0, row["orbit_source"]
+        )
+    return row, covariance
 
 
-def _neocc_covariance(
-    body: Sequence[str], words: Mapping[str, Sequence[str]], row: Mapping[str, str], file: str
+def _parameters(words: Mapping[str, Sequence[str]], name: str, file: str) -> dict[str, float]:
+    """Values of the parameters of the force model by name.
+
+    Raises
+    ------
+    InvalidInput
+        A model or a parameter that is not modelled: an area-to-mass ratio, the outgassing of comets.
+    """
+    values = [number(v, "NGR", file) for v in words.get("NGR", [])]
+    model = words.get("LSP", ["1" if values else "0"])[0]
+    if model not in _PARAMETERS or (values and is_comet(name)):
+        given = [f"model {model} of OrbFit, parameter {k + 1}" for k in range(max(len(values), 1))]
+        check_parameters("OrbFit", given, file)
+    labels = _PARAMETERS[model]
+    if len(values) > len(labels) or (values and len(values) != len(labels)):
+        check_parameters("OrbFit", [f"parameter {k + 1}" for k in range(len(labels), len(values))], file)
+        raise InvalidInput("NGR", values, f"the parameters {', '.join(labels)} in {file}")
+    found = dict(zip(labels, values, strict=False))
+    solved = _solved(words, file)
+    if any(s not in labels for s in solved):
+        check_parameters("OrbFit", [s for s in solved if s not in labels], file)
+    check_parameters("OrbFit", [n for n, v in found.items() if n != "A2" and (v != 0.0 or n in solved)], file)
+    return {n: v for n, v in found.items() if n == "A2"}
+
+
+def _solved(words: Mapping[str, Sequence[str]], file: str) -> list[str]:
+    """Names of the parameters that were estimated with the elements (the end of the LSP line)."""
+    lsp = words.get("LSP", [])
+    labels = _PARAMETERS.get(lsp[0], ()) if lsp else ()
+    out = []
+    for text in lsp[3:]:
+        k = int(number(text, "LSP", file))
+        out.append(labels[k - 1] if 1 <= k <= len(labels) else f"parameter {text}")
+    return out
+
+
+def _covariance(
+    jd: float,
+    names: Sequence[str],
+    values: Sequence[float],
+    words: Mapping[str, Sequence[str]],
+    parameters: Mapping[str, float],
+    source: str,
+    file: str,
 ) -> Covariance | None:
-    import astropy.units as u
-    import numpy as np
-    from astropy.time import Time
-
-    from flybystab.orbit.covariance import Covariance
-
-    cells = [c for line in body if line.startswith("COV") for c in line.split()[1:]]
-    if not cells:
+    if "COV" not in words:
         return None
-    names = ["a", "e", "i", "node", "peri", "M"]
-    units: list[u.UnitBase] = [u.au, u.dimensionless_unscaled, *[u.deg] * 4]
-    try:
-        upper = [float(c) for c in cells]
-        # LSP: model, number of parameters, dimension, list of those solved for (2: Yarkovsky).
-        solved = words.get("LSP", [])[3:]
-        n = 6 + len(solved)
-        if len(upper) != n * (n + 1) // 2 or any(s not in ("1", "2") for s in solved):
-            raise ValueError
-        matrix = np.zeros((n, n))
-        matrix[np.triu_indices(n)] = upper
-        matrix += np.triu(matrix, 1).T
-        values = [float(row[c]) for c in ("a_au", "e", "i_deg", "node_deg", "peri_deg", "M_deg")]
-        keep = list(range(6))
-        if "2" in solved:  # the area-to-mass ratio is marginalised: solar radiation is not modelled
-            keep.append(6 + solved.index("2"))
-            names.append("A2")
-            units.append(1e-10 * u.au / u.d**2)
-            values.append(float(words["NGR"][1]))
-        rms = [float(c) for c in words.get("RMS", [])] or np.sqrt(np.diag(matrix))
-        if len(rms) != n or not np.allclose(np.sqrt(np.diag(matrix)), rms, rtol=1e-4):
-            raise ValueError
-    except (ValueError, IndexError):
-        raise InvalidInput(
-            "orbit file",
-            file,
-            "COV lines that agree with the LSP and RMS lines, A2 at most beside the elements",
-        ) from None
-    epoch = Time(float(row["epoch_jd_tdb"]), format="jd", scale="tdb")
-    return Covariance.in_units(epoch, names, values, matrix[np.ix_(keep, keep)], units, f"ESA NEOCC ({file})")
+    solved = _solved(words, file)
+    n = 6 + len(solved)
+    upper = [number(c, "COV", file) for c in words["COV"]]
+    expected = "COV lines that agree with the LSP and RMS lines"
+    if len(upper) != n * (n + 1) // 2:
+        raise InvalidInput("orbit file", file, f"{expected} ({n * (n + 1) // 2} numbers, not {len(upper)})")
+    matrix = np.zeros((n, n))
+    matrix[np.triu_indices(n)] = upper
+    matrix += np.triu(matrix, 1).T
+    if np.any(np.diag(matrix) < 0.0):
+        raise InvalidInput("orbit file", file, f"{expected}, with variances of zero or more")
+    rms = [number(c, "RMS", file) for c in words.get("RMS", [])] or np.sqrt(np.diag(matrix))
+    if len(rms) != n or not np.allclose(np.sqrt(np.diag(matrix)), rms, rtol=1e-4):
+        raise InvalidInput("orbit file", file, expected)
+    scale = np.array([1.0] * 6 + [_UNIT] * len(solved))
+    all_values = [*values, *(parameters[s] * _UNIT for s in solved)]
+    return covariance_of(jd, [*names, *solved], all_values, matrix * np.outer(scale, scale), source, file)
+
+
+def _row(line: str, file: str) -> Entry:
+    """A line of a catalogue of one-line records: name, MJD, six elements, H, G and a flag."""
+    cells = line.split()
+    if len(cells) < 8:
+        raise InvalidInput("row", line[:60], f"a name, an epoch and six elements in {file}")
+    if len(cells) > 10 and cells[10] not in ("0", "0.0"):
+        check_parameters("OrbFit", ["parameters of the force model, which this file does not give"], file)
+    jd = number(cells[1], "epoch", file) + MJD
+    row = _identity(cells[0]) | epoch_row(jd) | dict(zip(_COLUMNS, cells[2:8], strict=True))
+    if len(cells) > 8:
+        row["H_mag"] = cells[8]
+    source = f"OrbFit ({file})"
+    return row | {"frame": FRAME, "orbit_source": source}, printed_covariance(
+        jd, _SETS["KEP"], cells[2:8], 0.0, source
+    )

@@ -1,7 +1,12 @@
-"""Estimated parameters of an orbit beside its elements: which are modelled, by publisher."""
+"""Parameters of orbit solutions beside the six elements: which are modelled, by publisher.
+
+Every reader passes what its file has beside the elements to :func:`check_parameters`. A parameter that is neither
+modelled nor known is refused by its name: leaving it out would give an orbit that its publisher did not determine.
+"""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Mapping
 from types import MappingProxyType
 
@@ -9,9 +14,23 @@ from flybystab.errors import InvalidInput
 
 #: Parameters that are read, by publisher.
 MODELLED: Mapping[str, frozenset[str]] = MappingProxyType(
-    {"JPL": frozenset({"A1", "A2", "A3", "ALN", "NK", "NM", "NN", "R0"})}
+    {
+        # https://ssd-api.jpl.nasa.gov/doc/sbdb.html (model_pars)
+        "JPL": frozenset({"A1", "A2", "A3", "ALN", "NK", "NM", "NN", "R0"}),
+        # Parameters 1 and 2 of model 1 in the LSP and NGR lines of OrbFit: area-to-mass ratio and Yarkovsky A2.
+        "OrbFit": frozenset({"A2"}),
+        # non_grav_coefficients of https://github.com/Smithsonian/mpc-public/tree/main/mpc_orb (A2 in 1e-10 au/d2).
+        "MPC": frozenset({"yarkovsky", "yarkovski"}),
+        # A2 alone is its Yarkovsky model; with A1 it is one of several laws, which the file does not name.
+        "find_orb": frozenset({"A2"}),
+        # Non-gravitational terms of layup have constants g(r) of their own (https://github.com/Smithsonian/layup).
+        "FORMAT": frozenset(),
+        # Element tables of MPC and JPL without room for parameters.
+        "table": frozenset(),
+    }
 )
 
+_WITHOUT = "a solution without this parameter"
 #: Parameters that are known but not modelled, and what to do instead.
 NOT_MODELLED: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
@@ -20,9 +39,30 @@ NOT_MODELLED: Mapping[str, Mapping[str, str]] = MappingProxyType(
             "AMRAT": "an orbit with A1 or A2 in place of the area-to-mass ratio",
             "DT": "a solution without the delay of the maximum of outgassing",
             "S0": "a solution without S0",
-        }
+        },
+        "OrbFit": {
+            "AMRAT": "an orbit with A2 alone, or fs.Orbit.from_elements with A1 for the radiation pressure"
+        },
+        "MPC": dict.fromkeys(
+            ("A1", "A2", "A3", "DT", "srp", "yc"), "JPL's orbit (SBDB), which names the law"
+        ),
+        "find_orb": {
+            "A1": "fs.Orbit.from_elements with A1, A2, A3 and the law of the fit",
+            "A3": "fs.Orbit.from_elements with A1, A2, A3 and the law of the fit",
+            "AMR": "a fit with A2 alone, or fs.Orbit.from_elements with A1 for the radiation pressure",
+        },
+        "FORMAT": dict.fromkeys(("A1", "A2", "A3"), "fs.Orbit.from_elements or from_state with A1, A2, A3"),
+        "table": {},
     }
 )
+
+#: Names by which agencies write parameters of a force model: capitals and digits, as A4, DT, AMRAT, RHO.
+_PARAMETER = re.compile(r"[A-Z][A-Z0-9]{1,7}$")
+
+
+def looks_like_parameter(name: str) -> bool:
+    """Whether a name of a column or key is written as the parameters of force models are: A4, DT, AMRAT."""
+    return bool(_PARAMETER.match(name))
 
 
 def check_parameters(agency: str, names: Iterable[str], file: str) -> None:
@@ -35,10 +75,10 @@ def check_parameters(agency: str, names: Iterable[str], file: str) -> None:
     """
     lacking = [n for n in names if n not in MODELLED[agency]]
     if lacking:
-        advice = {NOT_MODELLED[agency].get(n, "a solution without this parameter") for n in lacking}
+        advice = {NOT_MODELLED[agency].get(n, _WITHOUT) for n in lacking}
         raise InvalidInput(
             "non-gravitational parameters",
             ", ".join(lacking),
-            f"parameters that are modelled ({', '.join(sorted(MODELLED[agency]))}) in {file}; "
+            f"parameters that are modelled ({', '.join(sorted(MODELLED[agency])) or 'none'}) in {file}; "
             f"use {'; '.join(sorted(advice))}",
         )

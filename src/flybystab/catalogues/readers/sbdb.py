@@ -1,14 +1,32 @@
-"""JPL Small-Body Database: query tables (CSV, JSON) and single answers (JSON)."""
+"""JPL Small-Body Database: tables of the query tool and API (CSV and JSON).
+
+Columns: https://ssd-api.jpl.nasa.gov/doc/sbdb_query.html. Elements are heliocentric, J2000 ecliptic, TDB. Any set of
+columns that defines an orbit and names its object is read.
+"""
 
 from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from flybystab.catalogues.designations import names_of
+import numpy as np
+
+from flybystab.catalogues.designations import is_comet, name_columns, names_of
 from flybystab.catalogues.readers import FRAME, header_of, reader, rows_of
-from flybystab.catalogues.readers.parameters import NOT_MODELLED, check_parameters
+from flybystab.catalogues.readers.conversion import (
+    MJD,
+    covariance_of,
+    decimals_of,
+    number,
+    perihelion_row,
+    printed_covariance,
+    since_perihelion,
+)
+from flybystab.catalogues.readers.parameters import (
+    check_parameters,
+    looks_like_parameter,
+)
 from flybystab.errors import InvalidInput
 from flybystab.files import parse_json
 
@@ -16,116 +34,87 @@ if TYPE_CHECKING:
     from flybystab.catalogues.readers import Entry
     from flybystab.orbit.covariance import Covariance
 
-#: Mean motion at 1 au, deg/d (Gauss's constant).
-_GAUSS = 0.98560766860142
-_SBDB = {
-    "class": "orbit_class",
-    "H": "H_mag",
-    "epoch": "epoch_jd_tdb",
+_ELEMENTS = {
     "a": "a_au",
     "e": "e",
     "i": "i_deg",
     "om": "node_deg",
     "w": "peri_deg",
     "ma": "M_deg",
-    "sigma_a": "sigma_a_au",
-    "sigma_e": "sigma_e",
-    "sigma_i": "sigma_i_deg",
-    "sigma_om": "sigma_node_deg",
-    "sigma_w": "sigma_peri_deg",
-    "sigma_ma": "sigma_M_deg",
-    "A1": "A1_au_d2",
-    "A2": "A2_au_d2",
-    "A3": "A3_au_d2",
+}
+_COMETARY = ("q", "e", "i", "om", "w", "tp")
+_SIGMAS = {f"sigma_{c}": f"sigma_{mine}" for c, mine in _ELEMENTS.items()}
+_ACCELERATIONS = ("A1", "A2", "A3")
+_SBDB = {
+    "class": "orbit_class",
+    "H": "H_mag",
+    "epoch": "epoch_jd_tdb",
     "rot_per": "spin_period_h",
     "orbit_id": "orbit_solution",
     "condition_code": "condition_code",
+    **_ELEMENTS,
+    **_SIGMAS,
+    **{c: f"{c}_au_d2" for c in _ACCELERATIONS},
 }
+_NAMES = {"a": "a", "e": "e", "i": "i", "om": "node", "w": "peri", "ma": "M", "q": "q", "tp": "tp"}
+#: Columns in capitals that are no parameters of the force model.
+_OTHER = frozenset({"H", "G", "M1", "M2", "K1", "K2", "PC", "GM", "BV", "UB", "IR", "UV"})
+#: Columns by which a table is known to be JPL's.
+_JPL = frozenset(
+    {"om", "w", "ma", "tp", "pdes", "full_name", "spkid", "epoch_mjd", "epoch_cal", "moid", "per_y"}
+)
+#: Classes of comets in the SBDB.
+_COMETS = frozenset({"COM", "CTc", "ETc", "HTC", "HYP", "JFC", "JFc", "PAR"})
+
+
+def comet_orbit(orbit_class: str, key: str) -> bool:
+    """Whether an object is a comet, by its class or its designation: its A1, A2, A3 follow the law of comets."""
+    return orbit_class in _COMETS or is_comet(key)
 
 
 def from_sbdb(row: Mapping[str, str], file: str) -> dict[str, str]:
-    """A row of a JPL Small-Body Database query (column names of its API) as a catalogue row."""
+    """A row of a query (column names of the API) as a catalogue row.
+
+    Raises
+    ------
+    InvalidInput
+        Parameters of the force model that are not modelled, or elements that are no numbers.
+    """
     out = {mine: row[theirs] for theirs, mine in _SBDB.items() if row.get(theirs)}
-    check_parameters("JPL", (c for c in NOT_MODELLED["JPL"] if row.get(c)), file)
+    _check(row, file)
     full = row.get("full_name", "").strip()
-    key = row.get("pdes", "").strip() or _key_of(full, row.get("spkid", ""))
+    key = row.get("pdes", "").strip() or _key_of(full, row.get("spkid", "") or row.get("id", ""))
     out |= _elements(row, file)
-    if any(row.get(c) for c in ("A1", "A2", "A3")):
-        out["nongrav_law"] = "comet" if _is_comet(row.get("class", ""), key) else "asteroid"
-    designation = full.partition("(")[2].rstrip(") ") if "(" in full else ""
-    known = names_of(key)
-    out["number"] = key if key.isdigit() else ""
-    out["designation"] = designation or (known[1] if key.isdigit() else key)
-    out["name"] = row.get("name", "").strip() or known[0] or out["designation"] or key
+    if any(row.get(c) for c in _ACCELERATIONS):
+        out["nongrav_law"] = "comet" if comet_orbit(row.get("class", ""), key) else "asteroid"
+    out |= _names(row, full, key)
     out["pha"] = {"True": "Y", "False": "N"}.get(row.get("pha", ""), row.get("pha", ""))
     taxonomy = row.get("spec_B") or row.get("spec_T")
     if taxonomy:
         out["taxonomic_class"] = taxonomy
     if row.get("diameter"):
-        out["diameter_m"] = _thousandfold(row["diameter"], "diameter", file)
+        out["diameter_m"] = thousandfold(row["diameter"], "diameter", file)
         if row.get("diameter_sigma"):
-            out["diameter_sigma_m"] = _thousandfold(row["diameter_sigma"], "diameter_sigma", file)
+            out["diameter_sigma_m"] = thousandfold(row["diameter_sigma"], "diameter_sigma", file)
     out["condition_code"] = out.get("condition_code", "") if out.get("condition_code", "").isdigit() else ""
     return out | {"frame": FRAME, "orbit_source": f"JPL SBDB ({file})"}
 
 
-_SBDB_PHYS = {"H": "H_mag", "rot_per": "spin_period_h"}
-_SBDB_NAMES = {"om": "node", "w": "peri"}
+def _names(row: Mapping[str, str], full: str, key: str) -> dict[str, str]:
+    if comet_orbit(row.get("class", ""), key) and (full or is_comet(key)):
+        return name_columns(full or key)  # many comets are called SOHO or LINEAR
+    designation = full.partition("(")[2].rstrip(") ") if "(" in full else ""
+    known = names_of(key)
+    out = {"number": key if key.isdigit() else ""}
+    out["designation"] = designation or (known[1] if key.isdigit() else key)
+    out["name"] = row.get("name", "").strip() or known[0] or out["designation"] or key
+    return out
 
 
-def from_sbdb_answer(text: str, file: str) -> tuple[dict[str, str], Covariance | None]:
-    """One object's answer of the JPL SBDB API (JSON, with ``cov=mat`` for the covariance).
-
-    Returns
-    -------
-    dict
-        A catalogue row: elements of the answer at their epoch.
-    Covariance or None
-        At the epoch of its own, around the elements that the answer gives for that epoch; au, days, degrees.
-
-    Raises
-    ------
-    InvalidInput
-    """
-    try:
-        record: dict[str, Any] = parse_json(text, "orbit file", file)
-        orbit, thing = record["orbit"], record["object"]
-        elements = {item["name"]: item for item in orbit["elements"]}
-        pushes = {p["name"]: p for p in orbit.get("model_pars") or [] if p["name"] in ("A1", "A2", "A3")}
-        row = {mine: str(elements[c]["value"]) for c, mine in _SBDB.items() if c in elements}
-        row |= {
-            _SBDB["sigma_" + c]: str(elements[c]["sigma"])
-            for c in ("a", "e", "i", "om", "w", "ma")
-            if elements[c].get("sigma")
-        }
-        row |= {f"{name}_au_d2": str(p["value"]) for name, p in pushes.items()}
-        row["epoch_jd_tdb"] = str(orbit["epoch"])
-        full = str(thing["fullname"])
-        key = str(thing["des"])
-    except (KeyError, TypeError) as error:
-        raise InvalidInput(
-            "orbit file", file, f"an answer of the SBDB API with full precision ({error})"
-        ) from None
-    check_parameters("JPL", (p["name"] for p in orbit.get("model_pars") or []), file)
-    designation = full.partition("(")[2].rstrip(") ")
-    row["number"] = key if key.isdigit() else ""
-    row["designation"] = designation or ("" if key.isdigit() else key)
-    name = full.partition("(")[0].strip()
-    row["name"] = name.removeprefix(key).strip() if key.isdigit() else row["designation"]
-    row["name"] = row["name"] or row["designation"] or key
-    row["orbit_class"] = (thing.get("orbit_class") or {}).get("code", "")
-    row["pha"] = {True: "Y", False: "N"}.get(thing.get("pha"), "")
-    for item in record.get("phys_par") or []:
-        if item["name"] in _SBDB_PHYS and item.get("value"):
-            row[_SBDB_PHYS[item["name"]]] = str(item["value"])
-        elif item["name"] == "diameter" and item.get("value"):
-            row["diameter_m"] = _thousandfold(str(item["value"]), "diameter", file)
-    solution = str(orbit.get("orbit_id", ""))
-    row |= {"frame": FRAME, "orbit_solution": f"JPL {solution}", "orbit_source": f"JPL SBDB ({file})"}
-    row["condition_code"] = str(orbit.get("condition_code") or "")
-    if pushes:
-        row["nongrav_law"] = _law_of(orbit, _is_comet(row["orbit_class"], key), file)
-    return row, _sbdb_covariance(orbit, pushes, f"JPL SBDB, solution {solution} ({file})", file)
+def _check(row: Mapping[str, str], file: str) -> None:
+    """Refuse parameters of the force model: columns in capitals that are not known as anything else."""
+    given = {c.removesuffix("_sigma").removesuffix("_kind") for c in row if row[c] and c not in _OTHER}
+    check_parameters("JPL", sorted(c for c in given if looks_like_parameter(c) and c not in _OTHER), file)
 
 
 def _key_of(full: str, spkid: str) -> str:
@@ -133,129 +122,114 @@ def _key_of(full: str, spkid: str) -> str:
     if full:
         first = full.split()[0].strip("()")
         return first if first.isdigit() and not re.match(r"\d{4} [A-Z]{2}", full) else full.strip("() ")
-    n = int(spkid) if spkid.isdigit() else 0
+    text = spkid.lstrip("abcdefghijklmnopqrstuvwxyz")  # the column id is a0000433
+    n = int(text) if text.isdigit() else 0
+    if text != spkid:
+        return str(n) if n else spkid
     return str(n - 20000000 if n > 20000000 else n - 2000000) if n > 2000000 else spkid
 
 
+def _epoch(row: Mapping[str, str], file: str) -> float:
+    if row.get("epoch"):
+        return number(row["epoch"], "epoch", file)
+    return number(row.get("epoch_mjd", ""), "epoch_mjd", file) + MJD
+
+
+def _keplerian(row: Mapping[str, str]) -> bool:
+    return bool(row.get("a") and row.get("ma"))
+
+
 def _elements(row: Mapping[str, str], file: str) -> dict[str, str]:
-    """Epoch (JD, TDB), a and M of a row, from whichever columns define them.
+    """Epoch and elements of a row, from whichever columns define them."""
+    epoch = _epoch(row, file)
+    if _keplerian(row):
+        for c in _ELEMENTS:
+            number(row.get(c, ""), c, file)
+        return {} if row.get("epoch") else {"epoch_jd_tdb": repr(epoch)}
+    e = number(row.get("e", ""), "e", file)
+    q = number(row.get("q") or row.get("a", ""), "q or a", file) * (1.0 if row.get("q") else 1.0 - e)
+    if row.get("tp"):
+        since = epoch - number(row["tp"], "tp", file)
+    elif e != 1.0:
+        since = since_perihelion(number(row.get("ma", ""), "tp or ma", file), q / (1.0 - e))
+    else:
+        raise InvalidInput("tp", row.get("tp"), f"the time of perihelion of a parabola in {file}")
+    angles = [number(row.get(c, ""), c, file) for c in ("i", "om", "w")]
+    return perihelion_row(epoch, (q, e, *angles), since)
+
+
+def _covariance(row: Mapping[str, str], file: str) -> Covariance | None:
+    """Covariance where the catalogue row alone does not say it: by q and tp, or with errors of A1, A2, A3."""
+    pushes = [c for c in _ACCELERATIONS if row.get(c) and row.get(f"{c}_sigma")]
+    keplerian = _keplerian(row)
+    columns = tuple(_ELEMENTS) if keplerian else _COMETARY
+    if (keplerian and not pushes) or not all(row.get(c) for c in columns):
+        return None
+    jd = _epoch(row, file)
+    texts = [row[c] for c in columns]
+    names = [_NAMES[c] for c in columns]
+    sigmas = [row.get(f"sigma_{c}", "") for c in columns]
+    source = f"JPL SBDB ({file})"
+    if not all(sigmas) and not pushes:
+        return printed_covariance(jd, names, texts, jd, source)
+    values = [number(t, c, file) - (jd if c == "tp" else 0.0) for c, t in zip(columns, texts, strict=True)]
+    sigma = [
+        number(s, "sigma", file) if s else 0.5 * 10.0 ** -decimals_of(t) / np.sqrt(3.0)
+        for s, t in zip(sigmas, texts, strict=True)
+    ]
+    values += [number(row[c], c, file) for c in pushes]
+    sigma += [number(row[f"{c}_sigma"], f"{c}_sigma", file) for c in pushes]
+    matrix = np.diag(np.square(sigma))
+    what = "1-sigmas" if all(sigmas) else "printed digits and 1-sigmas"
+    label = f"{what} without correlations, {source}"
+    return covariance_of(jd, [*names, *pushes], values, matrix, label, file, correlated=False)
+
+
+def thousandfold(text: str, name: str, file: str) -> str:
+    """A printed number of kilometres in metres."""
+    return f"{1000.0 * number(text, name, file):.10g}"
+
+
+def _missing(columns: set[str]) -> list[str]:
+    """What columns of a query lack to define an orbit and name its object."""
+    out = [c for c in ("e", "i", "om", "w") if c not in columns]
+    for either in (("epoch", "epoch_mjd"), ("a", "q"), ("ma", "tp"), ("full_name", "pdes", "spkid", "name")):
+        if not {*either, *(("id",) if "spkid" in either else ())} & columns:
+            out.append(" or ".join(either))
+    return out
+
+
+def _is_query(text: str) -> bool:
+    columns = set(header_of(text))
+    return len(columns & _JPL) >= 2 and "a_au" not in columns and "FORMAT" not in columns
+
+
+def _entries(rows: list[dict[str, str]], columns: set[str], file: str) -> list[Entry]:
+    missing = _missing(columns)
+    if missing:
+        raise InvalidInput(
+            "columns", "a JPL query without " + ", ".join(missing), f"columns that define an orbit in {file}"
+        )
+    return [(from_sbdb(row, file), _covariance(row, file)) for row in rows]
+
+
+@reader("SBDB query (CSV)", _is_query)
+def read_query(text: str, file: str) -> list[Entry]:
+    """Rows of a query saved as CSV.
 
     Raises
     ------
     InvalidInput
-        The orbit is a parabola, or a number cannot be read.
+        Columns that define an orbit are missing, or a row is not understood.
     """
-    out = {}
-    try:
-        if not row.get("epoch"):
-            out["epoch_jd_tdb"] = repr(float(row["epoch_mjd"]) + 2400000.5)
-        epoch = float(row.get("epoch") or out["epoch_jd_tdb"])
-        e = float(row["e"])
-        if not row.get("a") and e != 1.0:
-            out["a_au"] = repr(float(row["q"]) / (1.0 - e))
-        if not row.get("ma") and e != 1.0:
-            a = abs(float(row.get("a") or out["a_au"]))
-            out["M_deg"] = repr(_GAUSS * a**-1.5 * (epoch - float(row["tp"])))
-    except (KeyError, ValueError, ZeroDivisionError) as error:
-        raise InvalidInput("elements", dict(row), f"numbers in {file} ({error})") from None
-    if e == 1.0:
-        raise InvalidInput("e", 1, f"an ellipse or a hyperbola: a parabola has no a and M (in {file})")
-    return out
+    return _entries(rows_of(text, file), set(header_of(text)), file)
 
 
-#: Classes of comets in the SBDB.
-_COMETS = frozenset({"COM", "CTc", "ETc", "HTC", "HYP", "JFC", "JFc", "PAR"})
-#: Constants of the laws of distance, as JPL lists them.
-_LAWS = {
-    "asteroid": {"ALN": 1.0, "NK": 0.0, "NM": 2.0, "R0": 1.0},
-    "comet": {"ALN": 0.1112620426, "NK": 4.6142, "NM": 2.15, "NN": 5.093, "R0": 2.808},
-}
-
-
-def _is_comet(orbit_class: str, key: str) -> bool:
-    return orbit_class in _COMETS or bool(re.match(r"(\d+[PCD](-|/|$)|[PCD]/)", key.strip()))
-
-
-def _law_of(orbit: Mapping[str, Any], comet: bool, file: str) -> str:
-    """Law of distance of A1, A2, A3: that of the constants listed, or of Marsden et al. (1973) for a comet."""
-    constants = {c for law in _LAWS.values() for c in law}
-    given = {p["name"]: float(p["value"]) for p in orbit.get("model_pars") or [] if p["name"] in constants}
-    if not given and comet:
-        return "comet"
-    for name, law in _LAWS.items():
-        if given and all(given.get(c) == x for c, x in law.items()):
-            return name
-    raise InvalidInput(
-        "A1, A2, A3",
-        f"with the law {given or 'not given'} in {file}",
-        "the constants of an acceleration that falls as 1/r2, or of the water law of comets",
-    )
-
-
-def _sbdb_covariance(
-    orbit: Mapping[str, Any], pushes: Mapping[str, Any], source: str, file: str
-) -> Covariance | None:
-    import astropy.units as u
-    import numpy as np
-    from astropy.time import Time
-
-    from flybystab.orbit.covariance import Covariance
-
-    found = orbit.get("covariance")
-    if not found:
-        return None
-    unit = {"e": u.dimensionless_unscaled, "q": u.au, "tp": u.d} | dict.fromkeys(("node", "peri", "i"), u.deg)
-    unit |= dict.fromkeys(("A1", "A2", "A3"), u.au / u.d**2)
-    try:
-        names = [_SBDB_NAMES.get(str(n), str(n)) for n in found["labels"]]
-        epoch = float(found["epoch"])
-        # JPL repeats the elements only where the epoch of the covariance is not that of the orbit.
-        own = orbit["elements"] if epoch == float(orbit["epoch"]) else None
-        if own is None and "elements" not in found:
-            raise KeyError("elements at the epoch of the covariance")
-        mean = {_SBDB_NAMES.get(e["name"], e["name"]): str(e["value"]) for e in found.get("elements", own)}
-        mean |= {name: str(p["value"]) for name, p in pushes.items()}
-        # Digits of the time of perihelion are lost neither as a Julian date nor as a difference.
-        whole, _, rest = mean["tp"].partition(".")
-        values = [float(mean[n]) if n != "tp" else (float(whole) - epoch) + float("0." + rest) for n in names]
-        matrix = np.array([[float(c) for c in line] for line in found["data"]])
-        units = [unit[n] for n in names]
-    except (KeyError, TypeError, ValueError) as error:
-        raise InvalidInput(
-            "covariance", file, f"labels out of e, q, tp, node, peri, i, A1, A2, A3 ({error})"
-        ) from None
-    return Covariance.in_units(Time(epoch, format="jd", scale="tdb"), names, values, matrix, units, source)
-
-
-def _thousandfold(text: str, name: str, file: str) -> str:
-    try:
-        return f"{1000.0 * float(text):.10g}"
-    except ValueError:
-        raise InvalidInput(name, text, f"a number in {file}") from None
-
-
-def _defines_orbit(columns: set[str]) -> bool:
-    """Whether columns of a query define an orbit and name its object."""
-    return (
-        {"e", "i", "om", "w"} <= columns
-        and bool({"epoch", "epoch_mjd"} & columns)
-        and ("a" in columns or "q" in columns)
-        and ("ma" in columns or "tp" in columns)
-        and bool({"pdes", "full_name", "spkid"} & columns)
-    )
-
-
-@reader("SBDB query (CSV)", lambda text: _defines_orbit(set(header_of(text))))
-def read_query(text: str, file: str) -> list[Entry]:
-    """Rows of a query saved as CSV."""
-    return [(from_sbdb(row, file), None) for row in rows_of(text, file)]
-
-
-def _is_query(text: str) -> bool:
+def _is_query_json(text: str) -> bool:
     return text.lstrip().startswith("{") and '"fields"' in text and '"data"' in text
 
 
-@reader("SBDB query (JSON)", _is_query)
+@reader("SBDB query (JSON)", _is_query_json)
 def read_query_json(text: str, file: str) -> list[Entry]:
     """Rows of an answer of the query API.
 
@@ -263,8 +237,8 @@ def read_query_json(text: str, file: str) -> list[Entry]:
     ------
     InvalidInput
     """
+    answer = parse_json(text, "catalogue file", file)
     try:
-        answer = parse_json(text, "catalogue file", file)
         fields = [str(f) for f in answer["fields"]]
         rows = [
             {f: "" if v is None else str(v) for f, v in zip(fields, row, strict=True)}
@@ -272,14 +246,4 @@ def read_query_json(text: str, file: str) -> list[Entry]:
         ]
     except (ValueError, KeyError, TypeError) as error:
         raise InvalidInput("orbit file", file, f"an answer of the SBDB query API ({error})") from None
-    if not _defines_orbit(set(fields)):
-        raise InvalidInput(
-            "fields", ", ".join(fields), "epoch, e, i, om, w, a or q, ma or tp, and a name (pdes, full_name)"
-        )
-    return [(from_sbdb(row, file), None) for row in rows]
-
-
-@reader("SBDB answer", lambda text: text.lstrip().startswith("{") and not _is_query(text))
-def read_answer(text: str, file: str) -> list[Entry]:
-    """The orbit of an answer for one object."""
-    return [from_sbdb_answer(text, file)]
+    return _entries(rows, set(fields), file)

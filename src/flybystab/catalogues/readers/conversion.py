@@ -1,0 +1,324 @@
+"""From the elements, states and matrices of orbit files to rows of a catalogue and covariances.
+
+Rows hold heliocentric elements of the J2000 ecliptic. States relative to another centre or with other axes are
+converted; their covariances become those of a state with ICRF axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from functools import lru_cache
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from flybystab.constants import AU, DAY
+from flybystab.errors import InvalidInput
+from flybystab.typing import Array
+
+if TYPE_CHECKING:
+    from astropy.time import Time
+
+    from flybystab.orbit.covariance import Covariance
+
+#: Day number of Modified Julian Dates, d.
+MJD = 2400000.5
+#: Radians of a degree.
+DEGREE = np.pi / 180.0
+#: Semi-major axes beyond this are left out of a row: q and the time of perihelion keep the digits, au.
+_LARGEST_AXIS = 1e5
+#: Displacement, m, below which the printed digits of an orbit are not counted as its error.
+_NEGLIGIBLE = 1e3
+
+
+def julian(text: str) -> tuple[float, float]:
+    """Whole and fractional day of a printed Julian date: differences keep all printed digits."""
+    whole, _, fraction = text.strip().partition(".")
+    return float(whole), float("0." + (fraction or "0"))
+
+
+def number(text: object, name: str, file: str) -> float:
+    """A finite number of a file.
+
+    Raises
+    ------
+    InvalidInput
+    """
+    try:
+        value = float(str(text).strip().lower().replace("d", "e"))
+    except ValueError:
+        value = np.nan
+    if not np.isfinite(value):
+        raise InvalidInput(name, text, f"a finite number in {file}")
+    return value
+
+
+def epoch_row(jd: float) -> dict[str, str]:
+    """Column of the epoch. TT and TDB, which differ by less than 2 ms, are not told apart."""
+    return {"epoch_jd_tdb": repr(float(jd))}
+
+
+def perihelion_row(jd: float, elements: Sequence[float], since: float) -> dict[str, str]:
+    """Columns of an orbit by its perihelion.
+
+    Parameters
+    ----------
+    jd : float
+        Epoch, TDB.
+    elements : sequence of float
+        q, e, i, node, peri; au and deg.
+    since : float
+        Days from the perihelion to the epoch.
+    """
+    from flybystab.orbit.elements import GM_SUN
+
+    q, e, i, node, peri = (float(x) for x in elements)
+    row = epoch_row(jd) | {"e": repr(e), "i_deg": repr(i), "node_deg": repr(node), "peri_deg": repr(peri)}
+    axis = q / (1.0 - e) if e != 1.0 else np.inf
+    if abs(axis) > _LARGEST_AXIS:
+        return row | {"q_au": repr(q), "tp_jd_tdb": repr(jd - since)}
+    mean = since * DAY * np.sqrt(GM_SUN / abs(axis * AU) ** 3) / DEGREE
+    return row | {"a_au": repr(axis), "M_deg": repr(float(mean))}
+
+
+def since_perihelion(mean: float, axis: float) -> float:
+    """Days since perihelion of a mean anomaly (deg) and a semi-major axis (au)."""
+    from flybystab.orbit.elements import GM_SUN
+
+    return float(mean * DEGREE * np.sqrt(abs(axis * AU) ** 3 / GM_SUN) / DAY)
+
+
+def equatorial_to_ecliptic(right_ascension: float, declination: float) -> tuple[float, float]:
+    """Longitude and latitude (deg, J2000) of a direction of the equator (deg)."""
+    from flybystab.orbit.elements import ecliptic_to_icrf
+
+    alpha, delta = right_ascension * DEGREE, declination * DEGREE
+    at = np.array([np.cos(delta) * np.cos(alpha), np.cos(delta) * np.sin(alpha), np.sin(delta)])
+    x, y, z = ecliptic_to_icrf().T @ at
+    return float(np.arctan2(y, x) / DEGREE) % 360.0, float(np.arcsin(z) / DEGREE)
+
+
+def state_row(jd: float, state: Array) -> dict[str, str]:
+    """Columns of the osculating elements of a heliocentric ICRF state (m, m/s)."""
+    from flybystab.orbit.elements import elements_from_state
+
+    q, e, i, node, peri, since = elements_from_state(state)
+    angles = (i / DEGREE, node / DEGREE, peri / DEGREE)
+    return perihelion_row(jd, (q / AU, e, *angles), since / DAY)
+
+
+def rotated(state: Array) -> Array:
+    """State, or matrix of its columns, from the axes of the ecliptic to those of the ICRF, shape (6, ...)."""
+    from flybystab.orbit.elements import ecliptic_to_icrf
+
+    turn = ecliptic_to_icrf()
+    return np.concatenate([turn @ state[:3], turn @ state[3:]])
+
+
+@lru_cache(maxsize=4096)
+def _centre_offset(jd: float, centre: str) -> tuple[float, ...]:
+    import astropy.units as u
+    from astropy.time import Time
+
+    from flybystab.orbit.orbit import Orbit, heliocentric
+
+    one = np.array([AU, 0.0, 0.0, 0.0, 0.0, 0.0])
+    whole = np.floor(jd)
+    orbit = Orbit.from_state(
+        Time(whole, jd - whole, format="jd", scale="tdb"), one[:3] * u.m, one[3:] * u.m / u.s, centre=centre
+    )
+    return tuple(float(x) for x in heliocentric(orbit) - one)
+
+
+def heliocentric_state(jd: float, state: Array, centre: str) -> Array:
+    """State (m, m/s, ICRF) relative to the Sun, from one relative to `centre` of :class:`flybystab.Orbit`.
+
+    Warns
+    -----
+    InaccurateOrbit
+        A barycentric state with an ephemeris of another barycentre (DE421).
+    """
+    return state if centre == "sun" else state + np.array(_centre_offset(jd, centre))
+
+
+@lru_cache(maxsize=1)
+def total_gm() -> float:
+    """GM of Sun, planets, Moon and massive asteroids, m3/s2, of barycentric elements."""
+    from flybystab.orbit.ephemeris import BELT_GM, BODIES
+    from flybystab.orbit.planets import PLANETS
+
+    return float(sum(PLANETS[name].gm for name in BODIES) + sum(BELT_GM.values()))
+
+
+def state_of(names: Sequence[str], values: Sequence[float] | Array, gm: float | None = None) -> Array:
+    """State (m, m/s, ICRF axes) of elements of the ecliptic in au, au/d, days and degrees.
+
+    Parameters
+    ----------
+    names : sequence of str
+        Those of a set of :data:`flybystab.orbit.covariance.SETS`; a cartesian state has axes of the ecliptic here.
+    values : sequence of float
+        ``tp`` is the time of perihelion less the epoch.
+    gm : float, optional
+        m3/s2; that of the Sun by default.
+    """
+    from flybystab.orbit.covariance import keplerian_angles
+    from flybystab.orbit.elements import GM_SUN, state_from_elements
+
+    mu = GM_SUN if gm is None else gm
+    at = dict(zip(names, values, strict=True))
+    if "x" in at:
+        return rotated(np.array([*(at[c] * AU for c in "xyz"), *(at["v" + c] * AU / DAY for c in "xyz")]))
+    if "h" in at:
+        h, k, p, q, longitude = (np.array([at[c]]) for c in ("h", "k", "P", "Q", "L"))
+        e, i, node, peri, mean = (float(x[0]) for x in keplerian_angles(h, k, p, q, longitude * DEGREE))
+    else:
+        e, i, node, peri = at["e"], *(at[c] * DEGREE for c in ("i", "node", "peri"))
+        mean = at.get("M", 0.0) * DEGREE
+    if "q" in at:
+        q, since = at["q"] * AU, -at["tp"] * DAY
+    else:
+        q, since = at["a"] * AU * (1.0 - e), mean * np.sqrt(abs(at["a"] * AU) ** 3 / mu)
+    return np.array(state_from_elements(q, e, i, node, peri, since, mu))
+
+
+def cartesian_covariance(
+    jd: float,
+    names: Sequence[str],
+    values: Sequence[float],
+    matrix: Array,
+    source: str,
+    *,
+    gm: float | None = None,
+    correlated: bool = True,
+    caveat: str = "",
+) -> Covariance:
+    """Covariance of the state with ICRF axes, from that of elements (au, days, degrees) to first order.
+
+    Parameters are those of :func:`state_of`; A1, A2, A3 may follow the elements, in au/d2.
+    """
+    from flybystab.orbit.covariance import PUSHES, SETS, Covariance
+
+    extra = [n for n in names if n in PUSHES]
+    elements = [n for n in names if n not in PUSHES]
+    middle = np.array(values[: len(elements)], dtype=float)
+    jacobian = np.zeros((6 + len(extra), len(names)))
+    sigma = np.sqrt(np.diag(matrix))
+    for k in range(len(elements)):
+        step = np.zeros(len(elements))
+        # A step of a part in 1e5 of the angle, length or time balances rounding and curvature.
+        step[k] = max(1e-6 * abs(middle[k]), min(float(sigma[k]), 1e-3), 1e-9)
+        difference = state_of(elements, middle + step, gm) - state_of(elements, middle - step, gm)
+        jacobian[:6, k] = difference / (2.0 * step[k])
+    for k in range(len(extra)):
+        jacobian[6 + k, len(elements) + k] = AU / DAY**2
+    mean = np.concatenate(
+        [state_of(elements, middle, gm), np.array(values[len(elements) :], dtype=float) * AU / DAY**2]
+    )
+    return Covariance(
+        _time(jd),
+        (*SETS["cartesian"], *extra),
+        mean,
+        _symmetric(jacobian @ matrix @ jacobian.T),
+        source,
+        correlated,
+        caveat,
+    )
+
+
+def _symmetric(matrix: Array) -> Array:
+    return np.asarray(0.5 * (matrix + matrix.T))
+
+
+def _time(jd: float) -> Time:
+    from astropy.time import Time
+
+    whole = np.floor(jd)
+    return Time(whole, jd - whole, format="jd", scale="tdb")
+
+
+_UNITS: Mapping[str, str] = (
+    dict.fromkeys(("a", "q", "x", "y", "z"), "au")
+    | dict.fromkeys(("vx", "vy", "vz"), "au/d")
+    | dict.fromkeys(("i", "node", "peri", "M", "L"), "deg")
+    | dict.fromkeys(("e", "h", "k", "P", "Q"), "")
+    | dict.fromkeys(("A1", "A2", "A3"), "au/d2")
+    | {"tp": "d"}
+)
+
+
+def covariance_of(
+    jd: float,
+    names: Sequence[str],
+    values: Sequence[float],
+    matrix: Array,
+    source: str,
+    file: str,
+    *,
+    correlated: bool = True,
+) -> Covariance:
+    """Covariance of heliocentric elements of the ecliptic, in au, days, degrees and au/d2.
+
+    A cartesian state has the axes of the ecliptic.
+
+    Raises
+    ------
+    InvalidInput
+        The matrix is not a covariance.
+    """
+    import astropy.units as u
+
+    from flybystab.orbit.covariance import Covariance
+
+    matrix = np.asarray(matrix, dtype=float)
+    scale = np.sqrt(np.outer(np.diag(matrix), np.diag(matrix)))
+    if matrix.shape != (len(names),) * 2 or np.any(np.abs(matrix - matrix.T) > 1e-6 * scale):
+        raise InvalidInput("covariance", matrix.shape, f"a symmetric matrix of {', '.join(names)} in {file}")
+    matrix = _symmetric(matrix)  # printed digits of the two halves may differ
+    if "x" in names:
+        return cartesian_covariance(jd, names, values, matrix, source, correlated=correlated)
+    unit = {
+        "au": u.au, "au/d": u.au / u.d, "deg": u.deg, "": u.dimensionless_unscaled,
+        "au/d2": u.au / u.d**2, "d": u.d,
+    }  # fmt: skip
+    units = [unit[_UNITS[n]] for n in names]
+    return Covariance.in_units(_time(jd), names, values, matrix, units, source, correlated)
+
+
+def printed_covariance(
+    jd: float, names: Sequence[str], texts: Sequence[str], offset: float, source: str, gm: float | None = None
+) -> Covariance | None:
+    """Covariance by the printed digits of elements, or None where these displace the asteroid by less than 1 km.
+
+    Each element is uniform within half a unit of its last digit; angles have the most decimals of all, since some
+    tables leave out trailing zeros. The result says nothing of the error of the orbit itself.
+
+    Parameters
+    ----------
+    jd : float
+        Epoch.
+    names, texts : sequences of str
+        Elements as in :func:`state_of`, as printed.
+    offset : float
+        What is subtracted from the text of ``tp``.
+    """
+    values = [float(t) - (offset if n == "tp" else 0.0) for n, t in zip(names, texts, strict=True)]
+    decimals = [decimals_of(t) for t in texts]
+    angular = [d for n, d in zip(names, decimals, strict=True) if _UNITS[n] == "deg"]
+    sigma = np.array(
+        [
+            0.5 * 10.0 ** -(max(angular) if _UNITS[n] == "deg" else d) / np.sqrt(3.0)
+            for n, d in zip(names, decimals, strict=True)
+        ]
+    )
+    found = cartesian_covariance(
+        jd, names, values, np.diag(sigma**2), f"digits of {source}",
+        gm=gm, correlated=False, caveat="by the digits of its elements",
+    )  # fmt: skip
+    return found if float(np.linalg.norm(found.sigma[:3])) > _NEGLIGIBLE else None
+
+
+def decimals_of(text: str) -> int:
+    """Decimals that a printed number has, after its exponent is applied."""
+    mantissa, _, exponent = text.strip().lower().partition("e")
+    return len(mantissa.partition(".")[2]) - int(exponent or 0)

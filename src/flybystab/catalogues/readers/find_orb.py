@@ -1,0 +1,139 @@
+"""Orbits of Find_Orb: ``total.json``, ``elements.json`` (elements with sigmas), ``covar.json`` (state, covariance).
+
+Keys: ``elements_in_json_format`` and ``covar.json`` in https://github.com/Bill-Gray/find_orb (``elem_out.cpp``
+and ``orb_func.cpp``).
+Epochs are Julian dates (TT); a state is heliocentric with axes of the J2000 ecliptic, au and au/d.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from flybystab.catalogues.designations import name_columns
+from flybystab.catalogues.readers import reader
+from flybystab.catalogues.readers.conversion import (
+    covariance_of,
+    epoch_row,
+    number,
+    perihelion_row,
+    state_of,
+    state_row,
+)
+from flybystab.catalogues.readers.parameters import check_parameters, looks_like_parameter
+from flybystab.errors import InvalidInput
+from flybystab.files import parse_json
+
+if TYPE_CHECKING:
+    from flybystab.catalogues.readers import Entry
+
+_CARTESIAN = ("x", "y", "z", "vx", "vy", "vz")
+_ELEMENTS = {"a": "a", "e": "e", "i": "i", "asc_node": "node", "arg_per": "peri", "M": "M"}
+_COMETARY = {"q": "q", "e": "e", "i": "i", "asc_node": "node", "arg_per": "peri", "Tp": "tp"}
+_COLUMNS = {
+    "a": "a_au",
+    "e": "e",
+    "i": "i_deg",
+    "asc_node": "node_deg",
+    "arg_per": "peri_deg",
+    "M": "M_deg",
+}
+#: Keys in capitals that are no parameters of the force model.
+_OTHER = frozenset({"H", "G", "U", "P", "Q", "M", "MOIDs", "Tp", "Tp_iso", "p_NEO", "p_HZ"})
+
+
+def _is_elements(text: str) -> bool:
+    return text.lstrip().startswith("{") and '"objects"' in text and '"central body"' in text
+
+
+def _is_covariance(text: str) -> bool:
+    return text.lstrip().startswith("{") and '"covar"' in text and '"state_vect"' in text
+
+
+@reader("Find_Orb elements", _is_elements)
+def read_elements(text: str, file: str) -> list[Entry]:
+    """Orbits of ``total.json`` or ``elements.json``.
+
+    Raises
+    ------
+    InvalidInput
+        Another centre or frame, or parameters that are not modelled.
+    """
+    document = parse_json(text, "orbit file", file)
+    try:
+        objects = document["objects"]
+        found = list(objects.items()) if isinstance(objects, Mapping) else [(o["object"], o) for o in objects]
+        return [_entry(str(name), thing["elements"], file) for name, thing in found]
+    except (KeyError, TypeError, AttributeError) as error:
+        raise InvalidInput("orbit file", file, f"objects with elements ({error})") from None
+
+
+def _entry(name: str, elements: Mapping[str, Any], file: str) -> Entry:
+    if elements.get("central body") != "Sun" or not str(elements.get("frame", "")).startswith("J2000 ecl"):
+        given = f"{elements.get('central body')}, {elements.get('frame')}"
+        raise InvalidInput("central body, frame", given, f"Sun, J2000 ecliptic in {file}")
+    unknown = [k for k in elements if _is_parameter(k)]
+    check_parameters("find_orb", unknown, file)
+    jd = number(elements["epoch"], "epoch", file)
+    names = _ELEMENTS if all(k in elements for k in _ELEMENTS) else _COMETARY
+    values = [number(elements[k], k, file) for k in names]
+    source = f"Find_Orb ({file})"
+    row = name_columns(name) | {"orbit_source": source}
+    if names is _ELEMENTS:
+        row |= epoch_row(jd) | {_COLUMNS[k]: str(elements[k]) for k in names}
+    else:
+        values[5] -= jd
+        row |= perihelion_row(jd, values[:5], -values[5])
+    if elements.get("H") is not None:
+        row["H_mag"] = str(elements["H"])
+    labels = list(names.values())
+    keys = list(names)
+    if "A2" in elements:
+        row |= {"A2_au_d2": repr(number(elements["A2"], "A2", file)), "nongrav_law": "asteroid"}
+    sigmas = [elements.get(f"{k} sigma") for k in keys]
+    if any(s is None for s in sigmas):
+        return row, None
+    sigma = [number(s, "sigma", file) for s in sigmas]
+    if "A2" in elements and elements.get("sigma_A2") is not None:
+        labels, values = [*labels, "A2"], [*values, float(row["A2_au_d2"])]
+        sigma.append(number(elements["sigma_A2"], "sigma_A2", file))
+    matrix = np.diag(np.square(sigma))
+    return row, covariance_of(
+        jd, labels, values, matrix, f"1-sigmas without correlations, {source}", file, correlated=False
+    )
+
+
+def _is_parameter(key: str) -> bool:
+    if key in ("dx", "dy", "dz", "T0"):  # a change of velocity at a time
+        return True
+    return looks_like_parameter(key) and key not in _OTHER
+
+
+@reader("Find_Orb covariance", _is_covariance)
+def read_covariance(text: str, file: str) -> list[Entry]:
+    """The orbit of ``covar.json``, which has no name: that of the file is taken.
+
+    Raises
+    ------
+    InvalidInput
+        More than six parameters: the file does not say which.
+    """
+    document = parse_json(text, "orbit file", file)
+    try:
+        jd = number(document["epoch"], "epoch", file)
+        values = [number(v, "state_vect", file) for v in document["state_vect"]]
+        matrix = np.array([[number(v, "covar", file) for v in line] for line in document["covar"]])
+    except (KeyError, TypeError, ValueError) as error:
+        raise InvalidInput("orbit file", file, f"covar, state_vect and epoch ({error})") from None
+    if len(values) > 6 or len(matrix) > 6:
+        extra = [f"parameter {k + 1} of covar" for k in range(6, max(len(values), len(matrix)))]
+        check_parameters("find_orb", extra, file)
+    if len(values) != 6:
+        raise InvalidInput("state_vect", len(values), f"6 numbers in {file}")
+    source = f"Find_Orb ({file})"
+    row = name_columns(Path(file).name.partition(".")[0]) | {"orbit_source": source}
+    row |= state_row(jd, state_of(_CARTESIAN, values))
+    return [(row, covariance_of(jd, _CARTESIAN, values, matrix, source, file))]

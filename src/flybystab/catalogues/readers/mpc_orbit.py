@@ -1,0 +1,144 @@
+"""The Minor Planet Center's own orbit documents (MPC_ORB JSON of the get-orb API), with their covariances.
+
+Fields: https://github.com/Smithsonian/mpc-public/tree/main/mpc_orb (schema 0.1 to 0.7). ``CAR`` is a heliocentric
+state with axes of the ecliptic, ``COM`` q, e, i, node, argperi, peri_time (MJD); epoch in MJD, TT; ``covKL`` is row
+K, column L of the covariance in the same units; yarkovsky in 1e-10 au/d2 (the unit of OrbFit, which makes the
+orbits).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from flybystab.catalogues.designations import name_columns
+from flybystab.catalogues.readers import reader
+from flybystab.catalogues.readers.conversion import (
+    MJD,
+    covariance_of,
+    number,
+    perihelion_row,
+    state_of,
+    state_row,
+)
+from flybystab.catalogues.readers.parameters import check_parameters
+from flybystab.errors import InvalidInput
+from flybystab.files import parse_json
+
+if TYPE_CHECKING:
+    from flybystab.catalogues.readers import Entry
+    from flybystab.typing import Array
+
+_COM = {"q": "q", "e": "e", "i": "i", "node": "node", "argperi": "peri", "peri_time": "tp"}
+_CAR = {c: c for c in ("x", "y", "z", "vx", "vy", "vz")}
+_YARKOVSKY = ("yarkovsky", "yarkovski")
+_UNIT = 1e-10  # au/d2
+
+
+def _is_mpc_orbit(text: str) -> bool:
+    return text.lstrip()[:1] in "{[" and '"coefficient_names"' in text and '"epoch_data"' in text
+
+
+@reader("MPC orbit (JSON)", _is_mpc_orbit)
+def read_mpc_orbit(text: str, file: str) -> list[Entry]:
+    """Orbits of a document, or of an answer of the API that holds documents (``mpc_orb``, ``orb``).
+
+    Raises
+    ------
+    InvalidInput
+    """
+    found = list(_documents(parse_json(text, "orbit file", file)))
+    if not found:
+        raise InvalidInput("orbit file", file, "an MPC_ORB document with CAR or COM, and epoch_data")
+    return [_entry(document, file) for document in found]
+
+
+def _documents(value: Any) -> list[Mapping[str, Any]]:
+    if isinstance(value, Mapping):
+        if "epoch_data" in value and ("CAR" in value or "COM" in value):
+            return [value]
+        return [d for v in value.values() for d in _documents(v)]
+    return [d for v in value for d in _documents(v)] if isinstance(value, list) else []
+
+
+def _entry(document: Mapping[str, Any], file: str) -> Entry:
+    try:
+        epoch, system = document["epoch_data"], document.get("system_data", {})
+        scale, form = str(epoch["timesystem"]), str(epoch["timeform"])
+        frame = str(system.get("refsys", "Ecliptic")), str(system.get("refframe", "ICRF"))
+        day = number(epoch["epoch"], "epoch", file)
+    except (KeyError, TypeError, AttributeError) as error:
+        raise InvalidInput("orbit file", file, f"an MPC_ORB document ({error})") from None
+    if scale not in ("TDT", "TT", "TDB") or form not in ("MJD", "JD"):
+        raise InvalidInput("epoch", f"{form} {scale}", f"MJD or JD in TT or TDB in {file}")
+    if frame[0].lower() != "ecliptic":
+        raise InvalidInput("refsys", frame[0], f"Ecliptic in {file}")
+    jd = day + (MJD if form == "MJD" else 0.0)
+    # The cometary elements are nearer to a normal distribution over long arcs; both describe one orbit.
+    kind = "COM" if document.get("COM") else "CAR"
+    names, values, matrix = _solution(document[kind], _COM if kind == "COM" else _CAR, file)
+    source = f"MPC orbit ({file})"
+    row = _identity(document) | {"orbit_source": source}
+    if kind == "COM":
+        values[names.index("tp")] += MJD - jd
+        by = dict(zip(names, values, strict=True))
+        row |= perihelion_row(jd, [by[n] for n in ("q", "e", "i", "node", "peri")], -by["tp"])
+    else:
+        row |= state_row(jd, state_of(names[:6], values[:6]))
+    if "A2" in names:
+        row |= {"A2_au_d2": repr(values[names.index("A2")]), "nongrav_law": "asteroid"}
+    magnitude = document.get("magnitude_data") or {}
+    if magnitude.get("H") is not None:
+        row["H_mag"] = str(magnitude["H"])
+    if matrix is None:
+        return row, None
+    return row, covariance_of(jd, names, values, matrix, source, file)
+
+
+def _identity(document: Mapping[str, Any]) -> dict[str, str]:
+    data = document.get("designation_data") or {}
+    permanent = str(data.get("permid") or "").strip("() ")
+    provisional = str(data.get("unpacked_primary_provisional_designation") or "").strip()
+    packed = str(data.get("packed_primary_provisional_designation") or "").strip()
+    label = (
+        f"{permanent} ({provisional})" if permanent and provisional else permanent or provisional or packed
+    )
+    row = name_columns(label or "unnamed")
+    row["name"] = str(data.get("iau_name") or "").strip() or row["name"]
+    return row
+
+
+def _solution(
+    part: Mapping[str, Any], known: Mapping[str, str], file: str
+) -> tuple[list[str], list[float], Array | None]:
+    """Names, values and covariance of a part of the document; A2 in au/d2.
+
+    Raises
+    ------
+    InvalidInput
+        Parameters beside the elements that are not modelled.
+    """
+    try:
+        theirs = [str(n) for n in part["coefficient_names"]]
+        given = [number(v, n, file) for n, v in zip(theirs, part["coefficient_values"], strict=True)]
+        cells = part.get("covariance") or {}
+    except (KeyError, TypeError, ValueError) as error:
+        raise InvalidInput(
+            "orbit file", file, f"coefficient_names and coefficient_values ({error})"
+        ) from None
+    if sorted(theirs[:6]) != sorted(known):
+        raise InvalidInput("coefficient_names", theirs[:6], f"{', '.join(known)} in {file}")
+    check_parameters("MPC", theirs[6:], file)
+    names = [known[n] for n in theirs[:6]] + ["A2" for n in theirs[6:] if n in _YARKOVSKY]
+    values = given[:6] + [v * _UNIT for v in given[6:]]
+    if not any(v is not None for v in cells.values()):
+        return names, values, None
+    n = len(names)
+    matrix = np.zeros((n, n))
+    for i in range(n):
+        for j in range(i, n):
+            matrix[i, j] = matrix[j, i] = number(cells.get(f"cov{i}{j}"), f"cov{i}{j}", file)
+    scale = np.array([1.0] * 6 + [_UNIT] * (n - 6))
+    return names, values, matrix * np.outer(scale, scale)

@@ -1,0 +1,224 @@
+"""JPL Small-Body Database: the answer for one object (JSON), with covariance and physical parameters.
+
+Fields: https://ssd-api.jpl.nasa.gov/doc/sbdb.html (``full-prec=1``, ``cov=mat``, ``phys-par=1``). Covariances are of
+e, q, tp, node, peri, i and estimated parameters, in au, days and degrees, at an epoch of their own.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from flybystab.catalogues.designations import name_columns
+from flybystab.catalogues.readers import FRAME, reader
+from flybystab.catalogues.readers.conversion import (
+    covariance_of,
+    equatorial_to_ecliptic,
+    julian,
+    number,
+    perihelion_row,
+)
+from flybystab.catalogues.readers.parameters import check_parameters
+from flybystab.catalogues.readers.sbdb import comet_orbit, thousandfold
+from flybystab.errors import InvalidInput
+from flybystab.files import parse_json
+
+if TYPE_CHECKING:
+    from flybystab.catalogues.readers import Entry
+    from flybystab.orbit.covariance import Covariance
+
+_COLUMNS = {"a": "a_au", "e": "e", "i": "i_deg", "om": "node_deg", "w": "peri_deg", "ma": "M_deg"}
+_LABELS = {"om": "node", "w": "peri"}
+_ACCELERATIONS = ("A1", "A2", "A3")
+#: Constants of the laws of distance, as JPL lists them.
+LAWS = {
+    "asteroid": {"ALN": 1.0, "NK": 0.0, "NM": 2.0, "R0": 1.0},
+    "comet": {"ALN": 0.1112620426, "NK": 4.6142, "NM": 2.15, "NN": 5.093, "R0": 2.808},
+}
+
+
+def from_sbdb_answer(text: str, file: str) -> tuple[dict[str, str], Covariance | None]:
+    """The orbit of an answer.
+
+    Returns
+    -------
+    dict
+        A catalogue row: elements of the answer at their epoch.
+    Covariance or None
+        At the epoch of its own, around the elements that the answer gives for that epoch.
+
+    Raises
+    ------
+    InvalidInput
+    """
+    try:
+        record: dict[str, Any] = parse_json(text, "orbit file", file)
+        orbit, thing = record["orbit"], record["object"]
+        elements = {item["name"]: item for item in orbit["elements"]}
+        model = {p["name"]: p for p in orbit.get("model_pars") or []}
+        full, key = str(thing["fullname"]), str(thing["des"])
+        orbit_class = (thing.get("orbit_class") or {}).get("code", "")
+        row = _elements(orbit, elements, file)
+    except (KeyError, TypeError, AttributeError) as error:
+        raise InvalidInput(
+            "orbit file", file, f"an answer of the SBDB API with full precision ({error})"
+        ) from None
+    check_parameters("JPL", model, file)
+    comet = comet_orbit(orbit_class, key)
+    row |= name_columns(full) if comet else _names(full, key)
+    row["orbit_class"] = orbit_class
+    row["pha"] = {True: "Y", False: "N"}.get(thing.get("pha"), "")
+    row |= _physical(record.get("phys_par") or [], file)
+    solution = str(orbit.get("orbit_id", ""))
+    row |= {"frame": FRAME, "orbit_solution": f"JPL {solution}", "orbit_source": f"JPL SBDB ({file})"}
+    row["condition_code"] = str(orbit.get("condition_code") or "")
+    pushes = {name: p for name, p in model.items() if name in _ACCELERATIONS}
+    row |= {f"{name}_au_d2": str(p["value"]) for name, p in pushes.items()}
+    if pushes:
+        row["nongrav_law"] = _law_of(model, comet, file)
+    return row, _covariance(orbit, pushes, f"JPL SBDB, solution {solution} ({file})", file)
+
+
+def _names(full: str, key: str) -> dict[str, str]:
+    designation = full.partition("(")[2].rstrip(") ")
+    out = {"number": key if key.isdigit() else ""}
+    out["designation"] = designation or ("" if key.isdigit() else key)
+    name = full.partition("(")[0].strip()
+    out["name"] = name.removeprefix(key).strip() if key.isdigit() else out["designation"]
+    out["name"] = out["name"] or out["designation"] or key
+    return out
+
+
+def _elements(orbit: Mapping[str, Any], elements: Mapping[str, Any], file: str) -> dict[str, str]:
+    """Columns of the elements: a and M, or q and tp where these are lacking (parabolas)."""
+    epoch = str(orbit["epoch"])
+    if all((elements.get(c) or {}).get("value") not in (None, "") for c in ("a", "ma")):
+        row = {mine: str(elements[c]["value"]) for c, mine in _COLUMNS.items()} | {"epoch_jd_tdb": epoch}
+        row |= {
+            f"sigma_{mine}": str(elements[c]["sigma"])
+            for c, mine in _COLUMNS.items()
+            if elements[c].get("sigma")
+        }
+        return row
+    values = [number(elements[c]["value"], c, file) for c in ("q", "e", "i", "om", "w")]
+    jd = number(epoch, "epoch", file)
+    return perihelion_row(jd, values, jd - number(elements["tp"]["value"], "tp", file))
+
+
+def _physical(items: list[Mapping[str, Any]], file: str) -> dict[str, str]:
+    """Physical columns, each with its source."""
+    given = {str(p.get("name")): p for p in items if p.get("value") not in (None, "")}
+
+    def source(name: str) -> str:
+        return f"JPL SBDB: {str(given[name].get('ref') or 'no reference').strip()}"
+
+    out = {}
+    if "H" in given:
+        out["H_mag"] = str(given["H"]["value"])
+    if "rot_per" in given:
+        out |= {"spin_period_h": str(given["rot_per"]["value"]), "spin_source": source("rot_per")}
+        if given["rot_per"].get("sigma"):
+            out["spin_period_sigma_h"] = str(given["rot_per"]["sigma"])
+    if "diameter" in given:
+        out["diameter_m"] = thousandfold(str(given["diameter"]["value"]), "diameter", file)
+        out["diameter_source"] = source("diameter")
+        if given["diameter"].get("sigma"):
+            out["diameter_sigma_m"] = thousandfold(str(given["diameter"]["sigma"]), "diameter", file)
+    if "density" in given:
+        out["density_kg_m3"] = thousandfold(str(given["density"]["value"]), "density", file)
+        out["density_source"] = source("density")
+        if given["density"].get("sigma"):
+            out["density_sigma_kg_m3"] = thousandfold(str(given["density"]["sigma"]), "density", file)
+    extent = [float(x) for x in re.findall(r"\d*\.?\d+", str((given.get("extent") or {}).get("value", "")))]
+    if len(extent) == 3:
+        axes = sorted(extent, reverse=True)
+        out |= {f"semi_axis_{c}_m": f"{500.0 * x:.10g}" for c, x in zip("abc", axes, strict=True)}
+        out["semi_axes_source"] = source("extent")
+    pole = re.fullmatch(
+        r"([-+.\d]+)\s*/\s*([-+.\d]+)", str((given.get("pole") or {}).get("value", "")).strip()
+    )
+    if pole:  # right ascension and declination
+        longitude, latitude = equatorial_to_ecliptic(float(pole[1]), float(pole[2]))
+        out |= {"pole_ecl_lon_deg": f"{longitude:.6g}", "pole_ecl_lat_deg": f"{latitude:.6g}"}
+        out["pole_source"] = source("pole")
+    return out
+
+
+def _law_of(model: Mapping[str, Mapping[str, Any]], comet: bool, file: str) -> str:
+    """Law of distance of A1, A2, A3: that of the constants listed, or of Marsden et al. (1973) for a comet."""
+    constants = {c for law in LAWS.values() for c in law}
+    given = {name: number(p["value"], name, file) for name, p in model.items() if name in constants}
+    if not given and comet:
+        return "comet"
+    for name, law in LAWS.items():
+        if given and all(given.get(c) == x for c, x in law.items()):
+            return name
+    raise InvalidInput(
+        "A1, A2, A3",
+        f"with the law {given or 'not given'} in {file}",
+        "the constants of an acceleration that falls as 1/r2, or of the water law of comets",
+    )
+
+
+def _covariance(
+    orbit: Mapping[str, Any], pushes: Mapping[str, Any], source: str, file: str
+) -> Covariance | None:
+    found = orbit.get("covariance")
+    if not found:
+        return _uncorrelated(orbit, pushes, source, file)
+    try:
+        names = [_LABELS.get(str(n), str(n)) for n in found["labels"]]
+        epoch = float(found["epoch"])
+        # JPL repeats the elements only where the epoch of the covariance is not that of the orbit.
+        own = orbit["elements"] if epoch == float(orbit["epoch"]) else None
+        if own is None and "elements" not in found:
+            raise KeyError("elements at the epoch of the covariance")
+        mean = {_LABELS.get(e["name"], e["name"]): str(e["value"]) for e in found.get("elements", own)}
+        mean |= {name: str(p["value"]) for name, p in pushes.items()}
+        # Digits of the time of perihelion are lost neither as a Julian date nor as a difference.
+        whole, fraction = julian(mean["tp"])
+        values = [(whole - epoch) + fraction if n == "tp" else float(mean[n]) for n in names]
+        matrix = np.array([[float(c) for c in line] for line in found["data"]])
+        return covariance_of(epoch, names, values, matrix, source, file)
+    except (KeyError, TypeError, ValueError) as error:
+        if isinstance(error, InvalidInput):
+            raise
+        raise InvalidInput(
+            "covariance", file, f"labels out of e, q, tp, node, peri, i, A1, A2, A3 ({error})"
+        ) from None
+
+
+def _uncorrelated(
+    orbit: Mapping[str, Any], pushes: Mapping[str, Any], source: str, file: str
+) -> Covariance | None:
+    """1-sigmas of elements and accelerations; None where the row alone has them all, or where they are lacking."""
+    elements = {item["name"]: item for item in orbit["elements"]}
+    with_errors = [n for n, p in pushes.items() if p.get("sigma")]
+    use = ("a", "e", "i", "om", "w", "ma")
+    keplerian = all((elements.get(c) or {}).get("value") not in (None, "") for c in use)
+    if not keplerian:
+        use = ("q", "e", "i", "om", "w", "tp")
+    if (keplerian and not with_errors) or not all((elements.get(c) or {}).get("sigma") for c in use):
+        return None
+    jd = number(orbit["epoch"], "epoch", file)
+    labels = {"om": "node", "w": "peri", "ma": "M"}
+    values = [number(elements[c]["value"], c, file) - (jd if c == "tp" else 0.0) for c in use]
+    values += [number(pushes[n]["value"], n, file) for n in with_errors]
+    sigma = [number(elements[c]["sigma"], c, file) for c in use]
+    sigma += [number(pushes[n]["sigma"], n, file) for n in with_errors]
+    names = [*(labels.get(c, c) for c in use), *with_errors]
+    label = f"1-sigmas without correlations, {source}"
+    return covariance_of(jd, names, values, np.diag(np.square(sigma)), label, file, correlated=False)
+
+
+def _is_answer(text: str) -> bool:
+    return text.lstrip().startswith("{") and '"orbit"' in text and '"object"' in text and '"fullname"' in text
+
+
+@reader("SBDB answer", _is_answer)
+def read_answer(text: str, file: str) -> list[Entry]:
+    """The orbit of an answer for one object."""
+    return [from_sbdb_answer(text, file)]
