@@ -7,6 +7,7 @@ from difflib import get_close_matches
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
+from typing import Any
 
 import astropy.units as u
 import numpy as np
@@ -14,10 +15,11 @@ from astropy.table import QTable
 
 from flybystab.catalogues.asteroid import CATALOGUE_DATE, Asteroid
 from flybystab.catalogues.designations import name_columns
-from flybystab.catalogues.readers import FRAME, header_of, reader_names, reader_of, text_of
+from flybystab.catalogues.objects import asteroids_of
+from flybystab.catalogues.readers import FRAME, reader_of, text_of
 from flybystab.catalogues.readers.native import read_native
 from flybystab.catalogues.record import TEXTS, UNITS, key_of
-from flybystab.errors import InvalidInput, UnknownName
+from flybystab.errors import UnknownName
 
 __all__ = ["CATALOGUE_DATE", "TEXTS", "UNITS", "Asteroid", "catalogue", "catalogue_table", "find", "key_of"]
 
@@ -45,12 +47,6 @@ def _read(text: str, file: str, name: str) -> tuple[Asteroid, ...]:
     """Asteroids of a text, by the reader of its format."""
     found = reader_of(text)
     if found is None:
-        if not {*TEXTS, *UNITS} & set(header_of(text)):
-            raise InvalidInput(
-                "catalogue file",
-                name,
-                f"the columns of the catalogue, or a file of {', '.join(reader_names())}",
-            )
         return tuple(Asteroid(row, file=file) for row, _ in read_native(text, file))
     source = {"frame": FRAME, "orbit_source": f"{found.name} ({name})"}
     return tuple(
@@ -65,11 +61,13 @@ def _embedded() -> tuple[Asteroid, ...]:
     return tuple(Asteroid(row, file=file) for row, _ in read_native(text, file))
 
 
-def catalogue(path: str | Path | None = None) -> tuple[Asteroid, ...]:
+def catalogue(path: Any = None) -> tuple[Asteroid, ...]:
     """All asteroids of the embedded catalogue, or of a file, in their order.
 
     The format is found from the content of the file (:mod:`flybystab.catalogues.readers`), which may be
-    gzipped: the catalogue's own columns, JPL SBDB queries and answers, MPC tables and MPCORB, OEF2.0 of NEOCC.
+    gzipped: the catalogue's own columns, or those of an agency or program (``docs/inputs.md``). Objects of astroquery
+    and sbpy are taken too (:mod:`flybystab.catalogues.objects`).
+
     The catalogue's own format needs only the columns that are used: a name,
     ``epoch_jd_tdb, a_au, e, i_deg, node_deg, peri_deg, M_deg`` for orbits,
     ``semi_axis_{a,b,c}_m, density_kg_m3, spin_period_h`` for bodies.
@@ -83,6 +81,8 @@ def catalogue(path: str | Path | None = None) -> tuple[Asteroid, ...]:
     """
     if path is None:
         return _embedded()
+    if not isinstance(path, str | Path):
+        return asteroids_of(path)
     return _read(text_of(path), str(path), Path(path).name)
 
 

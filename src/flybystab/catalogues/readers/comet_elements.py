@@ -14,7 +14,11 @@ from typing import TYPE_CHECKING, Any
 from flybystab.catalogues.designations import name_columns, unpacked
 from flybystab.catalogues.readers import reader
 from flybystab.catalogues.readers.conversion import number, perihelion_row, printed_covariance
-from flybystab.catalogues.readers.parameters import check_parameters, looks_like_parameter
+from flybystab.catalogues.readers.parameters import (
+    check_parameters,
+    looks_like_parameter,
+    named_parameters,
+)
 from flybystab.errors import InvalidInput
 from flybystab.files import parse_json
 
@@ -51,6 +55,7 @@ def read_comets(text: str, file: str) -> list[Entry]:
         found = _LINE.match(line)
         if not found:
             raise InvalidInput("row", line[:60], f"the fixed columns of CometEls.txt in {file}")
+        check_parameters("table", named_parameters(found["rest"]), file)
         cells = {k: v.strip() for k, v in found.groupdict().items()}
         label = found["rest"][13:69].strip() or unpacked(found["key"].strip())
         magnitude = found["rest"][2:6].strip()

@@ -141,13 +141,9 @@ def heliocentric_state(jd: float, state: Array, centre: str) -> Array:
     return state if centre == "sun" else state + np.array(_centre_offset(jd, centre))
 
 
-@lru_cache(maxsize=1)
-def total_gm() -> float:
-    """GM of Sun, planets, Moon and massive asteroids, m3/s2, of barycentric elements."""
-    from flybystab.orbit.ephemeris import BELT_GM, BODIES
-    from flybystab.orbit.planets import PLANETS
-
-    return float(sum(PLANETS[name].gm for name in BODIES) + sum(BELT_GM.values()))
+#: GM of the solar system, m3/s2, behind barycentric elements: 2.96309274879932e-4 au3/d2, the sum of the masses of
+#: DE440 with systems of satellites and 16 asteroids (``gm_total`` of Sorcha).
+GM_TOTAL = 2.9630927487993194e-04 * AU**3 / DAY**2
 
 
 def state_of(names: Sequence[str], values: Sequence[float] | Array, gm: float | None = None) -> Array:

@@ -18,6 +18,7 @@ import numpy as np
 from flybystab.catalogues.designations import name_columns
 from flybystab.catalogues.readers import reader
 from flybystab.catalogues.readers.conversion import (
+    GM_TOTAL,
     MJD,
     cartesian_covariance,
     epoch_row,
@@ -27,7 +28,6 @@ from flybystab.catalogues.readers.conversion import (
     printed_covariance,
     state_of,
     state_row,
-    total_gm,
 )
 from flybystab.catalogues.readers.parameters import check_parameters, looks_like_parameter
 from flybystab.errors import InvalidInput
@@ -141,7 +141,7 @@ def _entry(row: Mapping[str, str], file: str) -> Entry:
     if "tp" in names:
         offset = float(texts[5]) - (day("tp") - jd)
         values[5] -= offset
-    gm = total_gm() if centre == "ssb" and "x" not in names else None
+    gm = GM_TOTAL if centre == "ssb" and "x" not in names else None
     source = f"{kind} ({file})"
     out = name_columns(cell("id")[1]) | {"orbit_source": source}
     if row.get("H"):

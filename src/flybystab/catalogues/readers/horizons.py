@@ -16,6 +16,7 @@ import numpy as np
 from flybystab.catalogues.designations import is_comet, name_columns
 from flybystab.catalogues.readers import reader
 from flybystab.catalogues.readers.conversion import (
+    GM_TOTAL,
     decimals_of,
     epoch_row,
     heliocentric_state,
@@ -25,7 +26,6 @@ from flybystab.catalogues.readers.conversion import (
     rotated,
     state_of,
     state_row,
-    total_gm,
 )
 from flybystab.catalogues.readers.parameters import check_parameters, looks_like_parameter
 from flybystab.catalogues.readers.sbdb_answer import LAWS
@@ -162,7 +162,7 @@ def _gm(header: str, length: float, day: float, centre: str, file: str) -> float
 
     text = _line(header, "Keplerian GM")
     if not text:
-        return total_gm() if centre == "ssb" else None
+        return GM_TOTAL if centre == "ssb" else None
     gm = number(text.split()[0], "Keplerian GM", file) * length**3 / day**2
     if centre == "sun" and abs(gm / GM_SUN - 1.0) > 1e-6:
         raise InvalidInput("Keplerian GM", text, f"that of the Sun in {file}")

@@ -12,6 +12,11 @@ from typing import TYPE_CHECKING
 
 from flybystab.catalogues.designations import names_of, unpacked, unpacked_date
 from flybystab.catalogues.readers import FRAME, header_of, reader, rows_of
+from flybystab.catalogues.readers.parameters import (
+    check_parameters,
+    looks_like_parameter,
+    named_parameters,
+)
 from flybystab.errors import InvalidInput
 
 if TYPE_CHECKING:
@@ -71,6 +76,7 @@ _COLUMNS = {"principal_desig", "epoch_jd_tt", "a_au", "e", "i_deg", "node_deg", 
 @reader("MPC table", lambda text: set(header_of(text)) >= _COLUMNS)
 def read_mpc(text: str, file: str) -> list[Entry]:
     """Rows of an MPC table whose column names carry units."""
+    check_parameters("table", [c for c in header_of(text) if looks_like_parameter(c)], file)
     return [(from_mpc(row, file), None) for row in rows_of(text, file)]
 
 
@@ -103,6 +109,7 @@ def read_mpcorb(text: str, file: str) -> list[Entry]:
     for line in _body(text):
         if not _MPCORB.match(line):
             raise InvalidInput("row", line[:40], f"the fixed columns of MPCORB in {file}")
+        check_parameters("table", named_parameters(line[160:]), file)
         key = unpacked(line[:7].strip())
         name = re.sub(r"^\(\d+\)", "", line[166:194].strip()).strip()
         number = key if key.isdigit() else ""

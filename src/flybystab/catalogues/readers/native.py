@@ -5,7 +5,7 @@ from __future__ import annotations
 from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
-from flybystab.catalogues.readers import header_of, rows_of
+from flybystab.catalogues.readers import header_of, reader_names, rows_of
 from flybystab.catalogues.record import TEXTS, UNITS
 from flybystab.errors import InvalidInput, UnknownName
 
@@ -26,6 +26,12 @@ def read_native(text: str, file: str) -> list[Entry]:
         if c not in known:
             if ";" in c or "\t" in c:
                 raise InvalidInput("columns", c, f"commas between the columns of {file}")
+            if not set(known) & set(columns):
+                raise InvalidInput(
+                    "catalogue file",
+                    file,
+                    f"the columns of the catalogue, or a file of one of {', '.join(reader_names())}",
+                )
             raise UnknownName("column", c, get_close_matches(c, known, cutoff=0.6), f"(in {file})")
     if not {"name", "designation", "number"} & set(columns):
         raise InvalidInput("columns", columns, f"at least one of name, designation, number in {file}")

@@ -65,6 +65,11 @@ def looks_like_parameter(name: str) -> bool:
     return bool(_PARAMETER.match(name))
 
 
+def named_parameters(text: str) -> list[str]:
+    """Names of parameters that a text gives a value, as ``A2 = -1e-14``."""
+    return re.findall(r"\b([A-Z][A-Z0-9]{1,7}) *= *[-+.\d]", text)
+
+
 def check_parameters(agency: str, names: Iterable[str], file: str) -> None:
     """Refuse parameters that the force model does not have.
 

@@ -7,7 +7,7 @@ e, q, tp, node, peri, i and estimated parameters, in au, days and degrees, at an
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -71,7 +71,7 @@ def from_sbdb_answer(text: str, file: str) -> tuple[dict[str, str], Covariance |
     row |= name_columns(full) if comet else _names(full, key)
     row["orbit_class"] = orbit_class
     row["pha"] = {True: "Y", False: "N"}.get(thing.get("pha"), "")
-    row |= _physical(record.get("phys_par") or [], file)
+    row |= physical(record.get("phys_par") or [], file)
     solution = str(orbit.get("orbit_id", ""))
     row |= {"frame": FRAME, "orbit_solution": f"JPL {solution}", "orbit_source": f"JPL SBDB ({file})"}
     row["condition_code"] = str(orbit.get("condition_code") or "")
@@ -108,8 +108,8 @@ def _elements(orbit: Mapping[str, Any], elements: Mapping[str, Any], file: str) 
     return perihelion_row(jd, values, jd - number(elements["tp"]["value"], "tp", file))
 
 
-def _physical(items: list[Mapping[str, Any]], file: str) -> dict[str, str]:
-    """Physical columns, each with its source."""
+def physical(items: Sequence[Mapping[str, Any]], file: str) -> dict[str, str]:
+    """Physical columns of a list of physical parameters, each with its source."""
     given = {str(p.get("name")): p for p in items if p.get("value") not in (None, "")}
 
     def source(name: str) -> str:
