@@ -15,6 +15,7 @@ TABLES = {
     "coverage": "python benchmarks/campaign.py coverage",
     "extremes": "python benchmarks/campaign.py extremes",
     "flyby": "flybystab bench flyby --output docs/images/precision.png",
+    "forecast": "python examples/apophis_forecast.py",
     "grains": "python benchmarks/piles.py grains",
     "honesty": "python benchmarks/honesty.py scripted --encounters 300",
     "honesty_real": "python benchmarks/honesty.py real --every 4",

@@ -3,8 +3,10 @@
 import runpy
 from pathlib import Path
 
+import astropy.units as u
 import numpy as np
 import pytest
+from astropy.table import QTable
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 
@@ -123,6 +125,21 @@ def test_apophis_slopes():
     # the tilt of gravity on a sphere, (3/2) GM/d^3 over (4/3) pi G rho, is 1.73 deg; the ellipsoid is longer
     assert 1.73 < np.median(largest[1.29]) < 2.5
     assert np.median(largest[1.29]) / np.median(largest[2.2]) == pytest.approx(2.2 / 1.29, rel=0.05)
+
+
+def test_apophis_forecast(monkeypatch, tmp_path):
+    """Benson et al. (2023): short-axis mode likely, spin rate halved or doubled, pole moved by 10 deg or more."""
+    monkeypatch.chdir(tmp_path)
+    names = ran("apophis_forecast.py")
+    table = QTable.read(tmp_path / "out" / "apophis_forecast.ecsv")
+    assert np.all(table["share_sam"] > 0.8)
+    assert np.all((table["pole_change_50"] > 9 * u.deg) & (table["pole_change_95"] > 20 * u.deg))
+    # rival periods change the median forecast by less than the spread over the phases
+    middle = table["precession_period_50"][:3].to_value(u.h)
+    spread = (table["precession_period_95"] - table["precession_period_5"])[0].to_value(u.h)
+    assert np.ptp(middle) < 0.05 * spread
+    # 3.3 km of 38,012 change the tide by 2.6e-4
+    assert abs(names["shift"]) < 1e-3
 
 
 def test_shape_slopes():

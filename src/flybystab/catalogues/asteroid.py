@@ -114,6 +114,41 @@ class Asteroid(Record):
         row["assumed"] = ";".join(c for c in self.assumed if not c.startswith(("semi_axis", "diameter")))
         return replace(self, row=row)
 
+    def with_tumbling(
+        self,
+        precession_period: Quantity,
+        rotation_period: Quantity,
+        mode: str = "SAM",
+        *,
+        inertia: tuple[float, float] | None = None,
+    ) -> Asteroid:
+        """The same asteroid with another tumbling solution, for rival solutions of its lightcurves.
+
+        Parameters
+        ----------
+        precession_period, rotation_period : Quantity
+        mode : str
+            "SAM" or "LAM".
+        inertia : (float, float), optional
+            Ratios ``J1/J3`` and ``J2/J3`` of the moments of inertia: the semi-axes become those of the homogeneous
+            ellipsoid with these ratios and the same volume.
+        """
+        row = dict(self.row)
+        for column, value in (
+            ("precession_period_h", precession_period),
+            ("rotation_period_h", rotation_period),
+        ):
+            row[column] = repr(to_si(value, u.h, column, low=0.0, open_low=True))
+        row["tumbling_mode"] = mode
+        if inertia is not None:
+            first, second = inertia
+            if not (0.0 < first <= second <= 1.0 < first + second):
+                raise InvalidInput("inertia", inertia, "0 < J1/J3 <= J2/J3 <= 1 < J1/J3 + J2/J3")
+            squares = np.array([second + 1.0 - first, first + 1.0 - second, first + second - 1.0])
+            axes = np.sqrt(squares) * np.cbrt(np.prod(self.semi_axes.value) / np.sqrt(np.prod(squares)))
+            row.update(zip(SHAPE, map(repr, axes.tolist()), strict=True))
+        return replace(self, row=row)
+
     def __reduce__(self) -> tuple[Any, ...]:
         # Without what was built from the row: it is rebuilt where it is needed.
         return Asteroid, (dict(self.row), self.material, self.file, self.covariance)
