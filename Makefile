@@ -29,6 +29,7 @@ check: .venv/.test
 	$(PY) -m ruff format --check .
 	$(PY) -m mypy
 	.venv/bin/lint-imports
+	.venv/bin/codespell src tests docs examples benchmarks scripts *.md data/README.md
 
 .venv/.docs: pyproject.toml | .venv/bin/python
 	$(PY) -m pip install --quiet --disable-pip-version-check -e ".[docs]"

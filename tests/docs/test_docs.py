@@ -9,7 +9,8 @@ import flybystab
 from flybystab.cli.main import COMMANDS
 
 ROOT = Path(__file__).resolve().parents[2]
-PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES = [ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md"))]
+NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.md"))
 
 
 @pytest.mark.parametrize("page", ["README.md", "docs/index.md", "docs/tutorial.md", "docs/howto.md"])
@@ -20,6 +21,16 @@ def test_python_blocks_run(page, monkeypatch, tmp_path):
     space = {}
     for block in blocks:
         exec(compile(block, page, "exec"), space)
+
+
+@pytest.mark.parametrize("page", NOTEBOOKS, ids=lambda p: p.stem)
+def test_notebooks_run(page, monkeypatch, tmp_path, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MPLBACKEND", "Agg")
+    space = {}
+    for cell in re.findall(r"```\{code-cell\}\n(.*?)```", page.read_text(), re.S):
+        exec(compile(cell, str(page), "exec"), space)
+    capsys.readouterr()
 
 
 def test_the_scenario_of_the_howto_runs(tmp_path, monkeypatch, capsys):
