@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Protocol
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
 
 import astropy.units as u
 import numpy as np
@@ -24,6 +25,9 @@ from flybystab.orbit.target_plane import NORTH, checked, target_plane
 from flybystab.typing import Array
 from flybystab.units import brief, checked_time, to_si
 
+if TYPE_CHECKING:
+    from flybystab.encounter.trajectory_files import Samples
+
 
 class Track(Protocol):
     """Motion of the asteroid relative to the planet."""
@@ -37,7 +41,8 @@ class Encounter:
     """A close encounter with one planet.
 
     Made by :meth:`hyperbolic` (scripted, frame ``"periapsis"``), from a real orbit (:meth:`from_orbit`, frame
-    ``"ICRF"``) or from samples (:meth:`from_trajectory`).
+    ``"ICRF"``) or from samples (:meth:`from_trajectory`,
+    :meth:`from_spk`, :meth:`from_oem`).
     Times are counted from closest approach.
 
     Attributes
@@ -312,6 +317,112 @@ class Encounter:
         from flybystab.encounter.from_trajectory import sampled, samples
 
         return sampled(cls, body, *samples(times, positions, velocities), start, wait, j2, axis)
+
+    @classmethod
+    def from_spk(
+        cls,
+        path: str | Path,
+        target: int | str | None,
+        planet: str | Planet,
+        time: Time,
+        *,
+        start_distance: Quantity | None = None,
+        settle: Quantity = SETTLE * u.s,
+        search: Quantity = 30 * u.d,
+        ephemeris: str | Ephemeris | None = None,
+        j2: bool = False,
+        pole: tuple[float, float, float] = (0.0, 0.0, 1.0),
+    ) -> Encounter:
+        """Encounter along the trajectory of an SPK kernel, of any type that SPICE reads (21, 13, 2, ...).
+
+        Parameters
+        ----------
+        path : str or Path
+            Binary kernel.
+        target : int, str or None
+            Number of the asteroid or identifier of NAIF; None for the only small body of the kernel.
+        planet : str or Planet
+            The body encountered. It comes from `ephemeris` unless the trajectory is relative to it.
+        time : Time
+            Near closest approach; the minimum of distance nearest to it counts.
+        start_distance, settle, search, ephemeris
+            As in :meth:`from_orbit`.
+        j2, pole
+            As in :meth:`from_trajectory`.
+
+        Returns
+        -------
+        Encounter
+            `distance_error` is that of the interpolation; the tide is that of the planet alone.
+
+        Raises
+        ------
+        MissingExtra
+            spiceypy (extra ``spk``) is not installed.
+        NoEncounter, OutOfSpan, UnitMismatch, InvalidInput, UnknownName
+        """
+        checked_time(time, "time")
+        body = _planet(planet)
+        start = None if start_distance is None else to_si(start_distance, u.m, "start_distance", low=0.0)
+        reach = to_si(search, u.s, "search", low=0.0, open_low=True)
+        from flybystab.encounter.trajectory_files import spk_samples
+
+        found = spk_samples(path, target, body, time, reach, start, ephemeris)
+        return cls._along(found, body, start, settle, j2, pole)
+
+    @classmethod
+    def from_oem(
+        cls,
+        path: str | Path,
+        planet: str | Planet,
+        *,
+        start_distance: Quantity | None = None,
+        settle: Quantity = SETTLE * u.s,
+        ephemeris: str | Ephemeris | None = None,
+        j2: bool = False,
+        pole: tuple[float, float, float] = (0.0, 0.0, 1.0),
+    ) -> Encounter:
+        """Encounter along the samples of an orbit ephemeris message (CCSDS OEM, key-value notation).
+
+        Parameters
+        ----------
+        path : str or Path
+            Message with ICRF axes relative to the Sun, the barycentre of the solar system or a planet.
+        planet, start_distance, settle, ephemeris, j2, pole
+            As in :meth:`from_spk`.
+
+        Returns
+        -------
+        Encounter
+            `distance_error` is the change of the distance where every second sample is left out.
+
+        Raises
+        ------
+        NoEncounter, OutOfSpan, UnitMismatch, InvalidInput, UnknownName
+        """
+        body = _planet(planet)
+        start = None if start_distance is None else to_si(start_distance, u.m, "start_distance", low=0.0)
+        from flybystab.encounter.trajectory_files import oem_samples
+
+        return cls._along(oem_samples(path, body, ephemeris), body, start, settle, j2, pole)
+
+    @classmethod
+    def _along(
+        cls,
+        found: Samples,
+        body: Planet,
+        start: float | None,
+        settle: Quantity,
+        j2: bool,
+        pole: tuple[float, float, float],
+    ) -> Encounter:
+        """The encounter along the samples of a file."""
+        from flybystab.encounter.from_trajectory import sampled
+
+        wait = to_si(settle, u.s, "settle", low=0.0)
+        axis = _unit_vector(pole)
+        out = sampled(cls, body, found.t, found.states, found.epoch, start, wait, j2, axis)
+        return replace(out, distance_error=(found.error * u.m).to(u.km), ephemeris=found.ephemeris or None)
 
     @classmethod
     def from_orbit(

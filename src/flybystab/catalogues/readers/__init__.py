@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import importlib
 import pkgutil
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -91,7 +92,15 @@ def text_of(path: str | Path) -> str:
         raise InvalidInput(
             "catalogue file",
             path,
-            "a text file: SPK kernels are not read here; give one state to fs.Orbit.from_state",
+            "a file of orbits: an SPK kernel is a trajectory, made with forces that it does not name; "
+            "fs.Encounter.from_spk(path, target, planet, time) follows it",
+        )
+    if re.match(rb"\s*CCSDS_OEM_VERS", raw):
+        raise InvalidInput(
+            "catalogue file",
+            path,
+            "a file of orbits: an orbit ephemeris message is a trajectory; fs.Encounter.from_oem(path, planet) "
+            "follows it",
         )
     try:
         return raw.decode("utf-8-sig")
