@@ -1,0 +1,135 @@
+"""Probability that the surface of an asteroid is fresh: refreshed by an encounter within the time of space weathering.
+
+Near-Earth asteroids with unweathered surfaces are those that could come close to a planet recently (Binzel et al. 2010,
+Nature 463, 331; Nesvorny et al. 2010, Icarus 209, 510; DeMeo et al. 2014, Icarus 227, 112): refreshing distances of 5
+to 16 Earth radii and weathering within 1 Myr explain their number. Encounters are followed as far back as the orbit can
+be; beyond that they are a Poisson process with the mean rate of the orbit.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import astropy.units as u
+import numpy as np
+from astropy.table import QTable
+from astropy.time import Time
+from astropy.units import Quantity
+
+from flybystab.catalogues.asteroid import Asteroid
+from flybystab.errors import InvalidInput
+from flybystab.orbit.search.encounter_finder import find_encounters
+from flybystab.population.rates import encounter_rates
+from flybystab.typing import Array
+from flybystab.units import checked_time, to_si
+
+#: Weathering time by default, yr.
+WEATHERING = 1e6 * u.yr
+
+
+@dataclass(frozen=True, eq=False)
+class Freshness:
+    """Whether a surface is fresh.
+
+    Attributes
+    ----------
+    probability : float
+        That the surface was refreshed within the weathering time.
+    rate : Quantity
+        Mean rate of refreshing encounters on the present orbit, all planets, 1/yr.
+    span : Quantity
+        Time before `now` over which encounters were followed, yr.
+    followed : QTable
+        The refreshing encounters in that time.
+    """
+
+    probability: float
+    rate: Quantity
+    span: Quantity
+    followed: QTable
+
+    def __repr__(self) -> str:
+        return (
+            f"<Freshness {self.probability:.3g}: {len(self.followed)} refreshing encounters followed, "
+            f"{self.rate.to_value(1 / u.Myr):.3g} per Myr beyond>"
+        )
+
+
+def fresh_probability(ages: Sequence[Array], span: float, rate: float, weathering: float) -> float:
+    """Probability of a refreshing encounter within the weathering time.
+
+    Parameters
+    ----------
+    ages : sequence of ndarray
+        Times since the refreshing encounters that were followed, yr, for each possible orbit.
+    span : float
+        Time over which they were followed, yr.
+    rate : float
+        Mean rate of such encounters before that, 1/yr.
+    weathering : float
+        Time after which a surface is weathered, yr.
+
+    Returns
+    -------
+    float
+        Mean over the orbits of 1 for those with an encounter younger than the weathering time and of ``1 - exp(-rate
+        (weathering - span))`` for the others.
+    """
+    if not len(ages):
+        raise InvalidInput("ages", ages, "at least one possible orbit")
+    beyond = -np.expm1(-rate * max(weathering - span, 0.0))
+    return float(np.mean([1.0 if np.any(np.asarray(a) <= weathering) else beyond for a in ages]))
+
+
+def freshness(
+    asteroid: Asteroid,
+    distances: Mapping[str, Quantity],
+    *,
+    weathering: Quantity = WEATHERING,
+    now: Time | None = None,
+    span: Quantity = 100.0 * u.yr,
+) -> Freshness:
+    """Probability that the surface of an asteroid is fresh.
+
+    Parameters
+    ----------
+    asteroid : Asteroid
+    distances : mapping of str to Quantity
+        Refreshing distance of each planet (:func:`flybystab.flybys.refresh_distance.refresh_distance`).
+    weathering : Quantity
+        Time of space weathering; 1 Myr by default, an upper limit of the literature.
+    now : Time, optional
+        Epoch of the elements by default.
+    span : Quantity
+        Time over which the nominal orbit is followed back. The ephemeris must cover it, and the orbit should be known
+        over it: choose it shorter for a poor orbit.
+
+    Returns
+    -------
+    Freshness
+
+    Notes
+    -----
+    The rate is that of the present orbit with circulating angles; over 1 Myr the orbit itself changes. Encounters are
+    not the only process that refreshes surfaces.
+    """
+    if not isinstance(asteroid, Asteroid):
+        raise InvalidInput("asteroid", asteroid, "an Asteroid")
+    if not distances:
+        raise InvalidInput("distances", distances, "at least one planet with its refreshing distance")
+    end = asteroid.epoch if now is None else now
+    checked_time(end, "now")
+    years = to_si(span, u.yr, "span", low=0.0, open_low=True)
+    aged = to_si(weathering, u.yr, "weathering", low=0.0, open_low=True)
+    names = list(distances)
+    limits = [to_si(distances[n], u.m, f"distances[{n!r}]", low=0.0, open_low=True) for n in names]
+    table = find_encounters(asteroid, end - years * u.yr, end, planets=names, within=np.array(limits) * u.m)
+    ages = (end - table["time"]).to_value(u.yr) if len(table) else np.zeros(0)
+    rates = [
+        float(encounter_rates([asteroid], n, periapsis=q * u.m).rate[0].to_value(1 / u.yr))
+        for n, q in zip(names, limits, strict=True)
+    ]
+    total = float(np.sum(rates))
+    probability = fresh_probability([ages], years, total, aged)
+    return Freshness(probability, total / u.yr, years * u.yr, table)
