@@ -19,6 +19,7 @@ from flybystab.encounter.encounter import Encounter
 from flybystab.flybys.grains_document import grains_document
 from flybystab.flybys.result import FlybyResult
 from flybystab.flybys.spin_sample import SpinSample
+from flybystab.flybys.verdict_margins import VerdictMargins
 from flybystab.tabular import with_unit
 
 
@@ -106,6 +107,9 @@ def flyby_document(result: FlybyResult, sample: SpinSample | None = None, **abou
         "required_cohesion_Pa": result.required_cohesion.to_value(u.Pa),
         "lode_angle_at_yield_deg": None if result.lode_angle is None else result.lode_angle.to_value(u.deg),
         "bound_fraction": result.bound_fraction,
+        "settled": result.settled,
+        "energy_J": result.energy.to_value(u.J),
+        "margins": margins_document(result.margins),
         "semi_axes_m": result.semi_axes.to_value(u.m),
         "spin_rad_s": result.spin.to_value(u.rad / u.s),
         "spin_ratio": result.spin_ratio,
@@ -131,6 +135,19 @@ def flyby_document(result: FlybyResult, sample: SpinSample | None = None, **abou
     if sample is not None:
         document["attitudes"] = sample_document(sample)
     return plain(document)
+
+
+def margins_document(margins: VerdictMargins) -> dict[str, Any]:
+    """Distances of a verdict from its edges, and what is known of a body that has left the model."""
+    edge, distance = margins.nearest
+    return {
+        "axis_ratio": margins.axis_ratio,
+        "axis_ratio_limit": margins.limit,
+        "strain": margins.strain,
+        "bound_fraction_upper": margins.bound_fraction_upper,
+        "nearest_edge": edge,
+        "nearest_relative": distance,
+    }
 
 
 def sample_document(sample: SpinSample) -> dict[str, Any]:

@@ -46,7 +46,7 @@ class FlybyResult:
     verdict_class : str or None
         "M", "B" or "S" of Richardson et al. (1998) for bodies that lost mass.
     bound_fraction : float
-        Bound mass fraction in the potential of the whole body, an upper bound
+        Bound mass fraction, in the potential of what stays bound
         (:func:`flybystab.flybys.verdict.bound_fraction`).
     inputs : FlybyInputs
         Body, encounter and settings of the run.

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flybystab.core import verdict_codes as codes
-from flybystab.core.ellipsoid.bound_mass import bound_share
+from flybystab.core.ellipsoid.bound_mass import bound_share, one_pass_share
 from flybystab.typing import Array
 
 
@@ -70,12 +70,12 @@ def class_of(bound: float) -> MassClass:
 
 
 def bound_fraction(shape: Array, velocity_gradient: Array, density: float) -> float:
-    """Mass fraction gravitationally bound to a homogeneous ellipsoid with velocity ``L x``.
+    """Mass fraction bound to what stays bound, for a homogeneous ellipsoid with velocity ``L x``.
 
-    A point is bound if ``|L x|^2/2 < pi G rho (A_0 - sum A_i x_i^2)``. With ``x = F xi``, ``F F^T = S``, that
-    is ``xi^T [(L F)^T (L F)/2 + pi G rho diag(A_i a_i^2)] xi < pi G rho A_0`` on the unit ball, and the share
-    is the mean over directions of ``min(1, r^3)``, ``r`` the radius at which the form reaches the bound.
-    It is an upper bound: the potential counts the material that is leaving.
+    Material that is unbound in the potential of the whole is removed, the potential computed for the remainder, and so
+    on until nothing more leaves. The remainder of each pass counts as the homogeneous ellipsoid with its mass and its
+    second moments. Against sums over 32,768 points the fraction is right to 0.005 (rms of 40 random states), except
+    for states in which the remainder barely holds together: 0.078 where this gives 0.
 
     Parameters
     ----------
@@ -86,13 +86,22 @@ def bound_fraction(shape: Array, velocity_gradient: Array, density: float) -> fl
     density : float
         kg/m3.
     """
-    return float(
-        bound_share(
-            np.array(shape, dtype=float, order="C"),
-            np.array(velocity_gradient, dtype=float, order="C"),
-            float(density),
-        )
-    )
+    return float(bound_share(*_arrays(shape, velocity_gradient), float(density)))
+
+
+def bound_fraction_upper(shape: Array, velocity_gradient: Array, density: float) -> float:
+    """Mass fraction bound in the potential of the whole ellipsoid, an upper bound of `bound_fraction`.
+
+    A point is bound if ``|L x|^2/2 < pi G rho (A_0 - sum A_i x_i^2)``. With ``x = F xi``, ``F F^T = S``, that
+    is ``xi^T [(L F)^T (L F)/2 + pi G rho diag(A_i a_i^2)] xi < pi G rho A_0`` on the unit ball, and the fraction
+    is the mean over directions of ``min(1, r^3)``, ``r`` the radius at which the form reaches the bound.
+    Arguments as of `bound_fraction`.
+    """
+    return float(one_pass_share(*_arrays(shape, velocity_gradient), float(density)))
+
+
+def _arrays(shape: Array, velocity_gradient: Array) -> tuple[Array, Array]:
+    return np.array(shape, dtype=float, order="C"), np.array(velocity_gradient, dtype=float, order="C")
 
 
 def classed(bound: float) -> tuple[Verdict, str | None]:

@@ -12,8 +12,7 @@ from flybystab.errors import NotConverged
 from flybystab.flybys.batch import Judged
 from flybystab.flybys.history import axes_of
 from flybystab.flybys.inputs import FlybyInputs
-from flybystab.flybys.self_consistent import self_consistent_bound_fraction
-from flybystab.flybys.verdict import CLASSES, Verdict
+from flybystab.flybys.verdict import CLASSES, Verdict, bound_fraction_upper
 
 #: A run that passes the largest axis ratio is followed to this multiple of it, to see how far beyond it gets.
 FOLLOWED = 5.0
@@ -38,10 +37,9 @@ class VerdictMargins:
     strain : float
         Largest ``|ln(a_i/a_i(0))|`` of the three axes until the run ends (at `limit` at the latest).
     bound_fraction : float
-        Bound mass fraction in the potential of what stays, iterated to its fixed point: below the fraction of the
-        verdict, which counts the pull of the material that is leaving.
+        Bound mass fraction of the verdict, in the potential of what stays.
     bound_fraction_upper : float
-        The fraction of the verdict.
+        The same in the potential of the whole body.
     relative : dict of str to float
         Distance from each edge that the verdict has, relative: ``"friction"`` (over the friction angle),
         ``"axis ratio"`` (``1 - axis_ratio/limit``), ``"bound fraction"`` (to the nearest edge of a class).
@@ -66,7 +64,7 @@ class VerdictMargins:
 def verdict_margins(inputs: FlybyInputs, run: Judged) -> VerdictMargins:
     """Margins of the verdict of a run."""
     body = inputs.body
-    phi, upper = body.material.phi, float(run.bound)
+    phi, bound = body.material.phi, float(run.bound)
     start = float(body.axes[0] / body.axes[2])
     limit = max(inputs.max_axis_ratio, 1.001 * start)  # the kernel's limit of bodies that begin beyond it
     ratio, strain = start, 0.0
@@ -75,20 +73,20 @@ def verdict_margins(inputs: FlybyInputs, run: Judged) -> VerdictMargins:
     relative = {"friction": (phi - run.friction) / phi if phi > 0.0 else -np.inf}
     if run.verdict not in (Verdict.INTACT, Verdict.NOT_IN_EQUILIBRIUM, Verdict.IMPACT):
         relative["axis ratio"] = 1.0 - ratio / limit
-        if upper < 1.0:
+        if bound < 1.0:
             edges = [c.least for c in CLASSES if c.least > 0.0]
-            relative["bound fraction"] = min((upper - e for e in edges), key=abs)
+            relative["bound fraction"] = min((bound - e for e in edges), key=abs)
     return VerdictMargins(
         friction_angle=np.rad2deg(phi - run.friction) * u.deg,
         axis_ratio=ratio,
         limit=limit,
         strain=strain,
-        bound_fraction=upper
-        if upper == 1.0
-        else self_consistent_bound_fraction(
+        bound_fraction=bound,
+        bound_fraction_upper=bound
+        if bound == 1.0
+        else bound_fraction_upper(
             run.shape, run.velocity_gradient, body.rho * float(np.prod(body.axes) / np.prod(run.axes))
         ),
-        bound_fraction_upper=upper,
         relative={k: float(v) for k, v in relative.items()},
     )
 

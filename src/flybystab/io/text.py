@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import astropy.units as u
 import numpy as np
 
@@ -105,6 +107,17 @@ def flyby_lines(r: FlybyResult) -> list[str]:
         out.append(f"yield      {r.onset_time.to_value(u.h):.2f} h after the start{lode}")
         out.append(
             f"after      semi-axes {a[0]:.5g}, {a[1]:.5g}, {a[2]:.5g} m, bound mass fraction {r.bound_fraction:.1%}"
+        )
+    if r.verdict == "BEYOND MODEL" and r.grains is None:
+        m = r.margins
+        reach = f"{m.axis_ratio:.3g}" if math.isfinite(m.axis_ratio) else "not known"
+        out.append(
+            f"beyond     axis ratio {reach} (followed past {m.limit:.3g}), strain {m.strain:.2f} up to there; "
+            f"bound mass fraction at most {m.bound_fraction_upper:.1%}"
+        )
+    if not r.settled:
+        out.append(
+            "settled    no: the body still moves when the run ends, the verdict is that of one instant"
         )
     out.append(
         f"spin       rate x {r.spin_ratio:.3f}, axis rotates by {r.pole_change.to_value(u.deg):.2f} deg"

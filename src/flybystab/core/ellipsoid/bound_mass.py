@@ -14,6 +14,18 @@ from flybystab.typing import Array
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(128)
 _LONGITUDES = 256
 
+# The same for the iterated share, on half of the sphere.
+_HALF_NODES, _HALF_WEIGHTS = (x[24:].copy() for x in np.polynomial.legendre.leggauss(48))
+_HALF_LONGITUDES = 48
+_COSINES = np.cos((np.arange(_HALF_LONGITUDES) + 0.5) * 2.0 * np.pi / _HALF_LONGITUDES)
+_SINES = np.sin((np.arange(_HALF_LONGITUDES) + 0.5) * 2.0 * np.pi / _HALF_LONGITUDES)
+
+#: The iteration ends where a pass removes less than this share of the mass, or after that many passes.
+CONVERGED = 1e-7
+PASSES = 500
+#: Below this share nothing is left.
+NOTHING = 1e-3
+
 
 @kernel
 def principal_axes(shape: Array, axes: Array, vectors: Array) -> None:
@@ -78,8 +90,10 @@ def angle_between(a: Array, b: Array) -> float:
 
 
 @kernel
-def bound_share(shape: Array, gradient: Array, rho: float) -> float:
-    """Share of the mass bound to a homogeneous ellipsoid with velocity ``L x``; see `flybystab.flybys.verdict`.
+def one_pass_share(shape: Array, gradient: Array, rho: float) -> float:
+    """Share of the mass bound in the potential of the whole ellipsoid, with velocity ``L x``: an upper bound.
+
+    See :func:`flybystab.flybys.verdict.bound_fraction_upper`.
 
     Parameters
     ----------
@@ -127,3 +141,111 @@ def bound_share(shape: Array, gradient: Array, rho: float) -> float:
             ring += min(1.0, reach2 * np.sqrt(reach2))
         share += 0.5 * _WEIGHTS[a] * ring / _LONGITUDES
     return share
+
+
+@kernel
+def bound_share(shape: Array, gradient: Array, rho: float) -> float:
+    """Share of the mass bound to what stays bound, for a homogeneous ellipsoid with velocity ``L x``.
+
+    What is unbound in the potential of the whole is removed, the potential computed for the remainder, and so on until
+    nothing more leaves. The remainder is at each pass the part of the ellipsoid in which one quadratic form is below a
+    constant; its potential is that of the homogeneous ellipsoid with its mass and its second moments. Arguments as of
+    `one_pass_share`, which is the first pass.
+    """
+    first = one_pass_share(shape, gradient, rho)
+    if first >= 1.0:
+        return first
+    scale = np.pi * G
+    axes = np.empty(3)
+    v = np.empty((3, 3))
+    f = np.empty((3, 3))
+    flow = np.empty((3, 3))
+    kinetic = np.empty((3, 3))
+    c = np.empty(6)
+    values = np.empty(3)
+    basis = np.empty((3, 3))
+    principal_axes(shape, axes, v)
+    coefficients = gravity_coefficients(axes[0] ** 2, axes[1] ** 2, axes[2] ** 2)
+    for i in range(3):
+        for j in range(3):
+            f[i, j] = v[i, j] * axes[j]
+    multiply(gradient, f, flow)
+    for i in range(3):
+        for j in range(3):
+            kinetic[i, j] = 0.5 * (
+                flow[0, i] * flow[0, j] + flow[1, i] * flow[1, j] + flow[2, i] * flow[2, j]
+            )
+    form = kinetic.copy()
+    for i in range(3):
+        form[i, i] += scale * rho * coefficients[i] * axes[i] ** 2
+    pack(form, c)
+    eigensystem(c, values, basis)
+    top = np.argmax(values)
+    for i in range(3):  # the polar axis is the one that escapes most
+        basis[i, 2], basis[i, top] = basis[i, top], basis[i, 2]
+    to_space = np.empty((3, 3))
+    multiply(f, basis, to_space)
+    half = np.empty((3, 3))
+    multiply(kinetic, basis, half)
+    for i in range(3):
+        for j in range(3):
+            kinetic[i, j] = basis[0, i] * half[0, j] + basis[1, i] * half[1, j] + basis[2, i] * half[2, j]
+    moments = np.eye(3)  # 5 <z z^T> of the remainder, unit ball
+    share = 1.0
+    n = np.empty(3)
+    for _ in range(PASSES):
+        for i in range(3):
+            for j in range(3):
+                half[i, j] = (
+                    to_space[i, 0] * moments[0, j]
+                    + to_space[i, 1] * moments[1, j]
+                    + to_space[i, 2] * moments[2, j]
+                )
+        for i in range(3):
+            for j in range(3):
+                form[i, j] = (
+                    half[i, 0] * to_space[j, 0] + half[i, 1] * to_space[j, 1] + half[i, 2] * to_space[j, 2]
+                )
+        pack(form, c)
+        eigensystem(c, values, v)
+        coefficients = gravity_coefficients(values[0], values[1], values[2])
+        volume = np.sqrt(values[0] * values[1] * values[2]) / (axes[0] * axes[1] * axes[2])
+        potential = scale * rho * share / volume
+        depth = potential * potential_coefficient(values[0], values[1], values[2])
+        for i in range(3):
+            for j in range(3):
+                half[i, j] = v[0, i] * to_space[0, j] + v[1, i] * to_space[1, j] + v[2, i] * to_space[2, j]
+        for i in range(3):
+            for j in range(3):
+                form[i, j] = kinetic[i, j]
+                for k in range(3):
+                    form[i, j] += potential * coefficients[k] * half[k, i] * half[k, j]
+        mass = 0.0
+        moments[:] = 0.0
+        for a in range(_HALF_NODES.size):
+            n[2] = _HALF_NODES[a]
+            across = np.sqrt(1.0 - n[2] * n[2])
+            weight = _HALF_WEIGHTS[a] / _HALF_LONGITUDES
+            for b in range(_HALF_LONGITUDES):
+                n[0] = across * _COSINES[b]
+                n[1] = across * _SINES[b]
+                q = form[0, 0] * n[0] * n[0] + form[1, 1] * n[1] * n[1] + form[2, 2] * n[2] * n[2]
+                q += 2.0 * (form[0, 1] * n[0] * n[1] + form[0, 2] * n[0] * n[2] + form[1, 2] * n[1] * n[2])
+                r2 = min(1.0, depth / q)
+                r3 = weight * r2 * np.sqrt(r2)
+                mass += r3
+                r5 = 3.0 * r2 * r3
+                for i in range(3):
+                    for j in range(i, 3):
+                        moments[i, j] += r5 * n[i] * n[j]
+        if mass < NOTHING:
+            return 0.0
+        for i in range(3):
+            for j in range(i, 3):
+                moments[i, j] /= mass
+                moments[j, i] = moments[i, j]
+        change = share - mass
+        share = mass
+        if change < CONVERGED:
+            break
+    return min(first, share)
