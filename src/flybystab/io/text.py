@@ -109,11 +109,11 @@ def flyby_lines(r: FlybyResult) -> list[str]:
             f"after      semi-axes {a[0]:.5g}, {a[1]:.5g}, {a[2]:.5g} m, bound mass fraction {r.bound_fraction:.1%}"
         )
     if r.verdict == "BEYOND MODEL" and r.grains is None:
-        m = r.margins
-        reach = f"{m.axis_ratio:.3g}" if math.isfinite(m.axis_ratio) else "not known"
+        known = r.margins
+        reach = f"{known.axis_ratio:.3g}" if math.isfinite(known.axis_ratio) else "not known"
         out.append(
-            f"beyond     axis ratio {reach} (followed past {m.limit:.3g}), strain {m.strain:.2f} up to there; "
-            f"bound mass fraction at most {m.bound_fraction_upper:.1%}"
+            f"beyond     axis ratio {reach} (followed past {known.limit:.3g}), strain {known.strain:.2f} up to there; "
+            f"bound mass fraction at most {known.bound_fraction_upper:.1%}"
         )
     if not r.settled:
         out.append(
