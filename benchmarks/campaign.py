@@ -32,9 +32,9 @@ import flybystab as fs
 from flybystab.body.body import YIELD_SURFACES
 from flybystab.constants import G
 from flybystab.core.dynamics.moreau import follow_steps
-from flybystab.core.dynamics.run import parameters, passage
+from flybystab.core.dynamics.run import integrate, parameters
 from flybystab.core.ellipsoid.tide import TidePanels, components, tensor
-from flybystab.flybys.batch import Judged, judged
+from flybystab.flybys.batch import FlybyRun, flyby_run
 from flybystab.flybys.verdict import bound_fraction, classed
 from flybystab.orbit.planets import planet
 
@@ -149,7 +149,7 @@ def said(body: fs.Body, encounter: fs.Encounter) -> str:
     )
 
 
-def energy_gain(found: Judged, body: fs.Body) -> float:
+def energy_gain(found: FlybyRun, body: fs.Body) -> float:
     """Largest share of the kinetic energy gained at an instant, where it can only fall."""
     h = found.history
     assert h is not None
@@ -162,7 +162,7 @@ def energy_gain(found: Judged, body: fs.Body) -> float:
     return gain
 
 
-def plastic_gain(found: Judged) -> float:
+def plastic_gain(found: FlybyRun) -> float:
     """Largest negative plastic power over the largest stress times rate of strain; the flow rule forbids any."""
     h = found.history
     assert h is not None
@@ -190,8 +190,8 @@ def extremes(n: int, seed: int) -> Counter[str]:
 def stress(n: int, seed: int, draw: Callable[[np.random.Generator], Scene] = draw) -> Counter[str]:
     """Two tolerances of the default integrator."""
     first, encounter, _ = pile(np.random.default_rng(0), "drucker-prager", 0.0)
-    judged(
-        first, encounter, np.eye(3), TOLERANCES[0], LIMIT, 20_000, needs=True
+    flyby_run(
+        first, encounter, np.eye(3), TOLERANCES[0], LIMIT, 20_000, required=True
     )  # compiles what is not on disk
     rng = np.random.default_rng(seed)
     count: Counter[str] = Counter()
@@ -207,7 +207,9 @@ def stress(n: int, seed: int, draw: Callable[[np.random.Generator], Scene] = dra
         for tol in TOLERANCES:
             start = time.process_time()
             found.append(
-                judged(body, encounter, turn, tol, LIMIT, 20_000 if tol == TOLERANCES[0] else 0, needs=True)
+                flyby_run(
+                    body, encounter, turn, tol, LIMIT, 20_000 if tol == TOLERANCES[0] else 0, required=True
+                )
             )
             took = time.process_time() - start
             cpu[tol] += took
@@ -263,7 +265,7 @@ def stepped(
     tide = TidePanels(e.tau / t0, e.start, e.width, e.coefficients * t0**2)
     summary = np.zeros(4)
     span = encounter.t_start / t0, encounter.t_stop / t0
-    if not follow_steps(*span, n, y, par, tide, m.brittle, summary):
+    if not follow_steps(*span, n, y, par.material, tide, m.brittle, summary):
         return None
     w = y[12:15]
     spin = np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
@@ -292,7 +294,7 @@ def integrators(n: int, seed: int) -> Counter[str]:
         if not fs.equilibrium(body).admissible:
             continue
         count["bodies"] += 1
-        run = passage(
+        run = integrate(
             body.axes, body.rho, body.omega, turn, encounter.t_start, encounter.t_stop, encounter.tide, phi=m.phi,
             cohesion=m.c_pa, dilatancy=m.dilatancy, surface=m.surface_code, brittle=m.brittle, tolerance=1e-9,
             max_axis_ratio=LIMIT,

@@ -22,7 +22,7 @@ from scipy.spatial.transform import Rotation
 from flybystab.body.body import Material
 from flybystab.catalogues.catalogue import catalogue
 from flybystab.constants import G
-from flybystab.core.dynamics.run import passage
+from flybystab.core.dynamics.run import integrate
 from flybystab.core.ellipsoid.yield_bound import INTACT, NOT_IN_EQUILIBRIUM, quick_margins, tide_size
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import FlybystabError
@@ -108,10 +108,10 @@ def campaign(seed: int, encounters: int, each: int) -> Count:
             turn = Rotation.random(random_state=int(rng.integers(2**31))).as_matrix()
             way = axes[i], rho[i], omega[i], turn, enc.t_start, enc.t_stop, enc.tide
             material = {"phi": phi[i], "cohesion": cohesion[i], "surface": code, "tolerance": 1e-8}
-            run = passage(*way, **material, brittle=bool(rng.integers(2)), max_axis_ratio=8.0)
+            run = integrate(*way, **material, brittle=bool(rng.integers(2)), max_axis_ratio=8.0)
             yielded = any(name == "onset" for name, _, _ in run.events) or run.reason != "done"
             intact += 1
-            most = passage(*way, **material, unyielding=True, max_axis_ratio=8.0).max_friction
+            most = integrate(*way, **material, unyielding=True, max_axis_ratio=8.0).max_friction
             false += yielded or most > friction[i, 1] + 1e-9
             rest, bound = friction[i]
             if np.isfinite(rest) and bound - rest > 1e-3:

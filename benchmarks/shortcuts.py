@@ -20,12 +20,13 @@ from numba import njit
 import flybystab as fs
 from flybystab.core.dynamics import rates as motion
 from flybystab.core.dynamics import state
-from flybystab.core.dynamics import verdict_row as judgement
 from flybystab.core.dynamics.jacobian import flow_jacobian
 from flybystab.core.dynamics.run import parameters
-from flybystab.core.dynamics.steppers import N_STAGES, factorise, implicit_step, solve
+from flybystab.core.dynamics.steppers import implicit_step
+from flybystab.core.dynamics.workspace import Limits, workspace
 from flybystab.core.ellipsoid.tide import TidePanels, components
-from flybystab.flybys.batch import MAX_STEPS, buffers, judge_rows, one_row
+from flybystab.core.numerics.lu import factorise, solve
+from flybystab.flybys.batch import MAX_STEPS, one_row, output_buffers, verdict_rows
 
 PILE = fs.Body(semi_axes=[1400, 850, 750] * u.m, density=2000 * u.kg / u.m**3, spin_period=6 * u.h)
 
@@ -71,13 +72,14 @@ def distant() -> None:
     for name, body, e in scenes():
         for tolerance in (1e-3, 1e-6, 1e-8):
             arguments = one_row(body, e)
-            answer = np.empty((1, judgement.N_ANSWER))
+            output = output_buffers(1, 0)
 
-            def run(span: np.ndarray, arguments=arguments, tolerance=tolerance, answer=answer) -> None:
-                row = (*arguments[:7], span, *arguments[8:])
-                judge_rows(*row, tolerance, 6.0, MAX_STEPS, False, *buffers(0), answer)
+            def run(span: np.ndarray, arguments=arguments, tolerance=tolerance, output=output) -> None:
+                encounters = arguments.encounters._replace(rows=span)
+                limits = Limits(tolerance, 6.0, MAX_STEPS)
+                verdict_rows(arguments.rows, arguments.bodies, encounters, limits, False, output)
 
-            span = arguments[7].copy()
+            span = arguments.encounters.rows.copy()
             t = np.linspace(e.t_start, e.t_stop, 20001)
             size = 2.0 * e.planet.gm / e.distances(t) ** 3
             added = np.cumsum(size) * (t[1] - t[0])
@@ -85,10 +87,10 @@ def distant() -> None:
             first = t[np.searchsorted(added, allowed)]
             last = t[min(len(t) - 1, np.searchsorted(added, added[-1] - allowed))]
             full = least(lambda span=span, run=run: run(span))
-            steps = answer[0, judgement.STEPS]
+            steps = output.outcomes[0]["steps"]
             inner = span.copy()
-            inner[0, judgement.START] = first
-            inner[0, judgement.REST] = inner[0, judgement.STOP] = last
+            inner["start"] = first
+            inner["rest"] = inner["stop"] = last
             short = least(lambda inner=inner, run=run: run(inner))
             skipped = (first - e.t_start + e.t_stop - last) / 3600.0
             print(
@@ -106,13 +108,13 @@ def _rates(n, t, y, dy, par, tide, work):
 @njit
 def _cheap_rates(n, y, dy, par, work):
     for _ in range(n):
-        motion.deformation_rate(state.FLOWING, y, dy, par, work)
+        motion.deformation_rate(state.FLOWING, y, dy, par.material, work)
 
 
 @njit
 def _jacobians(n, t, y, dy, par, tide, work, jac, lu):
     for _ in range(n):
-        flow_jacobian(t, y, dy, 1e-6, par, tide, work, jac, lu)
+        flow_jacobian(t, y, dy, 1e-6, par.material, tide, work, jac, lu)
 
 
 @njit
@@ -130,9 +132,9 @@ def _solutions(n, size, b, pivots, x):
 
 
 @njit
-def _steps(n, t, y, par, tide, work, jac, lu, pivots, k, scale, y1, dense):
+def _steps(n, t, par, tide, ws):
     for _ in range(n):
-        implicit_step(t, y, 1e-3, par, tide, work, jac, lu, pivots, k, scale, y1, dense)
+        implicit_step(t, 1e-3, par, tide, ws)
 
 
 def planar() -> None:
@@ -149,7 +151,6 @@ def planar() -> None:
     y[14] = PILE.omega[2] * t0
     jac, lu = np.zeros((15, 16)), np.zeros((15, 15))
     pivots = np.zeros(15, dtype=np.int64)
-    k, dense, y1, scale = np.zeros((N_STAGES, 15)), np.zeros((7, 15)), np.zeros(15), np.full(15, 1e-8)
     motion.rate(state.FLOWING, 0.0, y, dy, par, tide, work)
     system = np.eye(15) / 1e-3
 
@@ -163,7 +164,9 @@ def planar() -> None:
     factors = [cost(_factors, m, system, lu, pivots) for m in (15, 9)]
     system -= jac[:, :15]
     solutions = [cost(_solutions, m, lu, pivots, s) for m in (15, 9)]
-    step = cost(_steps, 0.0, y, par, tide, work, jac, lu, pivots, k, scale, y1, dense)
+    ws = workspace()
+    ws.y[:], ws.jac[:], ws.scale[:] = y, jac, 1e-8
+    step = cost(_steps, 0.0, par, tide, ws)
     rows = [
         ("right-hand side", rate, rate),
         ("the same without self-gravity and tide", cheap, cheap),

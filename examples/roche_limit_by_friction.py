@@ -7,7 +7,7 @@ onset of yield found by the dynamics in a slowly increasing tide.
 import numpy as np
 
 from flybystab.constants import G
-from flybystab.core.dynamics.run import passage
+from flybystab.core.dynamics.run import integrate
 from flybystab.core.ellipsoid.tide import tide_panels
 
 RHO = 2000.0
@@ -25,7 +25,7 @@ for phi in (10, 20, 30, 40, 50):
         return np.stack([2 * x, -x, -x, 0 * x, 0 * x, 0 * x], axis=-1)
 
     tide, _ = tide_panels(ramp, 0.0, span, span, width=0.2)
-    run = passage(
+    run = integrate(
         np.full(3, 500.0), RHO, np.zeros(3), np.eye(3), 0.0, span, tide, phi=np.deg2rad(phi), tolerance=1e-10
     )
     onset = run.events[0][1]

@@ -13,9 +13,9 @@ from flybystab.constants import R_EARTH, G
 from flybystab.core.dynamics import state
 from flybystab.core.dynamics.ground import no_ground
 from flybystab.core.dynamics.moreau import follow_steps
-from flybystab.core.dynamics.regimes import follow
-from flybystab.core.dynamics.run import Passage, parameters, passage
-from flybystab.core.dynamics.workspace import N_EVENT, N_HISTORY, workspace
+from flybystab.core.dynamics.regimes import Span, follow
+from flybystab.core.dynamics.run import Run, integrate, parameters
+from flybystab.core.dynamics.workspace import Limits, new_log, workspace
 from flybystab.core.ellipsoid.tide import TidePanels, components, no_tide, tensor, tide_at
 from flybystab.encounter.encounter import Encounter
 
@@ -54,10 +54,10 @@ def carried(
     tide: TidePanels | None = None,
     attitude: Array | None = None,
     **kwargs: Any,
-) -> Passage:
+) -> Run:
     """Array-level run of a body."""
     m = body.material
-    return passage(
+    return integrate(
         body.axes,
         body.rho,
         body.omega,
@@ -138,7 +138,7 @@ def stepped(
     y[12:15] = body.omega * t0
     panels = no_tide() if tide is None else tide
     scaled = TidePanels(panels.tau / t0, panels.start, panels.width, panels.coefficients * t0**2)
-    assert follow_steps(t_start / t0, t_stop / t0, n, y, par, scaled, m.brittle, np.zeros(4))
+    assert follow_steps(t_start / t0, t_stop / t0, n, y, par.material, scaled, m.brittle, np.zeros(4))
     gradient = tensor(y[6:12])
     w = y[12:15]
     gradient += np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
@@ -171,14 +171,15 @@ def deforming(
     y[12:15] = body.omega * t0
     panels = no_tide() if tide is None else tide
     scaled = TidePanels(panels.tau / t0, panels.start, panels.width, panels.coefficients * t0**2)
-    history, events = np.zeros((20000, N_HISTORY)), np.zeros((64, N_EVENT))
-    count, mark = np.zeros(4, dtype=np.int64), np.zeros(2)
+    run = new_log(20000, 64)
     follow(
-        0.0, t_stop / t0, t_stop / t0, regime, y, par, scaled, no_ground(), tolerance, limit, m.brittle, False,
-        200_000, history, events, count, mark, workspace(),
+        Span(0.0, t_stop / t0, t_stop / t0), regime, y, par, scaled, no_ground(), Limits(tolerance, limit, 200_000),
+        m.brittle, False, run, workspace(),
     )  # fmt: skip
     w = y[12:15]
     gradient = tensor(y[6:12]) + np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])
-    rows = history[: count[0], [0, 2, 3, 4, 5, 6, 7]] * np.array([t0] + [a0**2] * 6)
-    log = [(int(c), t * t0) for c, t, _, _ in events[: count[1]]]
+    counts = run.counts[0]
+    history = run.history[: counts["rows"]]
+    rows = np.column_stack([history["time"] * t0, history["state"][:, :6] * a0**2])
+    log = [(int(e["code"]), float(e["time"]) * t0) for e in run.events[: counts["events"]]]
     return tensor(y[:6]) * a0**2, gradient / t0, log, rows

@@ -282,7 +282,7 @@ def test_a_stalled_looser_run_costs_no_answer(monkeypatch):
     import flybystab.flybys.inputs as flybys
 
     asked = []
-    real = flybys.judged
+    real = flybys.flyby_run
 
     def stalls(body, encounter, rotation, tolerance, *rest):
         asked.append(tolerance)
@@ -290,7 +290,7 @@ def test_a_stalled_looser_run_costs_no_answer(monkeypatch):
             return real(body, encounter, rotation, tolerance, *rest)._replace(failure="stalled")
         return real(body, encounter, rotation, tolerance, *rest)
 
-    monkeypatch.setattr(flybys, "judged", stalls)
+    monkeypatch.setattr(flybys, "flyby_run", stalls)
     r = flyby(PILE, earth(2.2), tolerance=1e-8)
     assert r.verdict == "RESHAPED"
     assert 0.0 < r.error.semi_axes < 1e-6

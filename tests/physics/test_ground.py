@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from tests.scenes import PILE
 
 from flybystab import Body, Encounter, Material, flyby, flyby_many
-from flybystab.core.dynamics.run import passage
+from flybystab.core.dynamics.run import integrate
 from flybystab.flybys.batch import span_of
 from flybystab.flybys.rigid_course import rigid_course
 from flybystab.io.text import flyby_lines
@@ -35,7 +35,7 @@ def flown(body: Body, encounter: Encounter, attitude: NDArray[np.float64]) -> Ca
     """Gap (m) to the ground at a time (s from closest approach) on a finer run that knows of no ground."""
     start, stop, _ = span_of(encounter)
     m = body.material
-    run = passage(
+    run = integrate(
         body.axes, body.rho, body.omega, attitude, start, stop, encounter.tide,
         phi=m.phi, cohesion=m.c_pa, unyielding=True, tolerance=1e-11, keep=20_000,
     )  # fmt: skip

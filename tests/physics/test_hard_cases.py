@@ -373,9 +373,16 @@ def test_frictionless_impulse_is_the_closed_form():
     )
     work = empty_buffers()
     did = friction_impulse(
-        y, par, 0.0, np.zeros(6), work, np.zeros((15, 15)), np.zeros(15, dtype=np.int64), np.zeros(36)
+        y,
+        par.material,
+        0.0,
+        np.zeros(6),
+        work,
+        np.zeros((15, 15)),
+        np.zeros(15, dtype=np.int64),
+        np.zeros(36),
     )
-    assert did == SLIDING
+    assert did.outcome == SLIDING
     inverse = np.linalg.inv(s)
     expected = big_l - np.trace(big_l) / np.trace(inverse) * inverse
     w = y[12:15]

@@ -8,7 +8,7 @@ from astropy.time import Time
 from flybystab.body.body import Body
 from flybystab.catalogues.catalogue import Asteroid
 from flybystab.constants import R_EARTH, G
-from flybystab.core.dynamics.run import passage
+from flybystab.core.dynamics.run import integrate
 from flybystab.core.material.surfaces import code_of
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
@@ -64,7 +64,7 @@ def test_bounds_are_where_the_dynamics_begins_to_yield():
 
         def yields(phi, rho=rho, c=c):
             run = [
-                passage(
+                integrate(
                     b.axes,
                     rho,
                     b.omega,

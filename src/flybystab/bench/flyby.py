@@ -20,12 +20,12 @@ import numpy as np
 from flybystab.body.body import Body, Material
 from flybystab.core.dynamics import rates as motion
 from flybystab.core.dynamics.moreau import follow_steps
-from flybystab.core.dynamics.run import parameters, passage
+from flybystab.core.dynamics.run import integrate, parameters
 from flybystab.core.dynamics.state import FLOWING, empty_buffers
-from flybystab.core.dynamics.verdict_row import N_ANSWER
+from flybystab.core.dynamics.workspace import Limits
 from flybystab.core.ellipsoid.tide import TidePanels, tensor
 from flybystab.encounter.encounter import Encounter
-from flybystab.flybys.batch import MAX_STEPS, buffers, judge_rows, one_row
+from flybystab.flybys.batch import MAX_STEPS, one_row, output_buffers, verdict_rows
 from flybystab.plots.style import save
 from flybystab.units import R_earth
 
@@ -65,7 +65,7 @@ def rows(figure: str | Path | None = None, repeat: int = 5) -> list[dict[str, An
     tide = TidePanels(e.tide.tau / t0, e.tide.start, e.tide.width, e.tide.coefficients * t0**2)
 
     def default(tolerance: float, keep: int = 0) -> Any:
-        return passage(
+        return integrate(
             body.axes, body.rho, body.omega, np.eye(3), e.t_start, e.t_stop, e.tide,
             phi=PHI, tolerance=tolerance, keep=keep,
         )  # fmt: skip
@@ -73,7 +73,8 @@ def rows(figure: str | Path | None = None, repeat: int = 5) -> list[dict[str, An
     def kernel(tolerance: float, encounter: Encounter) -> Callable[[], None]:
         """The compiled run alone, as `flyby` and `flyby_many` call it for each row."""
         arguments = one_row(body, encounter)
-        return lambda: judge_rows(*arguments, tolerance, 6.0, MAX_STEPS, False, *buffers(0), answer)
+        limits = Limits(tolerance, 6.0, MAX_STEPS)
+        return lambda: verdict_rows(*arguments, limits, False, output_buffers(1, 0))
 
     def axes(shape: Any) -> Any:
         return np.sqrt(np.linalg.eigvalsh(shape)[::-1])
@@ -81,7 +82,6 @@ def rows(figure: str | Path | None = None, repeat: int = 5) -> list[dict[str, An
     exact = default(1e-12, keep=200_000)
     truth = axes(exact.shape)
     out: list[dict[str, Any]] = []
-    answer = np.empty((1, N_ANSWER))
 
     def add(method: str, setting: str, shape: Any, cpu: float) -> None:
         error = float(np.abs(axes(shape) / truth - 1.0).max())
@@ -96,7 +96,7 @@ def rows(figure: str | Path | None = None, repeat: int = 5) -> list[dict[str, An
     )
 
     def rigid(tolerance: float) -> Any:
-        return passage(
+        return integrate(
             body.axes, body.rho, body.omega, np.eye(3), far.t_start, far.t_stop, far.tide, phi=PHI, tolerance=tolerance
         )  # fmt: skip
 
@@ -117,7 +117,7 @@ def rows(figure: str | Path | None = None, repeat: int = 5) -> list[dict[str, An
         y = np.zeros(15)
         y[:3] = (body.axes / a0) ** 2
         y[12:15] = body.omega * t0
-        follow_steps(e.t_start / t0, e.t_stop / t0, n, y, par.copy(), tide, False, np.zeros(4))
+        follow_steps(e.t_start / t0, e.t_stop / t0, n, y, par.material, tide, False, np.zeros(4))
         return tensor(y[:6]) * a0**2
 
     for n in (2000, 8000, 32000):

@@ -19,7 +19,7 @@ from flybystab.body.body import Body, check_body
 from flybystab.body.equilibrium import equilibrium
 from flybystab.body.stability import unit_deviator
 from flybystab.constants import G
-from flybystab.core.dynamics.run import Passage, passage
+from flybystab.core.dynamics.run import Run, integrate
 from flybystab.core.ellipsoid.tide import components, no_tide, tensor
 from flybystab.core.energy.perturbation import EDGE, pile, rate_of_strain, slope_of_flow
 from flybystab.core.energy.perturbation import direction as strain_direction
@@ -327,7 +327,7 @@ def _dilatancy(body: Body, dilatancy: float | None) -> float:
     return float(to_si(own, u.dimensionless_unscaled, "dilatancy", low=0.0, high=1.0))
 
 
-def _push(body: Body, direction: Any, energy: float, dilatancy: float, tolerance: float) -> Passage:
+def _push(body: Body, direction: Any, energy: float, dilatancy: float, tolerance: float) -> Run:
     d = unit_deviator(direction)
     m = body.material
     squares = body.axes**2
@@ -341,7 +341,7 @@ def _push(body: Body, direction: Any, energy: float, dilatancy: float, tolerance
     # K = tr(L I L^T)/2 with I = (m/5) S
     unit = body.mass.value / 10.0 * float(np.trace(gradient @ np.diag(squares) @ gradient.T))
     limit = max(EDGE, 1.001 * body.axes[0] / body.axes[2])
-    return passage(
+    return integrate(
         body.axes,
         body.rho,
         body.omega,
@@ -360,7 +360,7 @@ def _push(body: Body, direction: Any, energy: float, dilatancy: float, tolerance
     )
 
 
-def _recovery(body: Body, run: Passage) -> Recovery:
+def _recovery(body: Body, run: Run) -> Recovery:
     if run.reason == "stuck":
         raise NotConverged(f"the perturbed body could not be followed beyond {run.time:.1f} s ({run.regime})")
     axes = np.sqrt(np.linalg.eigvalsh(run.shape)[::-1])

@@ -1,4 +1,4 @@
-"""Bodies and encounters as rows of the arrays that the compiled judgement takes, and its answers read back."""
+"""Bodies and encounters as records of the compiled kernels, and the outcomes read back."""
 
 from __future__ import annotations
 
@@ -10,10 +10,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.body.body import Body
-from flybystab.core.dynamics import verdict_row as judgement
+from flybystab.core.dynamics import verdict_row as kernels
 from flybystab.core.dynamics.ground import Ground, no_ground
 from flybystab.core.dynamics.run import REGIMES, event_log, unpacked_history
-from flybystab.core.dynamics.workspace import N_EVENT, N_HISTORY
+from flybystab.core.dynamics.verdict_row import BODY, ENCOUNTER, NEAR_GROUND, OUTCOME, Encounters, Output
+from flybystab.core.dynamics.workspace import Limits, new_log
+from flybystab.core.verdict_codes import FAILED
 from flybystab.encounter.encounter import Encounter
 from flybystab.encounter.reach import TAIL
 from flybystab.errors import InvalidInput
@@ -21,8 +23,8 @@ from flybystab.flybys.verdict import Verdict, verdict_of
 from flybystab.typing import Array
 from flybystab.units import to_si
 
-#: :func:`flybystab.core.dynamics.verdict_row.judge_rows`, to be called with the arrays of `one_row`.
-judge_rows: Any = judgement.judge_rows
+#: :func:`flybystab.core.dynamics.verdict_row.verdict_rows`, without its type.
+verdict_rows: Any = kernels.verdict_rows
 
 #: Step tolerance by default: 1e-8 in the shape of the reference cases (``flybystab bench flyby``).
 TOLERANCE = 1e-8
@@ -44,8 +46,16 @@ def axis_ratio(value: Any) -> float:
     return ratio
 
 
-class Judged(NamedTuple):
-    """Result of :func:`flybystab.core.dynamics.verdict_row.judge` for a body, in SI units."""
+class RowInputs(NamedTuple):
+    """Records of bodies and encounters: the rows to compute, and the first arguments of `verdict_rows`."""
+
+    rows: NDArray[np.int64]
+    bodies: NDArray[Any]
+    encounters: Encounters
+
+
+class FlybyRun(NamedTuple):
+    """Result of :func:`flybystab.core.dynamics.verdict_row.verdict_row` for a body, in SI units."""
 
     verdict: Verdict
     bound: float
@@ -65,79 +75,91 @@ class Judged(NamedTuple):
     failure: str
 
 
-def judged(
+def flyby_run(
     body: Body,
     encounter: Encounter,
     rotation: Array,
     tolerance: float,
     max_axis_ratio: float,
     keep: int,
-    needs: bool,
-    inputs: tuple[Any, ...] | None = None,
-) -> Judged:
+    required: bool,
+    inputs: RowInputs | None = None,
+) -> FlybyRun:
     """Follow a body through an encounter and classify the outcome.
 
     `rotation` takes body axes to the frame of the encounter; `inputs` is `one_row` of the three, if it is at hand.
     """
-    out = np.empty((1, judgement.N_ANSWER))
-    shape, gradient, rows, events, count = room = buffers(keep)
-    judge_rows(
-        *(one_row(body, encounter, rotation) if inputs is None else inputs), tolerance,
-        float(max_axis_ratio), MAX_STEPS, needs, *room, out,
-    )  # fmt: skip
-    out = out[0]
-    return Judged(
-        verdict_of(int(out[judgement.VERDICT]), float(out[judgement.BOUND])) or Verdict.INTACT,
-        float(out[judgement.BOUND]),
-        out[judgement.AXES : judgement.AXES + 3],
-        out[judgement.SPIN : judgement.SPIN + 3],
-        float(out[judgement.FRICTION]),
-        float(out[judgement.FRICTION_TIME]),
-        float(out[judgement.SPIN_RATIO]),
-        float(out[judgement.POLE_CHANGE]),
-        float(out[judgement.LACKING]),
-        float(out[judgement.TIME]),
-        REGIMES[int(out[judgement.REGIME])],
-        shape,
-        gradient,
-        event_log(events, count),
-        unpacked_history(rows[: count[0]], body.axes, body.rho) if keep > 1 else None,
+    output = output_buffers(1, keep)
+    if inputs is None:
+        inputs = one_row(body, encounter, rotation)
+    verdict_rows(*inputs, Limits(tolerance, float(max_axis_ratio), MAX_STEPS), required, output)
+    out, log = output.outcomes[0], output.log
+    rows = log.history[: log.counts[0]["rows"]]
+    return FlybyRun(
+        verdict_of(int(out["verdict"]), float(out["bound_fraction"])) or Verdict.INTACT,
+        float(out["bound_fraction"]),
+        out["axes"],
+        out["spin"],
+        float(out["friction"]),
+        float(out["friction_time"]),
+        float(out["spin_ratio"]),
+        float(out["pole_change"]),
+        float(out["lacking"]),
+        float(out["time"]),
+        REGIMES[out["regime"]],
+        output.shape,
+        output.gradient,
+        event_log(log),
+        unpacked_history(rows, body.axes, body.rho) if keep > 1 else None,
         failure_of(out, encounter, tolerance),
     )
 
 
-def buffers(keep: int) -> tuple[Array, Array, Array, Array, NDArray[np.int64]]:
-    """Shape, velocity gradient, history of `keep` rows, event log and counts, for the kernel to write."""
-    history, events = np.zeros((max(keep, 1), N_HISTORY)), np.zeros((64, N_EVENT))
-    return np.empty((3, 3)), np.empty((3, 3)), history, events, np.zeros(4, dtype=np.int64)
+def output_buffers(n: int, keep: int) -> Output:
+    """Buffers for `n` outcomes, and the end state and record of a run with a history of `keep` rows."""
+    return Output(np.empty(n, OUTCOME), np.empty((3, 3)), np.empty((3, 3)), new_log(keep, 64))
 
 
-def one_row(body: Body, encounter: Encounter, rotation: Array | None = None) -> tuple[Any, ...]:
-    """One body and encounter as the first arguments of `judge_rows`; the identity rotation by default."""
+def one_row(body: Body, encounter: Encounter, rotation: Array | None = None) -> RowInputs:
+    """Records of one body and its encounter; the identity rotation by default."""
     turn = np.eye(3) if rotation is None else rotation
-    return np.zeros(1, dtype=np.int64), *columns([body], turn[None], [encounter])
+    return RowInputs(np.zeros(1, dtype=np.int64), *records([body], turn[None], [encounter]))
 
 
-def columns(bodies: Sequence[Body], rotations: Array, encounters: Sequence[Encounter]) -> tuple[Any, ...]:
-    """Bodies and encounters as the arrays of `judge_rows`; the same encounter is stored once."""
+def records(
+    bodies: Sequence[Body], rotations: Array, encounters: Sequence[Encounter]
+) -> tuple[NDArray[Any], Encounters]:
+    """Records of bodies and encounters; the same encounter is stored once."""
     met = {id(e): e for e in encounters}
     place = {key: k for k, key in enumerate(met)}
-    tides = [e.tide for e in met.values()]
-    longest = max(b.axes[0] for b in bodies)
-    grounds = [ground_near(e, longest) for e in met.values()]
-    return (
-        np.array([b.axes for b in bodies]),
-        np.array([b.rho for b in bodies]),
-        np.array([b.omega for b in bodies]),
-        np.ascontiguousarray(rotations),
-        np.array([_material(b) for b in bodies]),
-        np.array([place[id(e)] for e in encounters], dtype=np.int64),
-        np.array([span_of(e) for e in met.values()]),
-        np.array([[t.tau, t.start, t.width] for t in tides]),
-        *_joined([t.coefficients for t in tides]),
-        np.array([[g.tau, g.start, g.width, g.floor, g.least] for g in grounds]),
-        *_joined([g.coefficients for g in grounds]),
-    )
+    materials = [b.material for b in bodies]
+    rows = np.empty(len(bodies), BODY)
+    rows["axes"] = [b.axes for b in bodies]
+    rows["rho"] = [b.rho for b in bodies]
+    rows["omega"] = [b.omega for b in bodies]
+    rows["attitude"] = rotations
+    rows["phi"] = [m.phi for m in materials]
+    rows["cohesion"] = [m.c_pa for m in materials]
+    rows["dilatancy"] = [m.dilatancy for m in materials]
+    rows["surface"] = [m.surface_code for m in materials]
+    rows["brittle"] = [m.brittle for m in materials]
+    rows["encounter"] = [place[id(e)] for e in encounters]
+    return rows, _encounters(list(met.values()), max(float(b.axes[0]) for b in bodies))
+
+
+def _encounters(met: Sequence[Encounter], longest: float) -> Encounters:
+    """Records of encounters of bodies with semi-axes up to `longest` (m)."""
+    grounds = [ground_near(e, longest) for e in met]
+    first_tide, tides = _joined([e.tide.coefficients for e in met])
+    first_ground, positions = _joined([g.coefficients for g in grounds])
+    rows = np.empty(len(met), ENCOUNTER)
+    for k, (row, e, ground) in enumerate(zip(rows, met, grounds, strict=True)):
+        row["start"], row["rest"], row["stop"] = span_of(e)
+        t = e.tide
+        row["tide"] = (t.tau, t.start, t.width, first_tide[k], first_tide[k + 1])
+        row["ground"] = (ground.tau, ground.start, ground.width, first_ground[k], first_ground[k + 1])
+        row["floor"], row["least"] = ground.floor, ground.least
+    return Encounters(rows, tides, positions)
 
 
 def _joined(series: Sequence[Array]) -> tuple[NDArray[np.int64], Array]:
@@ -149,30 +171,25 @@ def _joined(series: Sequence[Array]) -> tuple[NDArray[np.int64], Array]:
     return first, out
 
 
-def _material(body: Body) -> Array:
-    m = body.material
-    return np.array([m.phi, m.c_pa, m.dilatancy, m.surface_code, m.brittle], dtype=float)
-
-
 def ground_near(encounter: Encounter, longest: float) -> Ground:
     """The ground along an encounter that bodies of a long semi-axis (m) may touch; none where it is far below."""
-    return encounter.ground if encounter.height <= judgement.NEAR_GROUND * longest else no_ground()
+    return encounter.ground if encounter.height <= NEAR_GROUND * longest else no_ground()
 
 
 def span_of(encounter: Encounter) -> Array:
-    """Start, rest and stop, s, clock of the tide: a row of spans of `judge_rows`."""
+    """Start, rest and stop of a run, s, clock of the tide."""
     stop, limit = encounter.t_stop, encounter.t_stop + TAIL
     if encounter.impact_time is not None:  # a body of any size has touched the ground by then
         stop = limit = max(encounter.impact_time, encounter.t_start)
     return np.array([encounter.t_start, stop, limit], dtype=float)
 
 
-def failure_of(out: Array, encounter: Encounter, tolerance: float) -> str:
-    """Reason that a row has no verdict; empty if it has one."""
-    if out[judgement.VERDICT] != judgement.FAILED:
+def failure_of(out: Any, encounter: Encounter, tolerance: float) -> str:
+    """Reason that an outcome has no verdict; empty if it has one."""
+    if out["verdict"] != FAILED:
         return ""
     return (
-        f"the integration stopped {out[judgement.TIME] - encounter.t_start:.1f} s after the start in the "
-        f"{REGIMES[int(out[judgement.REGIME])]} regime after {out[judgement.STEPS]:.0f} steps "
+        f"the integration stopped {out['time'] - encounter.t_start:.1f} s after the start in the "
+        f"{REGIMES[out['regime']]} regime after {out['steps']:.0f} steps "
         f"(tolerance {tolerance:g})"
     )

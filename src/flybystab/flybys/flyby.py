@@ -10,7 +10,7 @@ from flybystab.body.pile import Pile
 from flybystab.encounter.attitude import attitude_matrix
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput, NotConverged
-from flybystab.flybys.batch import TOLERANCE, Judged, axis_ratio, one_row, step_tolerance
+from flybystab.flybys.batch import TOLERANCE, FlybyRun, RowInputs, axis_ratio, one_row, step_tolerance
 from flybystab.flybys.grains_flyby import handed_on, request
 from flybystab.flybys.inputs import FlybyInputs
 from flybystab.flybys.result import FlybyResult
@@ -114,7 +114,7 @@ def flyby(
     return handed_on(result, body, encounter, rotation, asked, pile)
 
 
-def _comparison(inputs: FlybyInputs, row: tuple[Any, ...]) -> Judged:
+def _comparison(inputs: FlybyInputs, row: RowInputs) -> FlybyRun:
     """The run that measures the error: with a looser tolerance, or a tighter one where flow stalls the looser one."""
     tolerance = inputs.tolerance
     try:

@@ -10,8 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.body.body import Body, check_settled
-from flybystab.core.dynamics import verdict_row as judgement
+from flybystab.core.dynamics.verdict_row import OUTCOME
+from flybystab.core.dynamics.workspace import Limits
 from flybystab.core.numerics.threads import in_order, worker_count
+from flybystab.core.verdict_codes import FAILED
 from flybystab.encounter.attitude import attitude_matrices
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput, UnsettledBody
@@ -19,11 +21,11 @@ from flybystab.flybys.batch import (
     MAX_STEPS,
     TOLERANCE,
     axis_ratio,
-    buffers,
-    columns,
     failure_of,
-    judge_rows,
+    output_buffers,
+    records,
     step_tolerance,
+    verdict_rows,
 )
 from flybystab.flybys.table import FlybyTable
 from flybystab.flybys.verdict import Verdict, verdict_of
@@ -80,12 +82,13 @@ def flyby_many(
             failures[i] = str(reason)
     rows = np.flatnonzero(failures == "")
     phi = np.array([b.material.phi for b in bodies], dtype=float)
-    out = np.full((n, judgement.N_ANSWER), np.nan)
-    out[:, judgement.VERDICT] = judgement.FAILED
-    inputs = columns(bodies, rotations, encounters) if n else ()
+    out = np.empty(n, OUTCOME)
+    _fail(out)
+    inputs = records(bodies, rotations, encounters) if n else ()
+    limits = Limits(tolerance, max_axis_ratio, MAX_STEPS)
 
     def part(indices: NDArray[np.int64]) -> None:
-        judge_rows(indices, *inputs, tolerance, max_axis_ratio, MAX_STEPS, True, *buffers(0), out)
+        verdict_rows(indices, *inputs, limits, True, output_buffers(0, 0)._replace(outcomes=out))
 
     if threads == 1 or len(rows) < 2:
         if len(rows):
@@ -93,26 +96,31 @@ def flyby_many(
     else:  # rows that flow take longer: more parts than threads
         parts = min(len(rows), 16 * threads)
         list(in_order(part, [rows[k::parts].copy() for k in range(parts)], threads))
-    found = [verdict_of(int(row[judgement.VERDICT]), row[judgement.BOUND]) for row in out]
+    found = [verdict_of(int(row["verdict"]), row["bound_fraction"]) for row in out]
     names = np.array(["FAILED" if v is None else str(v) for v in found], dtype="U20")
     for lost in map(int, np.flatnonzero(names == "FAILED")):
         if not failures[lost]:
             failures[lost] = failure_of(out[lost], encounters[lost], tolerance)
-        out[lost] = np.nan
+        _fail(out[lost])
     paths = np.array(["path" if e.impact else "body" for e in encounters], dtype="U4")
-    axes, spin = out[:, judgement.AXES : judgement.AXES + 3], out[:, judgement.SPIN : judgement.SPIN + 3]
     return FlybyTable(
         verdict=names,
-        bound_fraction=out[:, judgement.BOUND],
-        semi_axes=axes * u.m,
-        spin=np.array([np.linalg.norm(w) for w in spin]) * u.rad / u.s,
-        max_required_friction_angle=np.rad2deg(out[:, judgement.FRICTION]) * u.deg,
-        margin=np.rad2deg(phi - out[:, judgement.FRICTION]) * u.deg,
-        spin_ratio=out[:, judgement.SPIN_RATIO],
-        pole_change=np.rad2deg(out[:, judgement.POLE_CHANGE]) * u.deg,
+        bound_fraction=out["bound_fraction"],
+        semi_axes=out["axes"] * u.m,
+        spin=np.array([np.linalg.norm(w) for w in out["spin"]]) * u.rad / u.s,
+        max_required_friction_angle=np.rad2deg(out["friction"]) * u.deg,
+        margin=np.rad2deg(phi - out["friction"]) * u.deg,
+        spin_ratio=out["spin_ratio"],
+        pole_change=np.rad2deg(out["pole_change"]) * u.deg,
         contact=np.where(names == Verdict.IMPACT, paths, ""),
         failure=failures.astype(str),
     )
+
+
+def _fail(rows: Any) -> None:
+    """Mark outcomes as not computed."""
+    for name in OUTCOME.names or ():
+        rows[name] = FAILED if OUTCOME[name].kind == "i" else np.nan
 
 
 def _all(kind: type[T], values: Any, name: str) -> list[T]:

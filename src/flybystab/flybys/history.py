@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from flybystab.core.dynamics.run import REGIMES
 from flybystab.core.material.yield_surface import required_frictions
-from flybystab.flybys.batch import Judged
+from flybystab.flybys.batch import FlybyRun
 from flybystab.flybys.inputs import FlybyInputs
 from flybystab.tabular import Tabular
 from flybystab.typing import Array
@@ -104,7 +104,7 @@ class FlybyError:
 
 
 def history_of(h: dict[str, Array], inputs: FlybyInputs) -> History:
-    """The history from the columns that the kernel wrote (:class:`flybystab.core.dynamics.run.Passage`)."""
+    """The history from the columns that the kernel wrote (:class:`flybystab.core.dynamics.run.Run`)."""
     m, encounter = inputs.body.material, inputs.encounter
     required = required_frictions(m.surface_code, m.c_pa, h["deviator"], h["pressure"], h["determinant"])
     return History(
@@ -121,7 +121,7 @@ def history_of(h: dict[str, Array], inputs: FlybyInputs) -> History:
     )
 
 
-def measured_error(run: Judged, other: Judged, tide_error: float) -> FlybyError:
+def measured_error(run: FlybyRun, other: FlybyRun, tide_error: float) -> FlybyError:
     """Differences between a run and another one with another step tolerance."""
     difference = 0.0 if run.friction == other.friction else abs(run.friction - other.friction)
     return FlybyError(

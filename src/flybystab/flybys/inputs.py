@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from flybystab.body.body import Body
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import NotConverged
-from flybystab.flybys.batch import Judged, judged
+from flybystab.flybys.batch import FlybyRun, RowInputs, flyby_run
 from flybystab.typing import Array
 
 
@@ -22,7 +22,7 @@ class FlybyInputs(NamedTuple):
     tolerance: float
     max_axis_ratio: float
 
-    def run(self, *, keep: int = 0, required: bool = False, row: tuple[Any, ...] | None = None) -> Judged:
+    def run(self, *, keep: int = 0, required: bool = False, row: RowInputs | None = None) -> FlybyRun:
         """Follow the body.
 
         Parameters
@@ -31,14 +31,14 @@ class FlybyInputs(NamedTuple):
             Rows of history at most.
         required : bool
             Whether to follow a body that yields once more as a rigid one, for the friction angle that it requires.
-        row : tuple, optional
+        row : RowInputs, optional
             ``one_row(body, encounter, rotation)``, if it is at hand.
 
         Raises
         ------
         NotConverged
         """
-        found = judged(
+        found = flyby_run(
             self.body, self.encounter, self.rotation, self.tolerance, self.max_axis_ratio, keep, required, row
         )
         if found.failure:

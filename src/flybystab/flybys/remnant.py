@@ -7,7 +7,7 @@ import numpy as np
 
 from flybystab.body.body import DENSITY_RANGE, Body
 from flybystab.core.ellipsoid.bound_mass import principal_axes
-from flybystab.flybys.batch import Judged
+from flybystab.flybys.batch import FlybyRun
 from flybystab.flybys.verdict import Verdict
 from flybystab.typing import Array
 
@@ -38,7 +38,7 @@ def final_attitude(shape: Array, spin: Array, along: float) -> Array:
     return np.stack([a1, np.cross(a3, a1), a3], axis=1)
 
 
-def state_after(run: Judged) -> str:
+def state_after(run: FlybyRun) -> str:
     """``Body.state`` at the end of a run."""
     if run.verdict == Verdict.IMPACT:
         return "on the ground"
@@ -47,7 +47,7 @@ def state_after(run: Judged) -> str:
     return run.regime
 
 
-def body_after(body: Body, run: Judged, attitude: Array, yielded: bool) -> Body:
+def body_after(body: Body, run: FlybyRun, attitude: Array, yielded: bool) -> Body:
     """The body at the end of a run, along the axes of `attitude`; brittle cohesion is lost with the first yield."""
     material = body.material
     if yielded and material.brittle:

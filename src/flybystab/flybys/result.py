@@ -17,7 +17,7 @@ from flybystab.body.surface_slope import SlopeChange
 from flybystab.constants import G
 from flybystab.core.ellipsoid.potential import carlson_fd
 from flybystab.encounter.encounter import Encounter
-from flybystab.flybys.batch import Judged
+from flybystab.flybys.batch import FlybyRun
 from flybystab.flybys.history import FlybyError, History, history_of, measured_error
 from flybystab.flybys.inputs import FlybyInputs, modelled
 from flybystab.flybys.remnant import body_after, final_attitude
@@ -64,16 +64,16 @@ class FlybyResult:
     inputs: FlybyInputs
     rung: str
     grains: GrainsOutcome | None
-    _run: Judged
-    _comparison: Judged | None
+    _run: FlybyRun
+    _comparison: FlybyRun | None
     _by_surface: dict[str, Verdict]
     _changed: dict[str, Any]
 
     def __init__(
         self,
         inputs: FlybyInputs,
-        _run: Judged,
-        _comparison: Judged | None = None,
+        _run: FlybyRun,
+        _comparison: FlybyRun | None = None,
         _by_surface: Mapping[str, Verdict] | None = None,
         _changed: Mapping[str, Any] | None = None,
         **changes: Any,

@@ -13,7 +13,7 @@ import numpy as np
 from astropy.units import Quantity
 
 from flybystab.body.body import Body, check_settled
-from flybystab.core.dynamics.run import passage
+from flybystab.core.dynamics.run import integrate
 from flybystab.core.dynamics.state import rotated_to_body, rotation_matrix
 from flybystab.core.ellipsoid.tide import TidePanels, tide_at
 from flybystab.core.numerics.jit import kernel
@@ -85,7 +85,7 @@ def rigid_course(
     rotation = periapsis_axes(encounter).T @ attitude_matrix(attitude)
     start, stop, limit = span_of(encounter)
     material = body.material
-    run = passage(
+    run = integrate(
         body.axes,
         body.rho,
         body.omega,

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from flybystab.body.body import YIELD_SURFACES
 from flybystab.errors import NotConverged
-from flybystab.flybys.batch import Judged
+from flybystab.flybys.batch import FlybyRun
 from flybystab.flybys.flyby_many import flyby_many
 from flybystab.flybys.inputs import FlybyInputs
 from flybystab.flybys.verdict import Verdict
@@ -64,7 +64,7 @@ class Robustness:
         return f"<Robustness: {', '.join(said)}>"
 
 
-def surface_verdicts(inputs: FlybyInputs, run: Judged, everything: bool = False) -> dict[str, Verdict]:
+def surface_verdicts(inputs: FlybyInputs, run: FlybyRun, everything: bool = False) -> dict[str, Verdict]:
     """Verdicts on all yield surfaces of a body that stays rigid (or `everything`), else on its own.
 
     A surface on which the run cannot be followed is left out.
@@ -89,7 +89,7 @@ def phases_of(value: Any) -> int:
     return whole(value, "robustness", 1)
 
 
-def robustness_of(inputs: FlybyInputs, run: Judged, phases: int) -> Robustness:
+def robustness_of(inputs: FlybyInputs, run: FlybyRun, phases: int) -> Robustness:
     """Verdicts over all yield surfaces, `phases` spin phases and three friction angles."""
     body, material = inputs.body, inputs.body.material
     momentum = body.axes**2

@@ -9,7 +9,7 @@ import numpy as np
 from astropy.units import Quantity
 
 from flybystab.errors import NotConverged
-from flybystab.flybys.batch import Judged
+from flybystab.flybys.batch import FlybyRun
 from flybystab.flybys.history import axes_of
 from flybystab.flybys.inputs import FlybyInputs
 from flybystab.flybys.verdict import CLASSES, Verdict, bound_fraction_upper
@@ -61,7 +61,7 @@ class VerdictMargins:
         return name, abs(self.relative[name])
 
 
-def verdict_margins(inputs: FlybyInputs, run: Judged) -> VerdictMargins:
+def verdict_margins(inputs: FlybyInputs, run: FlybyRun) -> VerdictMargins:
     """Margins of the verdict of a run."""
     body = inputs.body
     phi, bound = body.material.phi, float(run.bound)
@@ -91,7 +91,7 @@ def verdict_margins(inputs: FlybyInputs, run: Judged) -> VerdictMargins:
     )
 
 
-def _course(inputs: FlybyInputs, limit: float, run: Judged) -> tuple[float, float]:
+def _course(inputs: FlybyInputs, limit: float, run: FlybyRun) -> tuple[float, float]:
     """Largest axis ratio, followed past the limit, and largest strain up to it."""
     beyond = run.verdict == Verdict.BEYOND_MODEL
     history = run.history

@@ -23,7 +23,7 @@ from flybystab.catalogues.asteroid import identity
 from flybystab.catalogues.catalogue import Asteroid
 from flybystab.catalogues.tumbling import attitude_matrix, isotropic_direction
 from flybystab.constants import G
-from flybystab.core.dynamics.run import passage
+from flybystab.core.dynamics.run import integrate
 from flybystab.core.ellipsoid.yield_bound import quick_margins, tide_size
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
@@ -242,7 +242,7 @@ def _need(
     body: Body, turn: np.ndarray, encounter: Encounter, rho: float, cohesion: float, code: int
 ) -> float:
     """Largest friction angle (rad) that the rigid body mobilises in a passage."""
-    run = passage(
+    run = integrate(
         body.axes,
         rho,
         body.omega,

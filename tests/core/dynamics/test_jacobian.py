@@ -51,7 +51,7 @@ def test_columns_are_central_differences(surface, dilatancy, part, cohesion, vol
         encounter.tide.coefficients * unit**2,
     )
     par = parameters(np.array([1400.0, 850.0, 750.0]), 2000.0, np.deg2rad(35.0), cohesion, dilatancy, surface)
-    par[material.PART] = PARTS.get(part, material.FACE)
+    par = par._replace(material=material.on_part(par.material, PARTS.get(part, material.FACE), 0.0))
     work = state.empty_buffers()
     t, y = 0.3, flow(11, volume)
 
@@ -61,7 +61,7 @@ def test_columns_are_central_differences(surface, dilatancy, part, cohesion, vol
         return out
 
     jac, start = np.zeros((15, 16)), rate(t, y)
-    flow_jacobian(t, y, start, 1e-6, par, tide, work, jac, np.zeros((15, 15)))
+    flow_jacobian(t, y, start, 1e-6, par.material, tide, work, jac, np.zeros((15, 15)))
     steps = np.full(15, 1e-6)
     steps[6:12] *= 0.03
     differences = [

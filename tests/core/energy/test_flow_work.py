@@ -5,7 +5,7 @@ import inspect
 import numpy as np
 import pytest
 
-from flybystab.core.dynamics.run import passage
+from flybystab.core.dynamics.run import integrate
 from flybystab.core.ellipsoid.tide import no_tide
 from flybystab.core.energy.flow_work import LARGEST_VOLUME, gauss, gauss_up_to, growth_at, volume_at
 from flybystab.core.energy.perturbation import barrier, loss_at, pile, powers, rate_of_strain, slope_of_flow
@@ -59,7 +59,7 @@ def test_first_power_is_that_of_the_dynamics_of_a_small_perturbation(code, dilat
     density = 1.0 / (np.pi * 6.6743e-11)
     losses = []
     for t in (time, time / 2):
-        run = passage(
+        run = integrate(
             PILE,
             density,
             spin,
@@ -79,7 +79,7 @@ def test_first_power_is_that_of_the_dynamics_of_a_small_perturbation(code, dilat
 
 
 def test_the_dilation_is_that_of_the_dynamics():
-    assert inspect.signature(passage).parameters["expansion"].default == LARGEST_VOLUME
+    assert inspect.signature(integrate).parameters["expansion"].default == LARGEST_VOLUME
     for trace in (0.2, 1.1):
         t = np.linspace(0.0, 4.0, 40_001)
         volume = np.array([volume_at(trace, q) for q in t])

@@ -1,19 +1,21 @@
-"""The ends of a flow: their event functions, and the first of them in a step.
+"""Event functions of plastic flow, and the location of the first event in a step.
 
-The event functions are continuous, and positive while the flow goes on. A step is sampled on its dense output; where no
-sample is negative, a dip between them is looked for.
+The event functions are continuous, and positive while the flow goes on. They are sampled on the dense output of a step;
+where no sample is negative, a minimum between the samples is looked for.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
 from flybystab.core.dynamics.rates import rate
 from flybystab.core.dynamics.state import (
+    BEYOND_FACE,
     DETERMINANT,
     FLOWING,
     N_FULL,
-    PAST,
     PLACE,
     PRESSURE,
     STRENGTH,
@@ -21,6 +23,7 @@ from flybystab.core.dynamics.state import (
     W_SCRATCH,
     W_SINV,
     W_VECTORS,
+    Parameters,
 )
 from flybystab.core.dynamics.steppers import explicit_at, implicit_at
 from flybystab.core.dynamics.workspace import (
@@ -30,24 +33,34 @@ from flybystab.core.dynamics.workspace import (
     LOSS,
     N_SAMPLE,
     SWITCH,
-    Counts,
+    Log,
     Workspace,
+    keeps_history,
     record,
 )
-from flybystab.core.ellipsoid.self_gravity import spread
+from flybystab.core.ellipsoid.self_gravity import invariant_ratio
 from flybystab.core.ellipsoid.tide import TidePanels
-from flybystab.core.material.parameters import (
-    BESIDE,
-    COHESION,
-    COMPRESSION_CORNER,
-    FACE,
-    PART,
-    SIN_PHI,
-    SMOOTH,
-)
+from flybystab.core.material.parameters import COMPRESSION_CORNER, FACE, SMOOTH
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import eigensystem
 from flybystab.typing import Array
+
+
+class Flow(NamedTuple):
+    """Parameters of a flow, and where it ends."""
+
+    par: Parameters
+    tide: TidePanels
+    limit2: float  # square of the axis ratio beyond which the model is left
+    fade_volume: float  # V/V0 at which the dilatancy begins to fade; infinite if it does not, or has begun
+
+
+class FlowStep(NamedTuple):
+    """A step of flow from ``ws.y`` at `t` over `h`, explicit or implicit."""
+
+    explicit: bool
+    t: float
+    h: float
 
 
 @kernel
@@ -59,69 +72,70 @@ def axis_ratio2(y: Array, ws: Workspace) -> float:
 
 
 @kernel
-def health(
-    t: float, y: Array, dy: Array, par: Array, tide: TidePanels, limit2: float, ws: Workspace
-) -> float:
-    """Least of the event functions of flow; negative once one of them is over. Sets the rate `dy`.
+def least_event(t: float, y: Array, dy: Array, flow: Flow, ws: Workspace) -> tuple[float, int]:
+    """Least of the event functions of flow, negative once the flow has ended, and its code. Sets the rate `dy`.
 
-    They are the strength ``k P + k c`` (the pressure of a fluid), the denominator of the pressure, the distance
-    from the axis ratio where the model is left, from the volume ``ws.mark[4]`` where the dilatancy begins to fade,
-    and on Mohr-Coulomb from the end of the face or of the fan of the corner where the stress is. ``ws.mark[3]`` keeps
-    the code of the least.
+    The event functions are the strength ``k P + k c`` (the pressure of a fluid), the denominator of the pressure, the
+    distance from the axis ratio where the model is left, from the volume where the dilatancy begins to fade, and on
+    Mohr-Coulomb from the end of the face or of the fan of the corner where the stress is.
     """
-    denominator = rate(FLOWING, t, y, dy, par, tide, ws.work)
+    par = flow.par
+    material = par.material
+    denominator = rate(FLOWING, t, y, dy, par, flow.tide, ws.work)
     strength = ws.work.s[STRENGTH]
-    if par[SIN_PHI] == 0.0 and par[COHESION] == 0.0:
+    if material.sin_phi == 0.0 and material.cohesion == 0.0:
         strength = ws.work.s[PRESSURE]
     below = np.inf
-    ratio = np.sqrt(limit2)
-    if spread(y[0:6], ws.work.m[W_SINV]) > (ratio + 1.0 + 1.0 / ratio) ** 2:
-        below = limit2 - axis_ratio2(y, ws)
-    # Past a vanishing denominator the sign of the strength says nothing.
+    ratio = np.sqrt(flow.limit2)
+    if invariant_ratio(y[0:6], ws.work.m[W_SINV]) > (ratio + 1.0 + 1.0 / ratio) ** 2:
+        below = flow.limit2 - axis_ratio2(y, ws)
+    # Past a vanishing denominator the sign of the strength is undefined.
     if not denominator > 0.0:
         strength = np.inf
-    part = int(par[PART])
     inside = np.inf
-    if part != SMOOTH and denominator > 0.0 and strength > 0.0:
-        place, past = ws.work.s[PLACE], ws.work.s[PAST]
-        if part == FACE:
+    if material.part != SMOOTH and denominator > 0.0 and strength > 0.0:
+        place, beyond = ws.work.s[PLACE], ws.work.s[BEYOND_FACE]
+        if material.part == FACE:
             inside = min(place, 1.0 - place)
         else:
-            inside = par[BESIDE] + (past if part == COMPRESSION_CORNER else -past)
+            inside = material.fan_limit + (beyond if material.part == COMPRESSION_CORNER else -beyond)
     ends = ws.ends
     ends[0, -1], ends[1, -1], ends[2, -1], ends[3, -1] = below, denominator, strength, inside
-    least = below
-    ws.mark[3] = BEYOND
+    least, code = below, BEYOND
     if denominator < least:
-        least = denominator
-        ws.mark[3] = JAM
+        least, code = denominator, JAM
     if strength < least:
-        least = strength
-        ws.mark[3] = LOSS
+        least, code = strength, LOSS
     if inside < least:
-        least = inside
-        ws.mark[3] = SWITCH
-    ahead = ws.mark[4] - ws.work.s[VOLUME]
+        least, code = inside, SWITCH
+    ahead = flow.fade_volume - ws.work.s[VOLUME]
     if ahead < least:
-        least = ahead
-        ws.mark[3] = FADE
-    return least
+        least, code = ahead, FADE
+    return least, code
 
 
 @kernel
 def sample(a: int, b: int, ws: Workspace) -> None:
-    """Copy the event functions at a sample `a` to `b`; -1 are those that `health` leaves."""
+    """Copy the event functions at a sample `a` to `b`; -1 are those that `least_event` leaves."""
     for i in range(4):
         ws.ends[i, b] = ws.ends[i, a]
 
 
 @kernel
-def inside(explicit: bool, x: float, y: Array, ws: Workspace) -> None:
+def interpolate(x: float, step: FlowStep, ws: Workspace) -> None:
     """State ``ws.ys`` at the fraction `x` of a step just made."""
-    if explicit:
-        explicit_at(x, y, N_FULL, ws.dense, ws.ys)
+    if step.explicit:
+        explicit_at(x, ws.y, N_FULL, ws.dense, ws.ys)
     else:
-        implicit_at(x, y, N_FULL, ws.dense, ws.y1, ws.ys)
+        implicit_at(x, ws.y, N_FULL, ws.dense, ws.y1, ws.ys)
+
+
+@kernel
+def _least_inside(x: float, step: FlowStep, flow: Flow, ws: Workspace) -> float:
+    """Least event function at the fraction `x` of a step."""
+    interpolate(x, step, ws)
+    least, _ = least_event(step.t + x * step.h, ws.ys, ws.spare[:15], flow, ws)
+    return least
 
 
 @kernel
@@ -138,24 +152,14 @@ def _lowest(xa: float, va: float, xb: float, vb: float, xc: float, vc: float) ->
 
 
 @kernel
-def _dip(
-    explicit: bool,
-    t: float,
-    y: Array,
-    h: float,
-    points: int,
-    par: Array,
-    tide: TidePanels,
-    limit2: float,
-    ws: Workspace,
-) -> tuple[float, float, bool]:
-    """Where in a step an event function is below zero between two samples of it that are not, and the one before.
+def _minimum(step: FlowStep, points: int, flow: Flow, ws: Workspace) -> tuple[float, float, bool]:
+    """Fraction of a step at which an event function is negative between two samples, and of the sample before it.
 
-    ``ws.ends`` has the samples. Where a parabola through three of them falls towards zero, its lowest point is looked
-    at: contact may be lost in a dip of the pressure that is shorter than a step. The place is 2 where there is none;
-    the last answer is whether anything was looked at.
+    ``ws.ends`` has the samples, none of them negative. Where a parabola through three of them falls towards zero, its
+    lowest point is evaluated: contact may be lost during a minimum of the pressure that is shorter than a step. The
+    fraction is 2 where there is none; the last value is whether any point was evaluated.
     """
-    looked = False
+    evaluated = False
     for i in range(4):
         for j in range(1, points):
             xa, xb, xc = (j - 1.0) / points, float(j) / points, (j + 1.0) / points
@@ -165,10 +169,9 @@ def _dip(
                 least = min(va, min(vb, vc))
                 if not x < np.inf or x == xb or not (v < 0.5 * least or least < 0.1 * max(va, max(vb, vc))):
                     break
-                looked = True
-                inside(explicit, x, y, ws)
-                if health(t + x * h, ws.ys, ws.spare[:15], par, tide, limit2, ws) < 0.0:
-                    return x, xa if x < xb else xb, looked
+                evaluated = True
+                if _least_inside(x, step, flow, ws) < 0.0:
+                    return x, xa if x < xb else xb, evaluated
                 v = ws.ends[i, -1]
                 if v > vb:
                     if x < xb:
@@ -179,104 +182,71 @@ def _dip(
                     xc, vc, xb, vb = xb, vb, x, v
                 else:
                     xa, va, xb, vb = xb, vb, x, v
-    return 2.0, 0.0, looked
+    return 2.0, 0.0, evaluated
 
 
 @kernel
-def first_end(
-    explicit: bool,
-    t: float,
-    y: Array,
-    h: float,
-    f0: Array,
-    par: Array,
-    tide: TidePanels,
-    limit2: float,
-    ws: Workspace,
-) -> float:
-    """Fraction of the step just made at which an end of flow is reached first; 2 if none is.
+def first_event(step: FlowStep, f0: Array, flow: Flow, ws: Workspace) -> tuple[float, int]:
+    """Fraction of the step just made at which an event is reached first, 2 if none is, and its code.
 
-    ``ws.mark[3]`` gets the code of that end. Where there is none, `f0` gets the rate at the end of the step, the
-    stress there is left in ``ws.work``, and the event functions in ``ws.ends`` as the first of the next step.
+    Where there is none, `f0` gets the rate at the end of the step, the stress there is left in ``ws.work``, and the
+    event functions in ``ws.ends`` as the first of the next step.
     """
-    spare = ws.spare[:15]
+    t, h = step.t, step.h
     found = 2.0
     low = 0.0
-    points = 4 if explicit else 2
+    points = 4 if step.explicit else 2
+    code = BEYOND
     for j in range(1, points + 1):
         x = j / points
         if j < points:
-            inside(explicit, x, y, ws)
-            least = health(t + x * h, ws.ys, spare, par, tide, limit2, ws)
+            least = _least_inside(x, step, flow, ws)
         else:
-            least = health(t + h, ws.y1, f0, par, tide, limit2, ws)
+            least, code = least_event(t + h, ws.y1, f0, flow, ws)
         sample(-1, j, ws)
         if least < 0.0:
             found = x
             break
         low = x
     if found > 1.0:
-        found, low, looked = _dip(explicit, t, y, h, points, par, tide, limit2, ws)
+        found, low, evaluated = _minimum(step, points, flow, ws)
         if found > 1.0:
-            if looked:
-                health(t + h, ws.y1, f0, par, tide, limit2, ws)
+            if evaluated:
+                least_event(t + h, ws.y1, f0, flow, ws)
             sample(points, 0, ws)
-            return found
+            return found, code
     high = found
     for _ in range(52):
         mid = 0.5 * (low + high)
-        inside(explicit, mid, y, ws)
-        if health(t + mid * h, ws.ys, spare, par, tide, limit2, ws) < 0.0:
+        if _least_inside(mid, step, flow, ws) < 0.0:
             high = mid
         else:
             low = mid
-    inside(explicit, high, y, ws)
-    health(t + high * h, ws.ys, spare, par, tide, limit2, ws)
-    return high
+    interpolate(high, step, ws)
+    _, code = least_event(t + high * h, ws.ys, ws.spare[:15], flow, ws)
+    return high, code
 
 
 @kernel
-def record_flow(t: float, y: Array, par: Array, ws: Workspace, hist: Array, count: Counts) -> None:
-    """Append a state of flow to the history, with the stress that `health` has left of it."""
+def record_flow(t: float, y: Array, par: Parameters, ws: Workspace, log: Log) -> None:
+    """Append a state of flow to the history, with the stress that `least_event` has left."""
     s = ws.work.s
-    record(t, FLOWING, y, par, s[PRESSURE], s[STRENGTH], s[DETERMINANT], ws, hist, count)
+    record(t, FLOWING, y, par, s[PRESSURE], s[STRENGTH], s[DETERMINANT], ws, log)
 
 
 @kernel
-def record_end(
-    t: float,
-    y: Array,
-    dy: Array,
-    par: Array,
-    tide: TidePanels,
-    limit2: float,
-    ws: Workspace,
-    hist: Array,
-    count: Counts,
-) -> None:
+def record_end(t: float, y: Array, dy: Array, flow: Flow, ws: Workspace, log: Log) -> None:
     """Append the last state of a flow to the history."""
-    if hist.shape[0] > 1:
-        health(t, y, dy, par, tide, limit2, ws)
-        record_flow(t, y, par, ws, hist, count)
+    if keeps_history(log):
+        least_event(t, y, dy, flow, ws)
+        record_flow(t, y, flow.par, ws, log)
 
 
 @kernel
-def record_inside(
-    explicit: bool,
-    t: float,
-    y: Array,
-    h: float,
-    dy: Array,
-    par: Array,
-    tide: TidePanels,
-    limit2: float,
-    ws: Workspace,
-    hist: Array,
-    count: Counts,
-) -> None:
+def record_inside(step: FlowStep, dy: Array, flow: Flow, ws: Workspace, log: Log) -> None:
     """Append the quarters of a step to the history."""
     for j in range(1, N_SAMPLE):
         x = j / N_SAMPLE
-        inside(explicit, x, y, ws)
-        health(t + x * h, ws.ys, dy, par, tide, limit2, ws)
-        record_flow(t + x * h, ws.ys, par, ws, hist, count)
+        interpolate(x, step, ws)
+        least_event(step.t + x * step.h, ws.ys, dy, flow, ws)
+        record_flow(step.t + x * step.h, ws.ys, flow.par, ws, log)

@@ -2,25 +2,25 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from flybystab.core.dynamics.flow_events import (
-    first_end,
-    health,
+    Flow,
+    FlowStep,
+    first_event,
+    least_event,
     record_end,
     record_flow,
     record_inside,
     sample,
 )
-from flybystab.core.dynamics.ground import Ground, touches
+from flybystab.core.dynamics.ground import Ground, Step, contact_time
 from flybystab.core.dynamics.jacobian import flow_jacobian
-from flybystab.core.dynamics.mohr_coulomb_hexagon import choose_part, settle
-from flybystab.core.dynamics.state import FLOWING, N_FULL
-from flybystab.core.dynamics.steppers import (
-    explicit_dense,
-    explicit_step,
-    implicit_step,
-)
+from flybystab.core.dynamics.rates import rate
+from flybystab.core.dynamics.state import BEYOND_FACE, FLOWING, N_FULL, PLACE, W_N, Parameters
+from flybystab.core.dynamics.steppers import explicit_dense, explicit_step, implicit_step
 from flybystab.core.dynamics.workspace import (
     ARREST,
     D_REST,
@@ -29,13 +29,20 @@ from flybystab.core.dynamics.workspace import (
     STUCK,
     SWITCH,
     TOUCH,
-    Counts,
+    Limits,
+    Log,
     Workspace,
     copy,
+    count_rejected,
+    count_step,
+    drop_last_row,
+    exhausted,
+    keeps_history,
 )
 from flybystab.core.ellipsoid.tide import TidePanels
-from flybystab.core.material.flow_rule import fade
-from flybystab.core.material.parameters import BETA
+from flybystab.core.material.flow_rule import fade_start
+from flybystab.core.material.mohr_coulomb_hexagon import on_hexagon, part_of_flow, restore_flow_rule
+from flybystab.core.material.parameters import FACE, SMOOTH, on_part
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import determinant, deviator
 from flybystab.typing import Array
@@ -58,14 +65,39 @@ _BRIEF = 0.1
 _TIGHT = 1e-8
 
 
+class Method(NamedTuple):
+    """State of the choice between explicit and implicit steps.
+
+    Near onset and rest, where the direction of ``D`` relaxes as ``1/|D|``, the steps are implicit; in between, where
+    explicit ones of order 8 can be longer without losing stability, they are explicit.
+    """
+
+    explicit: bool
+    pull: float  # rate of relaxation times |D|, from the last Jacobian
+    slow: float  # |D| at which explicit steps end
+    implicit_ahead: int  # implicit steps at least before explicit ones
+
+
 @kernel
-def _step(explicit: bool, t: float, y: Array, h: float, par: Array, tide: TidePanels, ws: Workspace) -> float:
-    """One step of flow to ``ws.y1``, explicit (with its first rate in ``ws.k[0]``) or implicit; returns the error."""
+def _choose_part(t: float, near: float, par: Parameters, tide: TidePanels, ws: Workspace) -> Parameters:
+    """Put the stress on the part of the yield section that belongs to the flow ``ws.y``.
+
+    That is a face if ``D``, within the Lode angle `near`, is normal to one and can stay so, or else a corner.
+    """
+    if not on_hexagon(par.material):
+        return Parameters(on_part(par.material, SMOOTH, par.material.fan_limit), par.rigid)
+    par = Parameters(on_part(par.material, FACE, par.material.fan_limit), par.rigid)
+    rate(FLOWING, t, ws.y, ws.spare[:15], par, tide, ws.work)
+    s = ws.work.s
+    return Parameters(part_of_flow(s[BEYOND_FACE], s[PLACE], near, par.material), par.rigid)
+
+
+@kernel
+def _step(explicit: bool, t: float, h: float, flow: Flow, ws: Workspace) -> float:
+    """One step of flow from ``ws.y`` to ``ws.y1``; an explicit one has its first rate in ``ws.k[0]``."""
     if explicit:
-        return explicit_step(FLOWING, t, y, N_FULL, h, par, tide, ws.work, ws.k, ws.scale, ws.y1)
-    return implicit_step(
-        t, y, h, par, tide, ws.work, ws.jac, ws.lu, ws.pivots, ws.k, ws.scale, ws.y1, ws.dense
-    )
+        return explicit_step(FLOWING, t, N_FULL, h, flow.par, flow.tide, ws)
+    return implicit_step(t, h, flow.par, flow.tide, ws)
 
 
 @kernel
@@ -95,147 +127,187 @@ def _stiffness(jac: Array, v: Array) -> float:
 
 
 @kernel
+def _choose_method(
+    method: Method, t: float, h: float, d: float, f0: Array, flow: Flow, ws: Workspace
+) -> Method:
+    """Method of the next step, of length `h` at first, from ``|D|``; an implicit one has its Jacobian in ``ws.jac``."""
+    explicit, pull, slow, ahead = method.explicit, method.pull, method.slow, method.implicit_ahead
+    if explicit and (d < slow or h * pull > _HELD * d):
+        explicit, ahead = False, _BETWEEN
+    if not explicit:
+        flow_jacobian(t, ws.y, f0, 1e-6, flow.par.material, flow.tide, ws.work, ws.jac, ws.lu)
+        pull = d * _stiffness(ws.jac, ws.spare[:15])
+        ahead -= 1
+        if ahead < 0 and 1.5 * h * pull < _STABLE * d:
+            explicit, slow = True, 0.5 * d
+    return Method(explicit, pull, slow, ahead)
+
+
+@kernel
+def _accepted_step(
+    explicit: bool, t: float, t1: float, h: float, flow: Flow, limits: Limits, ws: Workspace, log: Log
+) -> tuple[float, float, float]:
+    """Make a step of at most `h` towards `t1`, shortened until its error is allowed.
+
+    Returns its error (nan where none could be made), its length, and the largest growth of the next one.
+    """
+    growth = 6.0
+    while True:
+        if exhausted(log, limits):
+            return np.nan, h, growth
+        if h >= t1 - t:
+            h = t1 - t
+        error = _step(explicit, t, h, flow, ws)
+        count_step(log)
+        if error <= 1.0:
+            return error, h, growth
+        count_rejected(log)
+        # Near onset the error falls slower than the order says: a second refusal halves the step at least.
+        most = 0.9 if growth > 1.0 else 0.5
+        growth = 1.0
+        h *= min(most, max(0.1, 0.9 * error ** (-0.125 if explicit else -0.2))) if np.isfinite(error) else 0.1
+        if h < 1e-15 * max(1.0, abs(t)):
+            return np.nan, h, growth
+
+
+@kernel
+def _set_scale(d: float, tolerance: float, ws: Workspace) -> None:
+    """Set the errors allowed in a step that starts at ``|D|`` = `d`."""
+    for i in range(6):
+        ws.scale[i] = tolerance
+        ws.scale[6 + i] = tolerance * max(d, 1e-4)
+    for i in range(12, 15):
+        ws.scale[i] = tolerance
+
+
+@kernel
+def _strain_rate(f0: Array, ws: Workspace) -> tuple[float, float]:
+    """``|D'|`` of ``ws.y`` and its derivative ``Dhat:Ddot`` from the rate `f0`."""
+    _, d, _ = deviator(ws.y[6:12], ws.stress)
+    trend = 0.0
+    for i in range(3):
+        trend += ws.stress[i] * f0[6 + i] + 2.0 * ws.stress[3 + i] * f0[9 + i]
+    return d, trend
+
+
+@kernel
+def _step_to_event(
+    step: FlowStep, end: float, goes_on: bool, flow: Flow, ws: Workspace, log: Log
+) -> FlowStep:
+    """Repeat a step up to the fraction `end`: with the order of the method in place of that of the interpolant."""
+    explicit, t, h = step.explicit, step.t, step.h * end
+    _step(explicit, t, h, flow, ws)
+    step = FlowStep(explicit, t, h)
+    if goes_on and keeps_history(log):
+        if explicit:
+            explicit_dense(FLOWING, t, N_FULL, h, flow.par, flow.tide, ws)
+        record_inside(step, ws.spare[:15], flow, ws, log)
+    copy(ws.y1, ws.y, N_FULL)
+    return step
+
+
+@kernel
 def follow_flow(
     t: float,
     t1: float,
-    par: Array,
+    par: Parameters,
     tide: TidePanels,
     ground: Ground,
-    tol: float,
-    limit: float,
-    max_steps: int,
+    limits: Limits,
     ws: Workspace,
-    hist: Array,
-    count: Counts,
+    log: Log,
 ) -> tuple[int, float]:
-    """Plastic flow of ``ws.y`` up to one of its ends or `t1`; returns (reason, time).
-
-    Near onset and rest, where the direction of ``D`` relaxes as ``1/|D|``, the steps are implicit; in between, where
-    explicit ones of order 8 can be longer without losing stability, they are explicit.
-    """
-    y = ws.y
+    """Plastic flow of ``ws.y`` up to one of its ends or `t1`; returns (reason, time)."""
+    y, tol = ws.y, limits.tolerance
     f0 = ws.spare[15:30]
-    spare = ws.spare[:15]
     h = 1e-4
-    explicit = False
-    pull = 0.0  # rate of relaxation times |D|, from the last Jacobian
-    slow = 0.0  # |D| at which explicit steps end
-    implicit_ahead = 0
-    limit2 = limit * limit
+    method = Method(False, 0.0, 0.0, 0)
     touched = False
     near = 1e-6 + 10.0 * tol  # the direction of D is known no better
     fastest = 0.0
-    choose_part(t, y, par, tide, near, ws)
+    par = _choose_part(t, near, par, tide, ws)
     # A step must not straddle the kink of the dilatancy: plastic flow only ever dilates, and passes it once.
-    ws.mark[4] = fade(par) if par[BETA] > 0.0 and np.sqrt(determinant(y[0:6])) < fade(par) else np.inf
-    if health(t, y, f0, par, tide, limit2, ws) < 0.0:
-        return int(ws.mark[3]), t
+    fading = fade_start(par.material)
+    if not (par.material.beta > 0.0 and np.sqrt(determinant(y[0:6])) < fading):
+        fading = np.inf
+    flow = Flow(par, tide, limits.axis_ratio * limits.axis_ratio, fading)
+    least, reason = least_event(t, y, f0, flow, ws)
+    if least < 0.0:
+        return reason, t
     sample(-1, 0, ws)
     while t < t1:
         # Here f0 and the stress in `ws.work` belong to (t, y).
-        record_flow(t, y, par, ws, hist, count)
-        _, d, _ = deviator(y[6:12], ws.stress)
-        # d|D'|/dt = Dhat : Ddot
-        trend = 0.0
-        for i in range(3):
-            trend += ws.stress[i] * f0[6 + i] + 2.0 * ws.stress[3 + i] * f0[9 + i]
+        record_flow(t, y, flow.par, ws, log)
+        d, trend = _strain_rate(f0, ws)
         fastest = max(fastest, d)
         if d < 1e-2 * fastest and d < _BRIEF * max(tol, _TIGHT) * -trend:
-            # Rest is nearer than the tolerance can tell: the direction of so small a D is noise, and on a sharp corner
+            # The time to rest is below the tolerance: the direction of so small a D is noise, and on a sharp corner
             # of the yield section, which turns the stress with it, D would never come to rest.
             for i in range(N_FULL):
                 y[i] += d / -trend * f0[i]
             return ARREST, t + d / -trend
-        if explicit and (d < slow or h * pull > _HELD * d):
-            explicit, implicit_ahead = False, _BETWEEN
-        if not explicit:
-            flow_jacobian(t, y, f0, 1e-6, par, tide, ws.work, ws.jac, ws.lu)
-            pull = d * _stiffness(ws.jac, spare)
-            implicit_ahead -= 1
-            if implicit_ahead < 0 and 1.5 * h * pull < _STABLE * d:
-                explicit, slow = True, 0.5 * d
-        if explicit:
+        method = _choose_method(method, t, h, d, f0, flow, ws)
+        if method.explicit:
             copy(f0, ws.k[0], N_FULL)
-            h = min(h, _STABLE * d / pull)
+            h = min(h, _STABLE * d / method.pull)
         if trend < 0.0:
             # |D| falls linearly to arrest, its direction relaxes as 1/|D|: approach it geometrically.
             h = min(h, _APPROACH * d / -trend)
-        for i in range(6):
-            ws.scale[i] = tol
-            ws.scale[6 + i] = tol * max(d, 1e-4)
-        for i in range(12, 15):
-            ws.scale[i] = tol
-        growth = 6.0
-        while True:
-            if count[2] >= max_steps:
-                return STUCK, t
-            last = h >= t1 - t
-            if last:
-                h = t1 - t
-            error = _step(explicit, t, y, h, par, tide, ws)
-            count[2] += 1
-            if error <= 1.0:
-                break
-            count[3] += 1
-            # Near onset the error falls slower than the order says: a second refusal halves the step at least.
-            most = 0.9 if growth > 1.0 else 0.5
-            growth = 1.0
-            h *= (
-                min(most, max(0.1, 0.9 * error ** (-0.125 if explicit else -0.2)))
-                if np.isfinite(error)
-                else 0.1
-            )
-            if h < 1e-15 * max(1.0, abs(t)):
-                return STUCK, t
-        # On the way and at the end: has one of the event functions changed its sign?
-        if explicit:
-            explicit_dense(FLOWING, t, y, N_FULL, h, par, tide, ws.work, ws.k, ws.y1, ws.ys, ws.dense)
+        _set_scale(d, tol, ws)
+        error, h, growth = _accepted_step(method.explicit, t, t1, h, flow, limits, ws, log)
+        if not error <= 1.0:
+            return STUCK, t
+        last = h >= t1 - t
+        step = FlowStep(method.explicit, t, h)
+        if step.explicit:
+            explicit_dense(FLOWING, t, N_FULL, h, flow.par, tide, ws)
         if not touched:
-            end_time = touches(FLOWING, explicit, t, h, par, ground, ws)
-            if end_time < np.inf:  # the step again, up to there
+            end_time = contact_time(Step(FLOWING, step.explicit, t, h, par.rigid), ground, ws)
+            if end_time < np.inf:  # repeat the step up to the contact
                 touched = True
                 t1 = end_time
-                count[0] = max(count[0] - 1, 0)
-                health(t, y, f0, par, tide, limit2, ws)
+                drop_last_row(log)
+                least_event(t, y, f0, flow, ws)
                 continue
-        end = first_end(explicit, t, y, h, f0, par, tide, limit2, ws)
+        end, reason = first_event(step, f0, flow, ws)
         if end <= 1.0:
-            reason = int(ws.mark[3])
-            # Repeat the step up to the root: the order of the method instead of that of the interpolant.
-            h *= end
-            _step(explicit, t, y, h, par, tide, ws)
             goes_on = reason in (SWITCH, FADE)
-            if goes_on and hist.shape[0] > 1:
-                if explicit:
-                    explicit_dense(FLOWING, t, y, N_FULL, h, par, tide, ws.work, ws.k, ws.y1, ws.ys, ws.dense)
-                record_inside(explicit, t, y, h, spare, par, tide, limit2, ws, hist, count)
-            copy(ws.y1, y, N_FULL)
+            step = _step_to_event(step, end, goes_on, flow, ws, log)
+            h = step.h
             t += h
             if not goes_on:
-                record_end(t, y, f0, par, tide, limit2, ws, hist, count)
+                record_end(t, y, f0, flow, ws, log)
                 return reason, t
             if reason == FADE:
-                ws.mark[4] = np.inf
+                flow = Flow(flow.par, tide, flow.limit2, np.inf)
                 h /= end
             else:
-                choose_part(t, y, par, tide, near, ws)
+                flow = Flow(_choose_part(t, near, flow.par, tide, ws), tide, flow.limit2, flow.fade_volume)
                 h = max(h, 1e-4)
-                explicit, implicit_ahead = False, _BETWEEN
-            if health(t, y, f0, par, tide, limit2, ws) < 0.0:
-                return int(ws.mark[3]), t
+                method = Method(False, method.pull, method.slow, _BETWEEN)
+            least, reason = least_event(t, y, f0, flow, ws)
+            if least < 0.0:
+                return reason, t
             sample(-1, 0, ws)
             continue
-        if hist.shape[0] > 1:
-            record_inside(explicit, t, y, h, spare, par, tide, limit2, ws, hist, count)
-            health(t + h, ws.y1, f0, par, tide, limit2, ws)
+        if keeps_history(log):
+            record_inside(step, ws.spare[:15], flow, ws, log)
+            least_event(t + h, ws.y1, f0, flow, ws)
         t = t1 if last else t + h
         copy(ws.y1, y, N_FULL)
-        if settle(y, par, ws.scale[6], ws):
-            health(t, y, f0, par, tide, limit2, ws)
+        material = flow.par.material
+        volume = np.sqrt(determinant(y[0:6]))
+        beyond = ws.work.s[BEYOND_FACE]
+        if restore_flow_rule(y[6:12], volume, beyond, material, ws.scale[6], ws.stress, ws.work.m[W_N]):
+            least_event(t, y, f0, flow, ws)
         _, d, _ = deviator(y[6:12], ws.stress)
         if d < D_REST:
-            record_end(t, y, f0, par, tide, limit2, ws, hist, count)
+            record_end(t, y, f0, flow, ws, log)
             return ARREST, t
-        h *= min(growth, max(0.2, 0.9 * error ** (-0.125 if explicit else -0.2))) if error > 0.0 else growth
-    record_end(t, y, f0, par, tide, limit2, ws, hist, count)
+        h *= (
+            min(growth, max(0.2, 0.9 * error ** (-0.125 if step.explicit else -0.2)))
+            if error > 0.0
+            else growth
+        )
+    record_end(t, y, f0, flow, ws, log)
     return TOUCH if touched else DONE, t

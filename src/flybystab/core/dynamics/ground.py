@@ -1,4 +1,4 @@
-"""The ground below a passage: whether and when the body reaches it.
+"""Contact of the body with the surface of the planet.
 
 A body with the shape tensor ``S`` extends ``h = sqrt(n.S.n)`` from its centre towards the planet, ``n`` the unit vector
 to it: the support function of the ellipsoid. It touches once its centre is no higher than ``h``. The tangent plane
@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from flybystab.core.dynamics.state import N_FULL, N_RIGID, RIGID, S1, S2, S3, W_SCRATCH, rotation_matrix
+from flybystab.core.dynamics.state import N_FULL, N_RIGID, RIGID, W_SCRATCH, RigidShape, rotation_matrix
 from flybystab.core.dynamics.steppers import explicit_at, implicit_at
 from flybystab.core.dynamics.workspace import Workspace
 from flybystab.core.ellipsoid.tide import panel_at
@@ -27,7 +27,7 @@ _DENSE, _LEAST, _MOST = 16, 8, 4000
 
 
 class Ground(NamedTuple):
-    """Where the planet is, seen from the body.
+    """Position of the planet relative to the body as a function of time.
 
     Attributes
     ----------
@@ -77,35 +77,43 @@ def _direction(t: float, ground: Ground, n: Array) -> float:
 
 
 @kernel
-def _reach(regime: int, y: Array, par: Array, n: Array, m: Array) -> float:
+def _reach(regime: int, y: Array, rigid: RigidShape, n: Array, m: Array) -> float:
     """Extent ``sqrt(n.S.n)`` of the body along ``n[3]``, in units of the body; `m` is scratch (3, 3)."""
     if regime == RIGID:
         rotation_matrix(y, m)
         s = 0.0
-        for i in range(3):
+        for i, square in enumerate((rigid.s1, rigid.s2, rigid.s3)):
             along = m[0, i] * n[0] + m[1, i] * n[1] + m[2, i] * n[2]
-            s += par[S1 + i] * along * along
+            s += square * along * along
         return np.sqrt(s)
     s = y[0] * n[0] * n[0] + y[1] * n[1] * n[1] + y[2] * n[2] * n[2]
     s += 2.0 * (y[3] * n[0] * n[1] + y[4] * n[0] * n[2] + y[5] * n[1] * n[2])
     return np.sqrt(s)
 
 
+class Step(NamedTuple):
+    """A step just made, from ``ws.y`` at `t` to ``ws.y1`` at ``t + h``, with its dense output."""
+
+    regime: int
+    explicit: bool
+    t: float
+    h: float
+    rigid: RigidShape
+
+
 @kernel
-def _gap(
-    regime: int, explicit: bool, t: float, h: float, when: float, par: Array, ground: Ground, ws: Workspace
-) -> float:
-    """Height of the body's lowest point above the ground at the time `when` of the step from `t` by `h`, m."""
-    x = (when - t) / h
-    if regime == RIGID:
+def _gap(when: float, step: Step, ground: Ground, ws: Workspace) -> float:
+    """Height of the body's lowest point above the ground at the time `when` of a step, m."""
+    x = (when - step.t) / step.h
+    if step.regime == RIGID:
         explicit_at(x, ws.y, N_RIGID, ws.dense, ws.ys)
-    elif explicit:
+    elif step.explicit:
         explicit_at(x, ws.y, N_FULL, ws.dense, ws.ys)
     else:
         implicit_at(x, ws.y, N_FULL, ws.dense, ws.y1, ws.ys)
     n = ws.spare[42:45]
     height = _direction(when, ground, n)
-    return height - ground.unit * _reach(regime, ws.ys, par, n, ws.work.m[W_SCRATCH])
+    return height - ground.unit * _reach(step.regime, ws.ys, step.rigid, n, ws.work.m[W_SCRATCH])
 
 
 @kernel
@@ -124,19 +132,17 @@ def _crossing(low: float, high: float, size: float, ground: Ground, n: Array) ->
 
 
 @kernel
-def touches(
-    regime: int, explicit: bool, t: float, h: float, par: Array, ground: Ground, ws: Workspace
-) -> float:
-    """Time at which the body first touches the ground in the step just made; infinite if it does not.
+def contact_time(step: Step, ground: Ground, ws: Workspace) -> float:
+    """Time at which the body first touches the ground in a step; infinite if it does not.
 
-    The step is that from ``ws.y`` at `t` to ``ws.y1`` at ``t + h`` with the dense output of its `regime`; in flow
-    `explicit` tells which. Uses ``ws.ys`` and the end of ``ws.spare``.
+    Uses ``ws.ys`` and the end of ``ws.spare``.
     """
     if ground.coefficients.shape[0] == 0:
         return np.inf
     y, y1 = ws.y, ws.y1
-    if regime == RIGID:
-        size = max(par[S1], par[S2], par[S3])
+    t = step.t
+    if step.regime == RIGID:
+        size = max(step.rigid.s1, step.rigid.s2, step.rigid.s3)
         turn = np.sqrt(y1[4] ** 2 + y1[5] ** 2 + y1[6] ** 2)
     else:
         # no eigenvalue of S is above its trace
@@ -149,7 +155,7 @@ def touches(
     if size < ground.least:
         return np.inf
     n = ws.spare[42:45]
-    end = t + h
+    end = t + step.h
     lowest = min(max(0.0, t), end)
     if _direction(lowest, ground, n) >= size:
         return np.inf
@@ -159,33 +165,30 @@ def touches(
     if _direction(end, ground, n) >= size:
         b = _crossing(lowest, end, size, ground, n)
     count = min(_MOST, _LEAST + int(_DENSE * turn * (b - a)))
-    before = f = _gap(regime, explicit, t, h, a, par, ground, ws)
+    before = f = _gap(a, step, ground, ws)
     if f <= 0.0:
         return a
-    step = (b - a) / count
+    spacing = (b - a) / count
     for j in range(1, count + 1):
-        at = a + j * step if j < count else b
-        after = _gap(regime, explicit, t, h, at, par, ground, ws)
+        at = a + j * spacing if j < count else b
+        after = _gap(at, step, ground, ws)
         if after <= 0.0:
-            return _root(at - step, at, regime, explicit, t, h, par, ground, ws)
+            return _root(at - spacing, at, step, ground, ws)
         # a dip between the samples, at the ends of the part also beside one
         if (f <= before and f <= after) or (j == count and after < f):
-            low, value = _dip(max(a, at - 2.0 * step), at, regime, explicit, t, h, par, ground, ws)
+            low, value = _dip(max(a, at - 2.0 * spacing), at, step, ground, ws)
             if value <= 0.0:
-                return _root(max(a, at - 2.0 * step), low, regime, explicit, t, h, par, ground, ws)
+                return _root(max(a, at - 2.0 * spacing), low, step, ground, ws)
         before, f = f, after
     return np.inf
 
 
 @kernel
-def _root(
-    low: float, high: float, regime: int, explicit: bool, t: float, h: float, par: Array, ground: Ground,
-    ws: Workspace,
-) -> float:  # fmt: skip
+def _root(low: float, high: float, step: Step, ground: Ground, ws: Workspace) -> float:
     """The time between `low`, where the body is clear of the ground, and `high` at which it has just reached it."""
     for _ in range(60):
         mid = 0.5 * (low + high)
-        if _gap(regime, explicit, t, h, mid, par, ground, ws) <= 0.0:
+        if _gap(mid, step, ground, ws) <= 0.0:
             high = mid
         else:
             low = mid
@@ -195,24 +198,21 @@ def _root(
 
 
 @kernel
-def _dip(
-    a: float, b: float, regime: int, explicit: bool, t: float, h: float, par: Array, ground: Ground,
-    ws: Workspace,
-) -> tuple[float, float]:  # fmt: skip
+def _dip(a: float, b: float, step: Step, ground: Ground, ws: Workspace) -> tuple[float, float]:
     """Golden-section minimum of the gap between the times `a` and `b`: when, and how large."""
     x1 = b - _GOLDEN * (b - a)
     x2 = a + _GOLDEN * (b - a)
-    f1 = _gap(regime, explicit, t, h, x1, par, ground, ws)
-    f2 = _gap(regime, explicit, t, h, x2, par, ground, ws)
+    f1 = _gap(x1, step, ground, ws)
+    f2 = _gap(x2, step, ground, ws)
     for _ in range(30):
         if f1 > f2:
             a = x1
             x1, f1 = x2, f2
             x2 = a + _GOLDEN * (b - a)
-            f2 = _gap(regime, explicit, t, h, x2, par, ground, ws)
+            f2 = _gap(x2, step, ground, ws)
         else:
             b = x2
             x2, f2 = x1, f1
             x1 = b - _GOLDEN * (b - a)
-            f1 = _gap(regime, explicit, t, h, x1, par, ground, ws)
+            f1 = _gap(x1, step, ground, ws)
     return (x1, f1) if f1 < f2 else (x2, f2)

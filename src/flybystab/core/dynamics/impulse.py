@@ -1,4 +1,4 @@
-"""Friction impulse: what a set-valued yield law does to a velocity gradient at one instant.
+"""Friction impulse: the effect of a set-valued yield law on a velocity gradient at one instant.
 
 ``Delta L = -That S^-1`` with ``That = -Phat 1 + (k Phat + chat) Dhat``, ``Dhat`` along the deviatoric rate of
 strain *afterwards* (for the true normal on ``k(theta)``: the stress whose normal that is) and ``Phat`` such that
@@ -12,42 +12,74 @@ time-stepping integrator of :mod:`flybystab.core.dynamics.moreau`.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 from numpy.typing import NDArray
 
-from flybystab.core.dynamics.state import W_A, W_B, W_L, W_N, W_S, W_SINV, Buffers, gradient, set_gradient
-from flybystab.core.dynamics.steppers import factorise, solve
+from flybystab.core.dynamics.state import (
+    W_A,
+    W_B,
+    W_L,
+    W_N,
+    W_S,
+    W_SINV,
+    Buffers,
+    gradient,
+    set_gradient,
+)
 from flybystab.core.dynamics.workspace import copy
 from flybystab.core.ellipsoid.tide import COMPONENTS
 from flybystab.core.material.flow_rule import dilatancy, dilation, flow_stress, isotropic
+from flybystab.core.material.mohr_coulomb_hexagon import on_hexagon
 from flybystab.core.material.parameters import (
-    COHESION,
     COMPRESSION_CORNER,
-    COS_PHI,
     EXTENSION_CORNER,
     FACE,
-    NORMAL,
-    PART,
-    SIN_PHI,
     SMOOTH,
-    SURFACE,
+    MaterialParameters,
+    on_part,
+    with_friction,
 )
-from flybystab.core.material.yield_surface import (
-    beyond_face,
-    corner,
-    flow_direction,
-    is_hexagon,
-    slope_over_sine,
-)
+from flybystab.core.material.yield_surface import beyond_face, corner, flow_direction, slope_over_sine
 from flybystab.core.numerics.jit import code, kernel
+from flybystab.core.numerics.lu import factorise, solve
 from flybystab.core.numerics.tensors import determinant, deviator, inverse, multiply, pack, unpack
 from flybystab.typing import Array
 
-# What an impulse did.
+# Outcomes of an impulse.
 FREE = code(0)
 REST = code(1)
 SLIDING = code(2)
 FAILED = code(3)
+
+
+class RestImpulse(NamedTuple):
+    """Invariants of the impulse that rest would need, and its excess over the yield surface."""
+
+    p: float
+    norm: float  # of its deviator
+    det: float  # of its unit deviator
+    excess: float  # as a rate of strain
+
+
+class Contact(NamedTuple):
+    """An impulse: what it does to the motion, and the part of the yield section on which its stress lies."""
+
+    outcome: int  # FREE, REST, SLIDING or FAILED
+    part: int
+
+
+class ImpulseProblem(NamedTuple):
+    """Equations of a sliding impulse (`_residual`): ``D`` before it, coefficients and scratch."""
+
+    d_star: Array
+    beta: float
+    cos_c: float
+    scale: float  # of the rates of strain
+    work: Buffers
+    jac: Array
+    pivots: NDArray[np.int64]
 
 
 @kernel
@@ -66,30 +98,29 @@ def rest_spin(y: Array, s: Array, big_l: Array, work: Buffers, w: Array) -> None
 
 
 @kernel
-def _residual(
-    x: Array, beta: float, cos_c: float, par: Array, work: Buffers, d_star: Array, f: Array
-) -> float:
+def _residual(x: Array, material: MaterialParameters, problem: ImpulseProblem, f: Array) -> float:
     """Equations of the sliding impulse; returns its strength ``Phat sin + chat cos``.
 
     ``x`` holds the deviator of D afterwards, Phat and, on a face of Mohr-Coulomb, the place of the stress between
     its corners. ``D - sym L* - Phat S^-1 + (Phat sin + chat cos) sym(N S^-1) = 0`` and ``tr x = 0``, with ``N`` the
     stress deviator of `flow_stress` and ``tr D`` the `dilation` of ``x``; on a face ``x`` is normal to it.
     """
+    work, d_star = problem.work, problem.d_star
     n, b, sinv = work.m[W_N], work.m[W_B], work.m[W_SINV]
     unit = work.c[2]
-    norm, _, support, _ = flow_stress(x[0:6], par, unit, n)
-    if int(par[PART]) == FACE:
+    norm, _, support, _ = flow_stress(x[0:6], material, unit, n)
+    if material.part == FACE:
         det = determinant(unit)
-        f[7] = norm * beyond_face(par[SIN_PHI], det)
-        p1, p2, _, _, _ = corner(par[SIN_PHI], det, False)
+        f[7] = norm * beyond_face(material.sin_phi, det)
+        p1, p2, _, _, _ = corner(material.sin_phi, det, False)
         isotropic(p1, p2, unit, b)
         for i in range(3):
             for j in range(3):
                 n[i, j] += x[7] * (b[i, j] - n[i, j])
     multiply(n, sinv, b)
     p = x[6]
-    strength = par[SIN_PHI] * p + cos_c
-    mean = dilation(beta, norm, support, par) / 3.0
+    strength = material.sin_phi * p + problem.cos_c
+    mean = dilation(problem.beta, norm, support, material) / 3.0
     f[0] = x[0] + mean - d_star[0] - p * sinv[0, 0] + strength * b[0, 0]
     f[1] = x[1] + mean - d_star[1] - p * sinv[1, 1] + strength * b[1, 1]
     f[2] = x[2] + mean - d_star[2] - p * sinv[2, 2] + strength * b[2, 2]
@@ -103,15 +134,15 @@ def _residual(
 @kernel
 def friction_impulse(
     y: Array,
-    par: Array,
+    material: MaterialParameters,
     duration: float,
     offset: Array,
     work: Buffers,
     jac: Array,
     pivots: NDArray[np.int64],
     x: Array,
-) -> int:
-    """Apply the impulse to the state ``y[15]``; returns FREE, REST, SLIDING or FAILED.
+) -> Contact:
+    """Apply the impulse to the state ``y[15]``.
 
     Parameters
     ----------
@@ -130,11 +161,48 @@ def friction_impulse(
         before[i, j] -= offset[c]
         if i != j:
             before[j, i] -= offset[c]
-    beta, _ = dilatancy(volume, par)
-    surface = int(par[SURFACE])
-    cos_c = par[COS_PHI] * par[COHESION] * volume * duration
+    beta, _ = dilatancy(volume, material)
+    cos_c = material.cos_phi * material.cohesion * volume * duration
     # Rest needs the impulse That = (L - W) S; inside the yield surface it holds the body.
+    that = work.c[0]
     w = x[8:11]
+    _impulse_to_rest(y, s, before, work, w, that)
+    p, norm, det = deviator(that, work.c[2])
+    g = slope_over_sine(material.surface, material.sin_phi, det)
+    if norm <= g * (p * material.sin_phi + cos_c):
+        for i in range(6):
+            y[6 + i] = offset[i]
+        y[12], y[13], y[14] = w[0], w[1], w[2]
+        return Contact(REST, material.part)
+    d_star = work.c[1]
+    for i in range(6):
+        d_star[i] = y[6 + i] - offset[i]
+    trace_sinv = sinv[0, 0] + sinv[1, 1] + sinv[2, 2]
+    mean, start, _ = deviator(d_star, work.c[2])
+    scale = start + abs(mean) + abs(p) * trace_sinv
+    excess = (norm - g * (p * material.sin_phi + cos_c)) * trace_sinv / 3.0
+    problem = ImpulseProblem(d_star, beta, cos_c, scale, work, jac, pivots)
+    found, part = _sliding_impulse(x, that, RestImpulse(p, norm, det, excess), mean, start, material, problem)
+    material = on_part(material, part, material.fan_limit)
+    if not found:
+        return Contact(FAILED, part)
+    strength = _residual(x, material, problem, x[19:27])
+    if strength < 0.0 or (material.sin_phi == 0.0 and material.cohesion == 0.0 and x[6] < 0.0):
+        return Contact(FREE, part)
+    # Delta L = Phat S^-1 - (Phat sin + chat cos) N S^-1; b = N S^-1 is left by the residual.
+    b = work.m[W_B]
+    for i in range(3):
+        for j in range(3):
+            before[i, j] += x[6] * sinv[i, j] - strength * b[i, j]
+    set_gradient(before, y)
+    for i in range(6):
+        y[6 + i] += offset[i]
+    return Contact(SLIDING, part)
+
+
+@kernel
+def _impulse_to_rest(y: Array, s: Array, before: Array, work: Buffers, w: Array, that: Array) -> None:
+    """Write the impulse ``that[6]`` that would bring ``L = before`` to rest, and the spin ``w[3]`` after it."""
     rest_spin(y, s, before, work, w)
     a = work.m[W_A]
     n = work.m[W_N]
@@ -148,34 +216,38 @@ def friction_impulse(
     n[1, 2] += w[0]
     n[2, 1] -= w[0]
     multiply(n, s, a)
-    that = work.c[0]
     pack(a, that)
-    p, norm, det = deviator(that, work.c[2])
-    g = slope_over_sine(surface, par[SIN_PHI], det)
-    if norm <= g * (p * par[SIN_PHI] + cos_c):
-        for i in range(6):
-            y[6 + i] = offset[i]
-        y[12], y[13], y[14] = w[0], w[1], w[2]
-        return REST
-    # Sliding. Near rest the strain starts along the deviator of the impulse that rest would need, in
-    # proportion to its excess; far from it the motion before the impulse is the better guess.
-    d_star = work.c[1]
-    for i in range(6):
-        d_star[i] = y[6 + i] - offset[i]
+
+
+@kernel
+def _sliding_impulse(
+    x: Array,
+    that: Array,
+    rest: RestImpulse,
+    mean: float,
+    start: float,
+    material: MaterialParameters,
+    problem: ImpulseProblem,
+) -> tuple[bool, int]:
+    """Solve the equations of sliding for ``x[:8]``; whether a solution was found, and its part of the section.
+
+    Near rest the strain starts along the deviator of the impulse that rest would need, in proportion to its excess;
+    far from it the motion before the impulse, of ``-tr/3`` `mean` and ``|D'|`` `start`, is the better guess.
+    """
+    work, d_star = problem.work, problem.d_star
+    sinv = work.m[W_SINV]
     trace_sinv = sinv[0, 0] + sinv[1, 1] + sinv[2, 2]
-    mean, start, _ = deviator(d_star, work.c[2])
-    scale = start + abs(mean) + abs(p) * trace_sinv
-    excess = (norm - g * (p * par[SIN_PHI] + cos_c)) * trace_sinv / 3.0
-    hexagon = par[NORMAL] > 0.0 and is_hexagon(surface)
-    if hexagon and int(par[PART]) == SMOOTH:
-        par[PART] = EXTENSION_CORNER
-    found = False
-    for part in range(3 if hexagon else 1):
-        if part > 0:
-            par[PART] = par[PART] % 3.0 + 1.0
+    hexagon = on_hexagon(material)
+    part = material.part
+    if hexagon and part == SMOOTH:
+        part = EXTENSION_CORNER
+    for turn in range(3 if hexagon else 1):
+        if turn > 0:
+            part = part % 3 + 1
+        m = on_part(material, part, material.fan_limit)
         for guess in range(4):
             if guess % 2 == 0:
-                _along_rest(that, p, norm, det, excess, par, x, work)
+                _along_rest(that, rest, m, x, work)
             elif start > 0.0:
                 for i in range(6):
                     x[i] = d_star[i] + (mean if i < 3 else 0.0)
@@ -183,71 +255,40 @@ def friction_impulse(
                 x[7] = 0.5
             else:
                 continue
-            if guess < 2:
-                found = _newton(x, beta, cos_c, scale, par, work, d_star, jac, pivots)
-            else:
-                found = _by_weaker_friction(x, beta, cos_c, scale, par, work, d_star, jac, pivots)
-            found = found and (not hexagon or _belongs(x, par, work))
-            if found:
-                break
-        if found:
-            break
-    if not found:
-        return FAILED
-    strength = _residual(x, beta, cos_c, par, work, d_star, x[19:27])
-    if strength < 0.0 or (par[SIN_PHI] == 0.0 and par[COHESION] == 0.0 and x[6] < 0.0):
-        return FREE
-    # Delta L = Phat S^-1 - (Phat sin + chat cos) N S^-1; b = N S^-1 is left by the residual.
-    b = work.m[W_B]
-    for i in range(3):
-        for j in range(3):
-            before[i, j] += x[6] * sinv[i, j] - strength * b[i, j]
-    set_gradient(before, y)
-    for i in range(6):
-        y[6 + i] += offset[i]
-    return SLIDING
+            found = _newton(x, m, problem) if guess < 2 else _by_weaker_friction(x, m, problem)
+            if found and (not hexagon or _belongs(x, m, work)):
+                return True, part
+    return False, part
 
 
 @kernel
 def _along_rest(
-    that: Array, p: float, norm: float, det: float, excess: float, par: Array, x: Array, work: Buffers
+    that: Array, rest: RestImpulse, material: MaterialParameters, x: Array, work: Buffers
 ) -> None:
-    """First guess ``x[:8]``: strain as the impulse that rest would need wants it, in proportion to its excess."""
+    """First guess ``x[:8]``: strain along the impulse that rest would need, in proportion to its excess."""
     unit, n = work.c[2], work.m[W_N]
     for i in range(6):
-        unit[i] = (that[i] + (p if i < 3 else 0.0)) / norm
+        unit[i] = (that[i] + (rest.p if i < 3 else 0.0)) / rest.norm
     a, b = 1.0, 0.0
-    if par[NORMAL] > 0.0:
-        a, b, _ = flow_direction(int(par[SURFACE]), par[SIN_PHI], det)
+    if material.normal:
+        a, b, _ = flow_direction(material.surface, material.sin_phi, rest.det)
     isotropic(a, b, unit, n)
     pack(n, x[0:6])
     for i in range(6):
-        x[i] *= excess
-    x[6] = p
+        x[i] *= rest.excess
+    x[6] = rest.p
     x[7] = 0.5
 
 
 @kernel
-def _by_weaker_friction(
-    x: Array,
-    beta: float,
-    cos_c: float,
-    scale: float,
-    par: Array,
-    work: Buffers,
-    d_star: Array,
-    jac: Array,
-    pivots: NDArray[np.int64],
-) -> bool:
-    """`_newton` by way of the solutions for less friction, where the section is rounder and a first is found."""
-    full = par[SIN_PHI]
-    kept = jac[14]
+def _by_weaker_friction(x: Array, material: MaterialParameters, problem: ImpulseProblem) -> bool:
+    """`_newton` by continuation in the friction: at less of it the section is rounder and a solution is found."""
+    kept = problem.jac[14]
     copy(x, kept, 8)
     share, more = 0.0, 0.5
     for _ in range(80):
         ahead = min(1.0, share + more)
-        par[SIN_PHI] = full * ahead
-        if _newton(x, beta, cos_c, scale, par, work, d_star, jac, pivots):
+        if _newton(x, with_friction(material, material.sin_phi * ahead), problem):
             share = ahead
             copy(x, kept, 8)
             more *= 2.0
@@ -256,39 +297,29 @@ def _by_weaker_friction(
             more *= 0.5
         if share == 1.0 or more < 1e-6:
             break
-    par[SIN_PHI] = full
     return share == 1.0
 
 
 @kernel
-def _belongs(x: Array, par: Array, work: Buffers) -> bool:
+def _belongs(x: Array, material: MaterialParameters, work: Buffers) -> bool:
     """Whether a solution lies where its part of the hexagon says: on the face, or in the fan of the corner."""
-    part = int(par[PART])
+    part = material.part
     if part == FACE:
         return -1e-9 <= x[7] <= 1.0 + 1e-9
     _, _, det = deviator(x[0:6], work.c[2])
-    past = beyond_face(par[SIN_PHI], det)
+    past = beyond_face(material.sin_phi, det)
     return past >= -1e-9 if part == COMPRESSION_CORNER else past <= 1e-9
 
 
 @kernel
-def _newton(
-    x: Array,
-    beta: float,
-    cos_c: float,
-    scale: float,
-    par: Array,
-    work: Buffers,
-    d_star: Array,
-    jac: Array,
-    pivots: NDArray[np.int64],
-) -> bool:
+def _newton(x: Array, material: MaterialParameters, problem: ImpulseProblem) -> bool:
     """Solve `_residual` for ``x[:7]`` (``x[:8]`` on a face) from the guess in it; scratch in ``x[11:]``."""
     trial, f, moved = x[11:19], x[19:27], x[27:35]
-    m = 8 if int(par[PART]) == FACE else 7
+    jac, pivots, scale = problem.jac, problem.pivots, problem.scale
+    m = 8 if material.part == FACE else 7
     for turn in range(60):
-        _residual(x, beta, cos_c, par, work, d_star, f)
-        _, size, _ = deviator(x[0:6], work.c[2])
+        _residual(x, material, problem, f)
+        _, size, _ = deviator(x[0:6], problem.work.c[2])
         if not size > 1e-300:
             return False
         for j in range(m):
@@ -296,7 +327,7 @@ def _newton(
             saved = x[j]
             x[j] = saved + delta
             delta = x[j] - saved
-            _residual(x, beta, cos_c, par, work, d_star, moved)
+            _residual(x, material, problem, moved)
             x[j] = saved
             for i in range(m):
                 jac[i, j] = (moved[i] - f[i]) / delta
@@ -305,7 +336,7 @@ def _newton(
             # A strain that stays on the kink of k(theta) at a corner (a sphere without spin) has no derivative there:
             # of one side alone the steps fall short by a part for ever.
             x[j] = saved - delta
-            _residual(x, beta, cos_c, par, work, d_star, moved)
+            _residual(x, material, problem, moved)
             x[j] = saved
             for i in range(m):
                 jac[i, j] = 0.5 * (jac[i, j] + (f[i] - moved[i]) / delta)

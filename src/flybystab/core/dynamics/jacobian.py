@@ -14,6 +14,8 @@ obeys the same small system once more:
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from flybystab.core.dynamics.state import (
@@ -43,7 +45,7 @@ from flybystab.core.dynamics.state import (
 from flybystab.core.ellipsoid.self_gravity import gravity_derivative
 from flybystab.core.ellipsoid.tide import COMPONENTS, TidePanels, tide_at
 from flybystab.core.material.flow_rule import dilatancy, flow_coefficients, isotropic
-from flybystab.core.material.parameters import COHESION, COS_PHI, FACE, NORMAL, PART, SIN_PHI
+from flybystab.core.material.parameters import FACE, MaterialParameters
 from flybystab.core.material.yield_surface import corner
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import contract, deviator, multiply, unpack
@@ -54,25 +56,51 @@ _STEP = 1e-7
 _LARGEST = 1.0 / (3.0 * np.sqrt(6.0))
 
 
-@kernel
-def _answer(
-    j: int, fading: float, slip: float, system: tuple[float, float, float, float], work: Buffers, out: Array
-) -> None:
-    """Column `j` of ``out[15, 16]`` from ``M`` and the right sides of the two conditions; solves for ``dP, dq``.
+class _Stress(NamedTuple):
+    """Stress of the flow at the state where the Jacobian is taken, and its slopes in ``det u``."""
 
-    `system` holds ``B:(1 - sin N) S^-1``, ``B:X S^-1``, ``X:(1 - sin N) S^-1`` and ``X:X S^-1``; the last is zero where
-    there is no face.
-    """
+    norm: float  # |D'|
+    trace_d: float
+    factor: float  # F
+    cohesive: float  # c cos(phi)
+    a: float  # of N = a u + b (u^2 - 1/3), and slopes
+    b: float
+    da: float
+    db: float
+    xa: float  # of X in the same form
+    xb: float
+    dxa: float
+    dxb: float
+    share: float  # q
+    beta: float
+    dbeta: float
+    d2beta: float
+    weight: float  # dilation over beta |D'|
+    dsupport: float
+    u_rate: float  # gradient of the support along the rate of D
+
+
+class _Conditions(NamedTuple):
+    """Coefficients of the conditions on ``dP, dq``; ``xx`` is zero where there is no face."""
+
+    bv: float  # B:(1 - sin N) S^-1
+    bx: float  # B:X S^-1
+    xv: float  # X:(1 - sin N) S^-1
+    xx: float  # X:X S^-1
+
+
+@kernel
+def _solve_column(j: int, fading: float, slip: float, system: _Conditions, work: Buffers, out: Array) -> None:
+    """Write column `j` of ``out[15, 16]`` from ``M`` and the right sides of the two conditions on ``dP, dq``."""
     m, pull, across = work.m[J_CHANGE], work.m[J_SLIP], work.m[J_ACROSS]
-    bv, bx, xv, xx = system
     r = fading - contract(work.m[W_B], m)
-    dp = r / bv
+    dp = r / system.bv
     dq = 0.0
-    if xx != 0.0:
+    if system.xx != 0.0:
         r2 = slip - contract(work.m[J_FACE], m)
-        det = bx * xv - bv * xx
-        dp = (bx * r2 - xx * r) / det
-        dq = (bv * r2 - xv * r) / det
+        det = system.bx * system.xv - system.bv * system.xx
+        dp = (system.bx * r2 - system.xx * r) / det
+        dq = (system.bv * r2 - system.xv * r) / det
     for i in range(3):
         for k in range(3):
             m[i, k] += dp * pull[i, k] - dq * across[i, k]
@@ -93,81 +121,73 @@ def _shape_rows(j: int, a: Array, out: Array) -> None:
 
 
 @kernel
-def flow_jacobian(
-    t: float,
-    y: Array,
-    f0: Array,
-    dt: float,
-    par: Array,
-    tide: TidePanels,
-    work: Buffers,
-    jac: Array,
-    scratch: Array,
-) -> None:
-    """Jacobian of plastic flow ``jac[15, 16]``, the last column of which is the derivative in time.
-
-    To be called after ``rate(FLOWING, t, y, f0, ...)``, which leaves the field, the tide and the pressure in
-    `work`. `dt` is
-    the step of the difference quotient of the tide; ``scratch[15, 15]``.
-    """
-    s, sinv, big_l = work.m[W_S], work.m[W_SINV], work.m[W_L]
-    n, b, rate = work.m[W_N], work.m[W_B], work.m[J_RATE]
-    u, square = work.m[J_UNIT], work.m[J_SQUARE]
-    ns, across, slip, ts = work.m[W_A], work.m[J_ACROSS], work.m[J_SLIP], work.m[J_STRESS]
-    x, m, turn, product, dn = (
-        work.m[J_FACE],
-        work.m[J_CHANGE],
-        work.m[J_TURN],
-        work.m[J_PRODUCT],
-        work.m[J_NORMAL],
-    )
-    volume, pressure, place = work.s[VOLUME], work.s[PRESSURE], work.s[PLACE]
+def _stress(y: Array, f0: Array, material: MaterialParameters, work: Buffers) -> _Stress:
+    """Stress of the flow ``y[15]`` with the rate ``f0[15]``; fills `work` with ``u``, ``N``, ``X``, ``N S^-1``..."""
+    sinv, n, rate = work.m[W_SINV], work.m[W_N], work.m[J_RATE]
+    u, x = work.m[J_UNIT], work.m[J_FACE]
+    volume = work.s[VOLUME]
     gradient(f0, rate)
-    # the stress, and its slopes in det u
     unit = work.c[2]
     _, norm, det = deviator(y[6:12], unit)
     unpack(unit, u)
-    isotropic(0.0, 1.0, unit, square)
+    isotropic(0.0, 1.0, unit, work.m[J_SQUARE])
     shift = -_STEP * _LARGEST if det > 0.0 else _STEP * _LARGEST
-    a0, b0, support, _, _ = flow_coefficients(det, par)
-    a1, b1, support1, _, _ = flow_coefficients(det + shift, par)
+    a0, b0, support, _, _ = flow_coefficients(det, material)
+    a1, b1, support1, _, _ = flow_coefficients(det + shift, material)
     da, db, dsupport = (a1 - a0) / shift, (b1 - b0) / shift, (support1 - support) / shift
     isotropic(a0, b0, unit, n)
-    multiply(n, sinv, ns)
-    sin = par[SIN_PHI]
-    cohesive = par[COS_PHI] * par[COHESION] * volume
-    factor = sin * pressure + cohesive
-    face = int(par[PART]) == FACE
+    multiply(n, sinv, work.m[W_A])
+    sin = material.sin_phi
+    cohesive = material.cos_phi * material.cohesion * volume
+    factor = sin * work.s[PRESSURE] + cohesive
     xa = xb = dxa = dxb = share = 0.0
-    if face:
+    if material.part == FACE:
         xa, xb, _, _, _ = corner(sin, det, False)
         dxa, dxb, _, _, _ = corner(sin, det + shift, False)
         dxa, dxb = (dxa - xa) / shift - da, (dxb - xb) / shift - db
         xa, xb = xa - a0, xb - b0
         isotropic(xa, xb, unit, x)
-        multiply(x, sinv, across)
-        share = factor * place if factor != 0.0 else 0.0
-    # B = 1 - beta U
-    true_normal = par[NORMAL] > 0.0
-    beta, dbeta = dilatancy(volume, par)
-    _, next_dbeta = dilatancy(volume * (1.0 + 1e-7), par)
+        multiply(x, sinv, work.m[J_ACROSS])
+        share = factor * work.s[PLACE] if factor != 0.0 else 0.0
+    beta, dbeta = dilatancy(volume, material)
+    _, next_dbeta = dilatancy(volume * (1.0 + 1e-7), material)
     d2beta = (next_dbeta - dbeta) / (1e-7 * volume)
-    weight = support * sin if true_normal else 1.0
-    trace_d = y[6] + y[7] + y[8]
-    u_rate = sin * contract(n, rate) if true_normal else contract(u, rate)
+    weight = support * sin if material.normal else 1.0
+    u_rate = sin * contract(n, rate) if material.normal else contract(u, rate)
+    return _Stress(
+        norm, y[6] + y[7] + y[8], factor, cohesive, a0, b0, da, db, xa, xb, dxa, dxb, share,
+        beta, dbeta, d2beta, weight, dsupport, u_rate,
+    )  # fmt: skip
+
+
+@kernel
+def _conditions(f: _Stress, material: MaterialParameters, work: Buffers) -> _Conditions:
+    """Coefficients of ``dP, dq``; fills `work` with ``B = 1 - beta U``, ``(1 - sin N) S^-1`` and ``T S^-1``."""
+    sinv, n, b, u = work.m[W_SINV], work.m[W_N], work.m[W_B], work.m[J_UNIT]
+    x, across, slip, ns, ts = work.m[J_FACE], work.m[J_ACROSS], work.m[J_SLIP], work.m[W_A], work.m[J_STRESS]
+    sin, pressure = material.sin_phi, work.s[PRESSURE]
+    face = material.part == FACE
     for i in range(3):
         for k in range(3):
-            b[i, k] = -beta * (sin * n[i, k] if true_normal else u[i, k])
+            b[i, k] = -f.beta * (sin * n[i, k] if material.normal else u[i, k])
             slip[i, k] = sinv[i, k] - sin * ns[i, k]
-            ts[i, k] = factor * ns[i, k] - pressure * sinv[i, k]
+            ts[i, k] = f.factor * ns[i, k] - pressure * sinv[i, k]
             if face:
-                ts[i, k] += share * across[i, k]
+                ts[i, k] += f.share * across[i, k]
         b[i, i] += 1.0
-    system = (contract(b, slip), 0.0, 0.0, 0.0)
-    if face:
-        system = (system[0], contract(b, across), contract(x, slip), contract(x, across))
-    # S: M = -2 dGamma - dC N S^-1 + T S^-1 H S^-1
-    gravity, one = scratch[0:6], scratch[6]
+    if not face:
+        return _Conditions(contract(b, slip), 0.0, 0.0, 0.0)
+    return _Conditions(contract(b, slip), contract(b, across), contract(x, slip), contract(x, across))
+
+
+@kernel
+def _shape_columns(
+    y: Array, f: _Stress, system: _Conditions, work: Buffers, jac: Array, gravity: Array
+) -> None:
+    """Columns of ``S``: ``M = -2 dGamma - dC N S^-1 + T S^-1 H S^-1``; ``gravity[6, 15]`` is scratch."""
+    sinv, big_l, ns, ts = work.m[W_SINV], work.m[W_L], work.m[W_A], work.m[J_STRESS]
+    m, turn = work.m[J_CHANGE], work.m[J_TURN]
+    volume = work.s[VOLUME]
     gravity_derivative(y[0:6], sinv, volume * volume, gravity)
     for c in range(6):
         p, q = COMPONENTS[c]
@@ -180,17 +200,69 @@ def flow_jacobian(
                     ts[i, p] * sinv[q, k]
                     + off * ts[i, q] * sinv[p, k]
                     - 2.0 * m[i, k]
-                    - cohesive * dvolume / volume * ns[i, k]
+                    - f.cohesive * dvolume / volume * ns[i, k]
                 )
-        fading = (d2beta * volume + dbeta) * dvolume * trace_d * norm * weight + dbeta * dvolume * u_rate
-        _answer(c, fading, 0.0, system, work, jac)
+        fading = (f.d2beta * volume + f.dbeta) * dvolume * f.trace_d * f.norm * f.weight
+        fading += f.dbeta * dvolume * f.u_rate
+        _solve_column(c, fading, 0.0, system, work, jac)
         for i in range(3):
             for k in range(3):
                 turn[i, k] = 0.0
             turn[i, q] += big_l[i, p]
             turn[i, p] += off * big_l[i, q]
         _shape_rows(c, turn, jac)
-    # D and w: M = -(G L + L G) - (F dN + q dX) S^-1
+
+
+@kernel
+def _strain_terms(f: _Stress, material: MaterialParameters, work: Buffers) -> tuple[float, float]:
+    """Subtract ``(F dN + q dX) S^-1`` from ``M`` for a change of ``D`` in ``work.m[J_TURN]``.
+
+    Returns the right sides of the two conditions.
+    """
+    u, square, rate, x_rate = work.m[J_UNIT], work.m[J_SQUARE], work.m[J_RATE], 0.0
+    m, turn, product, dn = work.m[J_CHANGE], work.m[J_TURN], work.m[J_PRODUCT], work.m[J_NORMAL]
+    dnorm = contract(u, turn)
+    trace = turn[0, 0] + turn[1, 1] + turn[2, 2]
+    # du, then u du
+    for i in range(3):
+        for k in range(3):
+            turn[i, k] = (turn[i, k] - dnorm * u[i, k] - (trace / 3.0 if i == k else 0.0)) / f.norm
+    multiply(u, turn, product)
+    ddet = contract(square, turn)
+    for i in range(3):
+        for k in range(3):
+            sides = product[i, k] + product[k, i]
+            dn[i, k] = ddet * (f.da * u[i, k] + f.db * square[i, k]) + f.a * turn[i, k] + f.b * sides
+    dweight = f.dsupport * ddet * material.sin_phi if material.normal else 0.0
+    du_rate = material.sin_phi * contract(dn, rate) if material.normal else contract(turn, rate)
+    fading = (
+        f.dbeta * work.s[VOLUME] * (trace * f.norm * f.weight + f.trace_d * (dnorm * f.weight + f.norm * dweight))
+        + f.beta * du_rate
+    )  # fmt: skip
+    for i in range(3):
+        for k in range(3):
+            dn[i, k] *= f.factor
+    if material.part == FACE:
+        for i in range(3):
+            for k in range(3):
+                sides = product[i, k] + product[k, i]
+                dx = ddet * (f.dxa * u[i, k] + f.dxb * square[i, k]) + f.xa * turn[i, k] + f.xb * sides
+                x_rate -= dx * rate[i, k]
+                dn[i, k] += f.share * dx
+    multiply(dn, work.m[W_SINV], product)
+    for i in range(3):
+        for k in range(3):
+            m[i, k] -= product[i, k]
+    return fading, x_rate
+
+
+@kernel
+def _gradient_columns(
+    f: _Stress, material: MaterialParameters, system: _Conditions, work: Buffers, jac: Array, one: Array
+) -> None:
+    """Columns of ``D`` and ``w``: ``M = -(G L + L G) - (F dN + q dX) S^-1``; ``one[15]`` is scratch."""
+    s, big_l = work.m[W_S], work.m[W_L]
+    m, turn, product = work.m[J_CHANGE], work.m[J_TURN], work.m[J_PRODUCT]
     for i in range(15):
         one[i] = 0.0
     for j in range(6, 15):
@@ -205,46 +277,38 @@ def flow_jacobian(
             for k in range(3):
                 m[i, k] = -m[i, k] - product[i, k]
         fading = 0.0
-        along = 0.0
+        x_rate = 0.0
         if j < 12:
-            dnorm = contract(u, turn)
-            trace = turn[0, 0] + turn[1, 1] + turn[2, 2]
-            # du, then u du
-            for i in range(3):
-                for k in range(3):
-                    turn[i, k] = (turn[i, k] - dnorm * u[i, k] - (trace / 3.0 if i == k else 0.0)) / norm
-            multiply(u, turn, product)
-            ddet = contract(square, turn)
-            for i in range(3):
-                for k in range(3):
-                    sides = product[i, k] + product[k, i]
-                    dn[i, k] = ddet * (da * u[i, k] + db * square[i, k]) + a0 * turn[i, k] + b0 * sides
-            dweight = dsupport * ddet * sin if true_normal else 0.0
-            du_rate = sin * contract(dn, rate) if true_normal else contract(turn, rate)
-            fading = (
-                dbeta * volume * (trace * norm * weight + trace_d * (dnorm * weight + norm * dweight))
-                + beta * du_rate
-            )
-            for i in range(3):
-                for k in range(3):
-                    dn[i, k] *= factor
-            if face:
-                for i in range(3):
-                    for k in range(3):
-                        sides = product[i, k] + product[k, i]
-                        dx = ddet * (dxa * u[i, k] + dxb * square[i, k]) + xa * turn[i, k] + xb * sides
-                        along -= dx * rate[i, k]
-                        dn[i, k] += share * dx
-            multiply(dn, sinv, product)
-            for i in range(3):
-                for k in range(3):
-                    m[i, k] -= product[i, k]
-        _answer(j, fading, along, system, work, jac)
+            fading, x_rate = _strain_terms(f, material, work)
+        _solve_column(j, fading, x_rate, system, work, jac)
+
+
+@kernel
+def flow_jacobian(
+    t: float,
+    y: Array,
+    f0: Array,
+    dt: float,
+    material: MaterialParameters,
+    tide: TidePanels,
+    work: Buffers,
+    jac: Array,
+    scratch: Array,
+) -> None:
+    """Jacobian of plastic flow ``jac[15, 16]``, the last column of which is the derivative in time.
+
+    To be called after ``rate(FLOWING, t, y, f0, ...)``, which leaves the gravity terms, the tide and the pressure in
+    `work`. `dt` is the step of the difference quotient of the tide; ``scratch[15, 15]``.
+    """
+    stress = _stress(y, f0, material, work)
+    system = _conditions(stress, material, work)
+    _shape_columns(y, stress, system, work, jac, scratch[0:6])
+    _gradient_columns(stress, material, system, work, jac, scratch[6])
     # t: M is the change of the tide
     before, after = work.c[0], work.c[1]
     tide_at(tide.tau, tide.start, tide.width, tide.coefficients, t + dt, after)
     for i in range(6):
         after[i] = (after[i] - before[i]) / dt
         jac[i, 15] = 0.0
-    unpack(after, m)
-    _answer(15, 0.0, 0.0, system, work, jac)
+    unpack(after, work.m[J_CHANGE])
+    _solve_column(15, 0.0, 0.0, system, work, jac)

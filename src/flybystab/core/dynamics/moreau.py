@@ -1,4 +1,4 @@
-"""A second integrator that knows no events: time stepping with a set-valued friction law (after Moreau 1999).
+"""A second integrator, without event location: time stepping with a set-valued friction law (after Moreau 1999).
 
 Each step drifts for half its length (free motion, in closed form: ``x -> (1 + t L) x``), kicks, and drifts
 again. The kick adds ``h K`` and then the impulse of :mod:`flybystab.core.dynamics.impulse`, which finds out by itself
@@ -14,7 +14,7 @@ from __future__ import annotations
 import numpy as np
 
 from flybystab.core.dynamics.impulse import FAILED, FREE, REST, SLIDING, friction_impulse
-from flybystab.core.dynamics.rates import field
+from flybystab.core.dynamics.rates import gravity_terms
 from flybystab.core.dynamics.state import (
     N_FULL,
     W_A,
@@ -30,7 +30,7 @@ from flybystab.core.dynamics.state import (
 from flybystab.core.dynamics.workspace import copy
 from flybystab.core.ellipsoid.tide import TidePanels
 from flybystab.core.material.flow_rule import dilatancy, dilation
-from flybystab.core.material.parameters import COHESION, SIN_PHI, SURFACE
+from flybystab.core.material.parameters import MaterialParameters, on_part, without_cohesion
 from flybystab.core.material.yield_surface import normal
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import determinant, deviator, multiply, pack, unpack
@@ -73,18 +73,25 @@ def drift(h: float, y: Array, work: Buffers) -> bool:
 
 
 @kernel
-def _dilation(y: Array, offset: Array, beta: float, par: Array, less: Array) -> float:
-    """``tr D`` that the flow rule wants for the deviator of ``D - offset``."""
+def _dilation(y: Array, offset: Array, beta: float, material: MaterialParameters, less: Array) -> float:
+    """``tr D`` of the flow rule for the deviator of ``D - offset``."""
     for i in range(6):
         less[i] = y[6 + i] - offset[i]
     _, norm, det = deviator(less, less)
-    _, _, support, _, _ = normal(int(par[SURFACE]), par[SIN_PHI], det)
-    return dilation(beta, norm, support, par)
+    _, _, support, _, _ = normal(material.surface, material.sin_phi, det)
+    return dilation(beta, norm, support, material)
 
 
 @kernel
 def follow_steps(
-    t0: float, t1: float, n: int, y: Array, par: Array, tide: TidePanels, brittle: bool, summary: Array
+    t0: float,
+    t1: float,
+    n: int,
+    y: Array,
+    material: MaterialParameters,
+    tide: TidePanels,
+    brittle: bool,
+    summary: Array,
 ) -> bool:
     """Carry the state ``y[15]`` from `t0` to `t1` in `n` equal steps; False if an impulse could not be found.
 
@@ -110,7 +117,7 @@ def follow_steps(
         t = t0 + (step + 0.5) * h
         if not drift(0.5 * h, y, work):
             return False
-        field(t, y, tide, work)
+        gravity_terms(t, y, tide, work)
         big_l = work.m[W_L]
         gradient(y, big_l)
         for i in range(3):
@@ -120,7 +127,7 @@ def follow_steps(
         volume = np.sqrt(determinant(y[0:6]))
         if step == 0:  # volumes are compared at the kicks: the drift of a spinning body opens it a little
             contact = volume
-        beta, _ = dilatancy(contact, par)
+        beta, _ = dilatancy(contact, material)
         did = FREE
         for turn in range(1 if touching else 4):
             # The drift to the next kick is 1 + h L, of mean gradient L - h L^2/2: that is what must obey the law
@@ -139,28 +146,30 @@ def follow_steps(
             for i in range(3):
                 offset[i] += gap / 3.0
             # Only grains that cohere bear a tension: whether it is too much, the impulse says.
-            free = not (touching and par[COHESION] > 0.0)
+            free = not (touching and material.cohesion > 0.0)
             if free and y[6] + y[7] + y[8] - offset[0] - offset[1] - offset[2] >= _dilation(
-                y, offset, beta, par, less
+                y, offset, beta, material, less
             ):
                 did = FREE
                 break
             if not touching and turn == 0:
                 contact = volume
-                beta, _ = dilatancy(contact, par)
+                beta, _ = dilatancy(contact, material)
                 gap = 0.0
                 for i in range(3):
                     offset[i] = 0.0
-            did = friction_impulse(y, par, h, offset, work, jac, pivots, spare)
+            impulse = friction_impulse(y, material, h, offset, work, jac, pivots, spare)
+            did = impulse.outcome
+            material = on_part(material, impulse.part, material.fan_limit)
             if did == FAILED:
                 return False
             gradient(y, last)
         gradient(y, last)
         touching = did != FREE
         if did == SLIDING:
-            contact *= np.exp(h * _dilation(y, offset, beta, par, less))
+            contact *= np.exp(h * _dilation(y, offset, beta, material, less))
             if brittle:
-                par[COHESION] = 0.0
+                material = without_cohesion(material)
             if summary[2] == 0.0:
                 summary[0] = t - 0.5 * h
             summary[1] = t + 0.5 * h

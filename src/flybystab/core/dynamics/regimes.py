@@ -22,13 +22,15 @@ strain at which flow starts and ends, is 1e-10 of the dynamical rate: its share 
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from flybystab.core.dynamics.dispersed import follow_free
 from flybystab.core.dynamics.flowing import follow_flow
 from flybystab.core.dynamics.ground import Ground
 from flybystab.core.dynamics.impulse import FAILED, FREE, SLIDING, friction_impulse
-from flybystab.core.dynamics.rates import rigid_excess, set_rigid_shape
+from flybystab.core.dynamics.rates import rigid_excess
 from flybystab.core.dynamics.rigid import follow_rigid
 from flybystab.core.dynamics.state import (
     DETERMINANT,
@@ -36,11 +38,12 @@ from flybystab.core.dynamics.state import (
     FLOWING,
     N_FULL,
     RIGID,
-    S1,
-    S2,
-    S3,
     W_SCRATCH,
+    Parameters,
+    RigidShape,
     angular_momentum,
+    rigid_shape,
+    rigid_volume,
     to_fixed_frame,
 )
 from flybystab.core.dynamics.workspace import (
@@ -52,36 +55,56 @@ from flybystab.core.dynamics.workspace import (
     LOSS,
     ONSET,
     STUCK,
-    Counts,
+    Limits,
+    Log,
+    Peak,
     Workspace,
+    borrowed_log,
     borrowed_workspace,
     copy,
-    log,
+    log_event,
 )
 from flybystab.core.ellipsoid.tide import COMPONENTS, TidePanels
 from flybystab.core.material.flow_rule import dilatancy
-from flybystab.core.material.parameters import COHESION, NORMAL, PART, SIN_PHI, SMOOTH, SURFACE
+from flybystab.core.material.parameters import SMOOTH, on_part, without_cohesion
 from flybystab.core.material.yield_surface import flow_direction
 from flybystab.core.numerics.jit import borrowed, kernel
 from flybystab.core.numerics.tensors import determinant, deviator, eigensystem
 from flybystab.typing import Array
 
 
+class Span(NamedTuple):
+    """Times on the clock of the tide.
+
+    Attributes
+    ----------
+    start, stop : float
+        Start and end of the run.
+    rest : float
+        A body that is rigid at or after this time ends the run.
+    """
+
+    start: float
+    rest: float
+    stop: float
+
+
 @kernel
-def loosen(y: Array, par: Array, ws: Workspace) -> None:
-    """Turn the RIGID state ``y[:7]`` into one that flows as the stress ``ws.stress`` wants, barely.
+def begin_flow(y: Array, par: Parameters, ws: Workspace) -> None:
+    """Turn the RIGID state ``y[:7]`` into one that flows infinitesimally under the stress ``ws.stress``.
 
     The direction is the deviator of the stress, or the normal of the yield surface there.
     """
     m = ws.work.m[0]
     out = ws.y1
-    to_fixed_frame(y, par, m, out[0:6], out[12:15])
+    material = par.material
+    to_fixed_frame(y, par.rigid, m, out[0:6], out[12:15])
     u = ws.ys
     _, _, det = deviator(ws.stress, u[:6])
-    trace, _ = dilatancy(np.sqrt(par[S1] * par[S2] * par[S3]), par)
-    if par[NORMAL] > 0.0:
-        p, q, support = flow_direction(int(par[SURFACE]), par[SIN_PHI], det)
-        trace *= support * par[SIN_PHI]
+    trace, _ = dilatancy(rigid_volume(par.rigid), material)
+    if material.normal:
+        p, q, support = flow_direction(material.surface, material.sin_phi, det)
+        trace *= support * material.sin_phi
         u0, u1, u2, u3, u4, u5 = u[0], u[1], u[2], u[3], u[4], u[5]
         u[0] = p * u0 + q * (u0 * u0 + u3 * u3 + u4 * u4 - 1.0 / 3.0)
         u[1] = p * u1 + q * (u3 * u3 + u1 * u1 + u5 * u5 - 1.0 / 3.0)
@@ -101,8 +124,8 @@ def loosen(y: Array, par: Array, ws: Workspace) -> None:
 
 
 @kernel
-def stiffen(y: Array, par: Array, ws: Workspace) -> None:
-    """Turn a 15-number state into the RIGID one with the same shape and angular momentum."""
+def make_rigid(y: Array, ws: Workspace) -> RigidShape:
+    """Turn a 15-number state into the RIGID one with the same shape and angular momentum; returns its shape."""
     h = ws.ys
     angular_momentum(y, ws.work, h)
     values = ws.work.m[W_SCRATCH, 0]
@@ -117,11 +140,11 @@ def stiffen(y: Array, par: Array, ws: Workspace) -> None:
         for i in range(3):
             v[i, 2] = -v[i, 2]
     s1, s2, s3 = values[0], values[1], values[2]
-    set_rigid_shape(s1, s2, s3, par)
     y[4] = (v[0, 0] * h[0] + v[1, 0] * h[1] + v[2, 0] * h[2]) / (s2 + s3)
     y[5] = (v[0, 1] * h[0] + v[1, 1] * h[1] + v[2, 1] * h[2]) / (s1 + s3)
     y[6] = (v[0, 2] * h[0] + v[1, 2] * h[1] + v[2, 2] * h[2]) / (s1 + s2)
     quaternion(v, y)
+    return rigid_shape(s1, s2, s3)
 
 
 @kernel
@@ -152,124 +175,125 @@ def quaternion(m: Array, q: Array) -> None:
 
 
 @kernel
-def follow(
+def _contact(y: Array, par: Parameters, ws: Workspace) -> int:
+    """Apply the inelastic impulse of grains that meet to ``y[15]``; returns its outcome."""
+    offset = ws.spare[36:42]
+    offset[:] = 0.0
+    material = on_part(par.material, SMOOTH, par.material.fan_limit)
+    return friction_impulse(y, material, 0.0, offset, ws.work, ws.jac, ws.pivots, ws.spare).outcome
+
+
+@kernel
+def _next_regime(
+    regime: int,
+    reason: int,
     t: float,
-    t1: float,
-    t_rest: float,
+    par: Parameters,
+    tide: TidePanels,
+    brittle: bool,
+    ws: Workspace,
+    log: Log,
+) -> tuple[int, Parameters]:
+    """Regime that follows the end of one, with ``ws.y`` as its state; negative if the contact impulse fails."""
+    if reason == ONSET:
+        if brittle:
+            par = Parameters(without_cohesion(par.material), par.rigid)
+        _, _, _, det = rigid_excess(t, ws.y, par, tide, ws.work, ws.stress)
+        log_event(ONSET, t, det, rigid_volume(par.rigid), log)
+        begin_flow(ws.y, par, ws)
+        return FLOWING, par
+    volume = np.sqrt(determinant(ws.y[0:6]))
+    if reason in (ARREST, JAM):
+        log_event(reason, t, ws.work.s[DETERMINANT], volume, log)
+        return RIGID, Parameters(par.material, make_rigid(ws.y, ws))
+    log_event(reason, t, 0.0, volume, log)
+    if reason == LOSS:
+        return DISPERSED, par
+    outcome = _contact(ws.y, par, ws)
+    if outcome == FAILED:
+        return -1, par
+    if outcome == SLIDING:
+        return FLOWING, par
+    if outcome == FREE:
+        return regime, par
+    return RIGID, Parameters(par.material, make_rigid(ws.y, ws))
+
+
+@kernel
+def follow(
+    span: Span,
     regime: int,
     y: Array,
-    par: Array,
+    par: Parameters,
     tide: TidePanels,
     ground: Ground,
-    tol: float,
-    limit: float,
+    limits: Limits,
     brittle: bool,
     unyielding: bool,
-    max_steps: int,
-    hist: Array,
-    events: Array,
-    count: Counts,
-    mark: Array,
+    log: Log,
     room: Workspace,
-) -> tuple[int, float, int]:
-    """Follow a body from `t` to `t1` through its regimes.
+) -> tuple[int, float, int, Peak]:
+    """Follow a body through its regimes.
 
     Parameters
     ----------
-    t, t1, t_rest : float
-        Start and end, in dynamical times, on the clock of the tide; a body that is rigid at or after `t_rest`
-        ends the run there.
+    span : Span
+        In dynamical times.
     regime : int
         RIGID (``y[:7]``), FLOWING, DISPERSED or FLUID (``y[:15]``) at the start.
     y : ndarray (15,)
         State, overwritten with the last one, which is a 15-number state in any regime.
-    par : ndarray (16,)
-        Parameters, see :mod:`flybystab.core.dynamics.state`; cohesion and rigid shape are updated.
+    par : Parameters
+    tide : TidePanels
     ground : Ground
         Its surface ends the run; times in dynamical ones.
-    tol : float
-        Relative error allowed in a step.
-    limit : float
-        Axis ratio beyond which the model is left.
+    limits : Limits
     brittle, unyielding : bool
         Cohesion is lost at first yield; the body never yields (for the friction that it would need).
-    hist, events : ndarray (n, 24), (m, 4)
-        History (one row or less: none is kept) and event log.
-    count : ndarray of int (4,)
-        Rows of history, events, steps, rejected steps.
-    mark : ndarray (2,)
-        Largest mobilised friction angle while rigid, rad, and its time.
+    log : Log
+        History, events and counts, to be continued.
     room : Workspace
 
     Returns
     -------
-    reason, time, regime
-        DONE, TOUCH, BEYOND or STUCK; the time reached; the regime there.
+    reason, time, regime, peak
+        DONE, TOUCH, BEYOND or STUCK; the time reached; the regime there; the largest mobilised friction.
     """
-    # Counting references at each use of a buffer would take longer than the sums.
+    # Reference counts at each use of a buffer would take longer than the sums.
     ws = borrowed_workspace(room)
-    y, par, hist = borrowed(y), borrowed(par), borrowed(hist)
+    log = borrowed_log(log)
+    y = borrowed(y)
     tide = TidePanels(tide.tau, tide.start, tide.width, borrowed(tide.coefficients))
     copy(y, ws.y, N_FULL)
-    ws.mark[0] = -1.0
+    t = span.start
+    peak = Peak(-1.0, 0.0)
+    step = 0.0
     reason = DONE
-    det = 0.0
-    switches = 0
-    while True:
-        switches += 1
-        if switches > 2000:
+    for _ in range(2000):
+        if regime == RIGID:
+            reason, t, step, peak = follow_rigid(
+                t, min(span.stop, span.rest), step, par, tide, ground, limits, unyielding, peak, ws, log
+            )
+        elif regime == FLOWING:
+            reason, t = follow_flow(t, span.stop, par, tide, ground, limits, ws, log)
+        else:
+            reason, t = follow_free(regime, t, span.stop, par, tide, ground, limits, ws, log)
+        if reason not in (ONSET, ARREST, JAM, LOSS, CONTACT):
+            break
+        following, par = _next_regime(regime, reason, t, par, tide, brittle, ws, log)
+        if following < 0:
             reason = STUCK
             break
-        if regime == RIGID:
-            reason, t = follow_rigid(
-                t, min(t1, t_rest), par, tide, ground, tol, unyielding, max_steps, ws, hist, count
-            )
-            if reason != ONSET:
-                break
-            if brittle:
-                par[COHESION] = 0.0
-            _, _, _, det = rigid_excess(t, ws.y, par, tide, ws.work, ws.stress)
-            log(ONSET, t, det, np.sqrt(par[S1] * par[S2] * par[S3]), events, count)
-            loosen(ws.y, par, ws)
-            regime = FLOWING
-        elif regime == FLOWING:
-            reason, t = follow_flow(t, t1, par, tide, ground, tol, limit, max_steps, ws, hist, count)
-            volume = np.sqrt(determinant(ws.y[0:6]))
-            if reason in (ARREST, JAM):
-                det = ws.work.s[DETERMINANT]
-                stiffen(ws.y, par, ws)
-                log(reason, t, det, volume, events, count)
-                regime = RIGID
-            elif reason == LOSS:
-                log(LOSS, t, 0.0, volume, events, count)
-                regime = DISPERSED
-            else:
-                break
-        else:
-            reason, t = follow_free(regime, t, t1, par, tide, ground, tol, limit, max_steps, ws, hist, count)
-            if reason != CONTACT:
-                break
-            log(CONTACT, t, 0.0, np.sqrt(determinant(ws.y[0:6])), events, count)
-            par[PART] = SMOOTH
-            offset = ws.spare[36:42]
-            offset[:] = 0.0
-            did = friction_impulse(ws.y, par, 0.0, offset, ws.work, ws.jac, ws.pivots, ws.spare)
-            if did == FAILED:
-                reason = STUCK
-                break
-            if did == SLIDING:
-                regime = FLOWING
-            elif did != FREE:
-                stiffen(ws.y, par, ws)
-                regime = RIGID
-        if t >= t1:
+        regime = following
+        if t >= span.stop:
             reason = DONE
             break
+    else:
+        reason = STUCK
     if regime == RIGID:
         rigid_excess(t, ws.y, par, tide, ws.work, ws.stress)
-        loosen(ws.y, par, ws)
+        begin_flow(ws.y, par, ws)
         for i in range(6, 12):
             ws.y[i] = 0.0
     copy(ws.y, y, N_FULL)
-    mark[0], mark[1] = ws.mark[0], ws.mark[1]
-    return reason, t, regime
+    return reason, t, regime, peak

@@ -1,12 +1,12 @@
-"""Rigid motion up to yield: Euler's equations, the yield function on dense output, and its extrema."""
+"""Rigid motion up to yield: Euler's equations, and extrema of the yield function on dense output."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from flybystab.core.dynamics.ground import Ground, touches
+from flybystab.core.dynamics.ground import Ground, Step, contact_time
 from flybystab.core.dynamics.rates import rate, rigid_excess
-from flybystab.core.dynamics.state import N_RIGID, RIGID, S1, S2, S3
+from flybystab.core.dynamics.state import N_RIGID, RIGID, Parameters, rigid_volume
 from flybystab.core.dynamics.steppers import explicit_at, explicit_dense, explicit_step
 from flybystab.core.dynamics.workspace import (
     DONE,
@@ -14,14 +14,19 @@ from flybystab.core.dynamics.workspace import (
     ONSET,
     STUCK,
     TOUCH,
-    Counts,
+    Limits,
+    Log,
+    Peak,
     Workspace,
     copy,
+    count_rejected,
+    count_step,
+    exhausted,
+    keeps_history,
     record,
 )
 from flybystab.core.ellipsoid.tide import TidePanels
 from flybystab.core.material.flow_rule import dilatancy
-from flybystab.core.material.parameters import COHESION, NORMAL, SIN_PHI, SURFACE
 from flybystab.core.material.yield_surface import required_friction, slope
 from flybystab.core.numerics.jit import code, kernel
 from flybystab.typing import Array
@@ -37,7 +42,7 @@ _BESIDE = 1e-4
 
 
 @kernel
-def yields(t: float, y: Array, par: Array, tide: TidePanels, ws: Workspace) -> float:
+def yields(t: float, y: Array, par: Parameters, tide: TidePanels, ws: Workspace) -> float:
     """Positive where a RIGID state has yielded and can flow: the smaller of the yield excess and, beyond
     yield, the denominator of the pressure for flow along the deviator of the rigid stress.
     """
@@ -46,24 +51,24 @@ def yields(t: float, y: Array, par: Array, tide: TidePanels, ws: Workspace) -> f
 
 
 @kernel
-def _onset(excess: float, p: float, norm: float, det: float, par: Array, stress: Array) -> float:
+def _onset(excess: float, p: float, norm: float, det: float, par: Parameters, stress: Array) -> float:
     """The onset function from what `rigid_excess` gives."""
     return excess if excess <= 0.0 else min(excess, onset_denominator(p, norm, det, par, stress))
 
 
 @kernel
-def onset_denominator(p: float, norm: float, det: float, par: Array, stress: Array) -> float:
+def onset_denominator(p: float, norm: float, det: float, par: Parameters, stress: Array) -> float:
     """``B:((1 - k shat) S^-1)`` for flow whose stress has the deviator of ``stress[6]`` (body axes).
 
     ``B = 1 - beta shat`` for the radial rule, ``1 - f k shat`` for the true normal.
     """
     if norm == 0.0:
         return 1.0
-    k = slope(int(par[SURFACE]), par[SIN_PHI], det)
-    beta, _ = dilatancy(np.sqrt(par[S1] * par[S2] * par[S3]), par)
-    if par[NORMAL] > 0.0:
+    k = slope(par.material.surface, par.material.sin_phi, det)
+    beta, _ = dilatancy(rigid_volume(par.rigid), par.material)
+    if par.material.normal:
         beta *= k
-    i1, i2, i3 = 1.0 / par[S1], 1.0 / par[S2], 1.0 / par[S3]
+    i1, i2, i3 = 1.0 / par.rigid.s1, 1.0 / par.rigid.s2, 1.0 / par.rigid.s3
     n0, n1, n2 = (stress[0] + p) / norm, (stress[1] + p) / norm, (stress[2] + p) / norm
     n3, n4, n5 = stress[3] / norm, stress[4] / norm, stress[5] / norm
     n_s = n0 * i1 + n1 * i2 + n2 * i3
@@ -76,18 +81,24 @@ def onset_denominator(p: float, norm: float, det: float, par: Array, stress: Arr
 
 
 @kernel
-def _rigid_values(t: float, y: Array, par: Array, tide: TidePanels, ws: Workspace, which: int) -> float:
+def _mobilised_friction(p: float, norm: float, det: float, par: Parameters) -> float:
+    """Friction angle, rad, that the stress of a rigid body requires."""
+    cohesion = par.material.cohesion * rigid_volume(par.rigid)
+    return required_friction(par.material.surface, cohesion, norm, p, det)
+
+
+@kernel
+def _rigid_values(t: float, y: Array, par: Parameters, tide: TidePanels, ws: Workspace, which: int) -> float:
     """Onset function (`which` 0) or mobilised friction angle (1) of a RIGID state."""
     if which == _ONSET:
         return yields(t, y, par, tide, ws)
     _, p, norm, det = rigid_excess(t, y, par, tide, ws.work, ws.stress)
-    volume = np.sqrt(par[S1] * par[S2] * par[S3])
-    return required_friction(int(par[SURFACE]), par[COHESION] * volume, norm, p, det)
+    return _mobilised_friction(p, norm, det, par)
 
 
 @kernel
 def _largest(
-    a: float, b: float, t: float, h: float, par: Array, tide: TidePanels, ws: Workspace, which: int
+    a: float, b: float, t: float, h: float, par: Parameters, tide: TidePanels, ws: Workspace, which: int
 ) -> tuple[float, float]:
     """Golden-section maximum over the fractions [a, b] of a rigid step: where, and how large."""
     x1 = b - _GOLDEN * (b - a)
@@ -121,7 +132,15 @@ def _vertex_inside(f0: float, f1: float, f2: float) -> bool:
 
 @kernel
 def _summit(
-    f: Array, j: int, last: int, t: float, h: float, par: Array, tide: TidePanels, ws: Workspace, which: int
+    f: Array,
+    j: int,
+    last: int,
+    t: float,
+    h: float,
+    par: Parameters,
+    tide: TidePanels,
+    ws: Workspace,
+    which: int,
 ) -> bool:
     """Whether a maximum may lie beside sample `j` of ``f[: last + 1]``.
 
@@ -138,28 +157,135 @@ def _summit(
 
 
 @kernel
+def _interval(j: int, last: int) -> tuple[float, float]:
+    """Fractions of a step between which a maximum beside sample `j` of ``0 ... last`` lies."""
+    return max(j - 1.0, 0.0) / N_SAMPLE, min(j + 1.0, last) / N_SAMPLE
+
+
+@kernel
+def _sample_step(
+    t: float, h: float, par: Parameters, tide: TidePanels, unyielding: bool, ws: Workspace
+) -> tuple[float, int]:
+    """Fraction of a step at which the body has yielded (2 if it has not), and the last sample before it.
+
+    ``ws.sample`` gets the onset function and the mobilised friction at the samples. Between samples near yield the
+    maximum of the onset function is located.
+    """
+    f = ws.sample
+    f[0, 0], f[1, 0] = f[0, N_SAMPLE], f[1, N_SAMPLE]
+    norm = 0.0
+    for j in range(1, N_SAMPLE + 1):
+        x = j / N_SAMPLE
+        explicit_at(x, ws.y, N_RIGID, ws.dense, ws.ys)
+        excess, p, norm, det = rigid_excess(t + x * h, ws.ys, par, tide, ws.work, ws.stress)
+        f[0, j] = _onset(excess, p, norm, det, par, ws.stress)
+        f[1, j] = _mobilised_friction(p, norm, det, par)
+        if not unyielding and f[0, j] > 0.0:
+            return x, j - 1
+    if unyielding:
+        return 2.0, N_SAMPLE
+    margin = f[0].max() - f[0].min() + 0.02 * norm
+    for j in range(N_SAMPLE + 1):
+        if f[0, j] + margin > 0.0 and _summit(f[0], j, N_SAMPLE, t, h, par, tide, ws, _ONSET):
+            a, b = _interval(j, N_SAMPLE)
+            x, value = _largest(a, b, t, h, par, tide, ws, _ONSET)
+            if value > 0.0:
+                return x, int(np.floor(x * N_SAMPLE))
+    return 2.0, N_SAMPLE
+
+
+@kernel
+def _record_samples(
+    t: float, h: float, n: int, par: Parameters, tide: TidePanels, ws: Workspace, log: Log
+) -> None:
+    """Append the samples 1 to `n` of a step to the history."""
+    for j in range(1, n + 1):
+        x = j / N_SAMPLE
+        explicit_at(x, ws.y, N_RIGID, ws.dense, ws.ys)
+        _, p, norm, det = rigid_excess(t + x * h, ws.ys, par, tide, ws.work, ws.stress)
+        record(t + x * h, RIGID, ws.ys, par, p, norm, det, ws, log)
+
+
+@kernel
+def _friction_peak(
+    t: float, h: float, n: int, par: Parameters, tide: TidePanels, peak: Peak, ws: Workspace
+) -> Peak:
+    """The larger of `peak` and the largest mobilised friction up to sample `n` of a step."""
+    f = ws.sample
+    margin = f[1, : n + 1].max() - f[1, : n + 1].min()
+    for j in range(n + 1):
+        if (
+            f[1, j] < np.inf
+            and f[1, j] + margin > peak.friction
+            and _summit(f[1], j, n, t, h, par, tide, ws, _FRICTION)
+        ):
+            a, b = _interval(j, n)
+            x, value = _largest(a, b, t, h, par, tide, ws, _FRICTION)
+            peak = larger(peak, value, t + x * h)
+    for j in range(1, n + 1):
+        peak = larger(peak, f[1, j], t + h * j / N_SAMPLE)
+    return peak
+
+
+@kernel
+def _step_to_yield(
+    t: float, h: float, n: int, end: float, par: Parameters, tide: TidePanels, ws: Workspace
+) -> float:
+    """Repeat a step up to the onset of yield between sample `n` and the fraction `end`; returns its time.
+
+    The root on the dense output is refined by a step of order 8 in place of the interpolant.
+    """
+    low, high = n / N_SAMPLE, end
+    for _ in range(60):
+        mid = 0.5 * (low + high)
+        explicit_at(mid, ws.y, N_RIGID, ws.dense, ws.ys)
+        if yields(t + mid * h, ws.ys, par, tide, ws) > 0.0:
+            high = mid
+        else:
+            low = mid
+        if (high - low) * h < 1e-14 * max(1.0, abs(t)):
+            break
+    explicit_step(RIGID, t, N_RIGID, high * h, par, tide, ws)
+    copy(ws.y1, ws.y, N_RIGID)
+    _normalise(ws.y)
+    return t + high * h
+
+
+@kernel
 def follow_rigid(
     t: float,
     t1: float,
-    par: Array,
+    first_step: float,
+    par: Parameters,
     tide: TidePanels,
     ground: Ground,
-    tol: float,
+    limits: Limits,
     unyielding: bool,
-    max_steps: int,
+    peak: Peak,
     ws: Workspace,
-    hist: Array,
-    count: Counts,
-) -> tuple[int, float]:
-    """Rigid motion of ``ws.y[:7]`` up to yield, the ground or `t1`; returns (reason, time)."""
-    y = ws.y
-    k = ws.k
-    h = min(0.05, t1 - t) if ws.mark[2] <= 0.0 else min(ws.mark[2], t1 - t)
+    log: Log,
+) -> tuple[int, float, float, Peak]:
+    """Rigid motion of ``ws.y[:7]`` up to yield, the ground or `t1`.
+
+    Parameters
+    ----------
+    first_step : float
+        Length of the first step; 0 for a default.
+    unyielding : bool
+        Do not stop at yield.
+    peak : Peak
+        Largest mobilised friction up to `t`.
+
+    Returns
+    -------
+    reason, time, step, peak
+        The end, its time, the length of the next step (0 unless it ends at yield), and the largest mobilised friction.
+    """
+    y, k, tol = ws.y, ws.k, limits.tolerance
+    h = min(0.05 if first_step <= 0.0 else first_step, t1 - t)
     rate(RIGID, t, y, k[0], par, tide, ws.work)
     excess, p, norm, det = rigid_excess(t, y, par, tide, ws.work, ws.stress)
-    surface = int(par[SURFACE])
-    cohesion = par[COHESION] * np.sqrt(par[S1] * par[S2] * par[S3])
-    record(t, RIGID, y, par, p, norm, det, ws, hist, count)
+    record(t, RIGID, y, par, p, norm, det, ws, log)
     # A step never spans more of the change of variable of the tide than its panels resolve, and less of it for a
     # smaller tolerance, as steps of order 8 are smaller: else the run that measures the error would share it.
     reach = min(0.4, 0.225 * (1e8 * tol) ** 0.125)
@@ -168,110 +294,55 @@ def follow_rigid(
     touched = False
     f = ws.sample
     f[0, N_SAMPLE] = _onset(excess, p, norm, det, par, ws.stress)
-    f[1, N_SAMPLE] = required_friction(surface, cohesion, norm, p, det)
-    if f[1, N_SAMPLE] > ws.mark[0]:
-        ws.mark[0], ws.mark[1] = f[1, N_SAMPLE], t
+    f[1, N_SAMPLE] = _mobilised_friction(p, norm, det, par)
+    peak = larger(peak, f[1, N_SAMPLE], t)
     if not unyielding and f[0, N_SAMPLE] > 0.0:
-        return ONSET, t
+        return ONSET, t, first_step, peak
     while t < t1:
-        if count[2] >= max_steps:
-            return STUCK, t
+        if exhausted(log, limits):
+            return STUCK, t, first_step, peak
         last = h >= t1 - t
         if last:
             h = t1 - t
         spin = np.sqrt(y[4] ** 2 + y[5] ** 2 + y[6] ** 2)
         for i in range(7):
             ws.scale[i] = tol if i < 4 else tol * max(spin, 0.1)
-        error = explicit_step(RIGID, t, y, N_RIGID, h, par, tide, ws.work, k, ws.scale, ws.y1)
-        count[2] += 1
+        error = explicit_step(RIGID, t, N_RIGID, h, par, tide, ws)
+        count_step(log)
         if not error <= 1.0:
-            count[3] += 1
+            count_rejected(log)
             h *= max(0.2, 0.9 * error ** (-0.125)) if np.isfinite(error) else 0.2
             continue
-        explicit_dense(RIGID, t, y, N_RIGID, h, par, tide, ws.work, k, ws.y1, ws.ys, ws.dense)
+        explicit_dense(RIGID, t, N_RIGID, h, par, tide, ws)
         if not touched:
-            end_time = touches(RIGID, True, t, h, par, ground, ws)
-            if end_time < np.inf:  # the step again, up to there
+            end_time = contact_time(Step(RIGID, True, t, h, par.rigid), ground, ws)
+            if end_time < np.inf:  # repeat the step up to the contact
                 touched = True
                 t1 = end_time
                 continue
-        f[0, 0], f[1, 0] = f[0, N_SAMPLE], f[1, N_SAMPLE]
-        end = 2.0  # fraction at which the body yields
-        for j in range(1, N_SAMPLE + 1):
-            x = j / N_SAMPLE
-            explicit_at(x, y, N_RIGID, ws.dense, ws.ys)
-            excess, p, norm, det = rigid_excess(t + x * h, ws.ys, par, tide, ws.work, ws.stress)
-            f[0, j] = _onset(excess, p, norm, det, par, ws.stress)
-            f[1, j] = required_friction(surface, cohesion, norm, p, det)
-            if not unyielding and f[0, j] > 0.0:
-                end = x
-                break
-        n = N_SAMPLE if end > 1.0 else int(np.rint(end * N_SAMPLE)) - 1
-        # Extrema between the samples: of the yield function near zero, then of the friction mobilised before.
-        if not unyielding and end > 1.0:
-            spread = f[0].max() - f[0].min() + 0.02 * norm
-            for j in range(N_SAMPLE + 1):
-                if (
-                    end > 1.0
-                    and f[0, j] + spread > 0.0
-                    and _summit(f[0], j, N_SAMPLE, t, h, par, tide, ws, _ONSET)
-                ):
-                    a, b = max(j - 1.0, 0.0) / N_SAMPLE, min(j + 1.0, N_SAMPLE) / N_SAMPLE
-                    x, value = _largest(a, b, t, h, par, tide, ws, _ONSET)
-                    if value > 0.0:
-                        end = x
-                        n = int(np.floor(x * N_SAMPLE))
-        if hist.shape[0] > 1:
-            for j in range(1, n + 1):
-                x = j / N_SAMPLE
-                explicit_at(x, y, N_RIGID, ws.dense, ws.ys)
-                excess, p, norm, det = rigid_excess(t + x * h, ws.ys, par, tide, ws.work, ws.stress)
-                record(t + x * h, RIGID, ws.ys, par, p, norm, det, ws, hist, count)
-        spread = f[1, : n + 1].max() - f[1, : n + 1].min()
-        for j in range(n + 1):
-            if (
-                f[1, j] < np.inf
-                and f[1, j] + spread > ws.mark[0]
-                and _summit(f[1], j, n, t, h, par, tide, ws, _FRICTION)
-            ):
-                a, b = max(j - 1.0, 0.0) / N_SAMPLE, min(j + 1.0, n) / N_SAMPLE
-                x, value = _largest(a, b, t, h, par, tide, ws, _FRICTION)
-                if value > ws.mark[0]:
-                    ws.mark[0], ws.mark[1] = value, t + x * h
-        for j in range(1, n + 1):
-            if f[1, j] > ws.mark[0]:
-                ws.mark[0], ws.mark[1] = f[1, j], t + h * j / N_SAMPLE
+        end, n = _sample_step(t, h, par, tide, unyielding, ws)
+        if keeps_history(log):
+            _record_samples(t, h, n, par, tide, ws, log)
+        peak = _friction_peak(t, h, n, par, tide, peak, ws)
         if end <= 1.0:
-            low, high = n / N_SAMPLE, end
-            for _ in range(60):
-                mid = 0.5 * (low + high)
-                explicit_at(mid, y, N_RIGID, ws.dense, ws.ys)
-                if yields(t + mid * h, ws.ys, par, tide, ws) > 0.0:
-                    high = mid
-                else:
-                    low = mid
-                if (high - low) * h < 1e-14 * max(1.0, abs(t)):
-                    break
-            # Repeat the step up to the root: order 8 instead of the order of the interpolant.
-            explicit_step(RIGID, t, y, N_RIGID, high * h, par, tide, ws.work, k, ws.scale, ws.y1)
-            t += high * h
-            copy(ws.y1, y, N_RIGID)
-            _normalise(y)
-            ws.mark[2] = h
+            t = _step_to_yield(t, h, n, end, par, tide, ws)
             excess, p, norm, det = rigid_excess(t, y, par, tide, ws.work, ws.stress)
-            value = required_friction(surface, cohesion, norm, p, det)
-            if value > ws.mark[0]:
-                ws.mark[0], ws.mark[1] = value, t
-            record(t, RIGID, y, par, p, norm, det, ws, hist, count)
-            return ONSET, t
+            peak = larger(peak, _mobilised_friction(p, norm, det, par), t)
+            record(t, RIGID, y, par, p, norm, det, ws, log)
+            return ONSET, t, h, peak
         t = t1 if last else t + h
         copy(ws.y1, y, N_RIGID)
         _normalise(y)
         k[0] = k[12]
         h *= min(5.0, max(0.3, 0.9 * error ** (-0.125))) if error > 0.0 else 5.0
         h = min(h, reach * np.sqrt(t * t + tide.tau * tide.tau) if tide.coefficients.shape[0] > 0 else h)
-    ws.mark[2] = 0.0
-    return TOUCH if touched else DONE, t
+    return TOUCH if touched else DONE, t, 0.0, peak
+
+
+@kernel
+def larger(peak: Peak, friction: float, t: float) -> Peak:
+    """The larger of a peak and a mobilised friction angle at a time."""
+    return Peak(friction, t) if friction > peak.friction else peak
 
 
 @kernel

@@ -6,18 +6,18 @@ The kernels of :mod:`flybystab.core.dynamics.regimes` work in the units of the b
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flybystab.constants import G
-from flybystab.core.dynamics import rates as motion
 from flybystab.core.dynamics import regimes, state
 from flybystab.core.dynamics.ground import Ground, no_ground
-from flybystab.core.dynamics.workspace import N_EVENT, N_HISTORY, Counts, workspace
+from flybystab.core.dynamics.regimes import Span
+from flybystab.core.dynamics.workspace import Limits, Log, Peak, new_log, workspace
 from flybystab.core.ellipsoid.tide import TidePanels
-from flybystab.core.material import parameters as material
-from flybystab.core.material.yield_surface import is_circular, least_slope
+from flybystab.core.material.parameters import material_parameters
 from flybystab.core.numerics.jit import inlined, kernel
 from flybystab.core.numerics.tensors import determinant, multiply, pack, unpack
 from flybystab.typing import Array
@@ -27,9 +27,54 @@ EVENTS = (
     "done", "onset", "arrest", "loss of contact", "contact", "beyond model", "jam", "stuck", "switch", "ground"
 )  # fmt: skip
 
+#: ``V/V0`` at which dilation has ended.
+EXPANSION = 1.5
 
-class Passage(NamedTuple):
-    """What happened to a body; SI units, fixed frame, times on the clock of the tide.
+
+class BodyState(NamedTuple):
+    """A body at the start of a run, in SI units.
+
+    Attributes
+    ----------
+    axes, rho, omega : ndarray (3,), float, ndarray (3,)
+        Semi-axes (m), density (kg/m3), spin along the body axes (rad/s).
+    attitude : ndarray (3, 3)
+        Rotation matrix, body axes -> frame of the tide.
+    phi, cohesion : float
+        Friction angle (rad) and cohesion (Pa).
+    dilatancy : float
+        ``beta / min k``.
+    surface : int
+        Code of the yield surface.
+    brittle : bool
+        Whether the cohesion is lost at first yield.
+    expansion : float
+        ``V/V0`` at which dilation ends.
+    """
+
+    axes: Array
+    rho: float
+    omega: Array
+    attitude: Array
+    phi: float
+    cohesion: float
+    dilatancy: float
+    surface: int
+    brittle: bool
+    expansion: float
+
+
+class FinalState(NamedTuple):
+    """End of a run, in SI units: why, when and in which regime it ended, and the largest mobilised friction."""
+
+    reason: int
+    time: float
+    regime: int
+    peak: Peak
+
+
+class Run(NamedTuple):
+    """Result of a run; SI units, fixed frame, times on the clock of the tide.
 
     Attributes
     ----------
@@ -44,7 +89,7 @@ class Passage(NamedTuple):
     velocity_gradient : ndarray (3, 3)
         ``L`` at the end, 1/s.
     max_friction, max_friction_time : float
-        Largest friction angle mobilised while rigid, rad (inf: none would do), and when, s.
+        Largest friction angle mobilised while rigid, rad (inf: none suffices), and when, s.
     events : list of (str, float, float)
         Name, time (s) and Lode angle of the stress (rad; nan where there is none) of every switch.
     history : dict of str to ndarray, or None
@@ -77,30 +122,26 @@ def parameters(
     dilatancy: float,
     surface: int,
     viscosity: float = 0.0,
-    expansion: float = 1.5,
-) -> Array:
-    """Parameter array of the kernels from SI floats (`phi` in rad, `cohesion` in Pa, `viscosity` in Pa s)."""
+    expansion: float = EXPANSION,
+) -> state.Parameters:
+    """Parameters of the kernels from SI floats (`phi` in rad, `cohesion` in Pa, `viscosity` in Pa s)."""
     a0 = np.cbrt(axes[0] * axes[1] * axes[2])
     rate2 = np.pi * G * rho
-    par = np.zeros(state.N_PARAMETERS)
-    par[material.SURFACE] = surface
-    par[material.SIN_PHI] = np.sin(phi)
-    par[material.COS_PHI] = np.cos(phi)
-    par[material.BETA] = dilatancy * least_slope(surface, np.sin(phi))
-    # Associative flow on a slope k(theta) is the true normal; less dilatant flow goes along the stress deviator.
-    if dilatancy >= 1.0 and not is_circular(surface):
-        par[material.NORMAL] = 1.0
-        par[material.BETA] = 1.0
-    par[material.COHESION] = 5.0 * cohesion / (rho * a0 * a0 * rate2)
-    par[material.VISCOSITY] = 10.0 * viscosity / (rho * a0 * a0 * np.sqrt(rate2))
-    par[material.EXPANSION] = expansion
-    motion.set_rigid_shape((axes[0] / a0) ** 2, (axes[1] / a0) ** 2, (axes[2] / a0) ** 2, par)
-    return par
+    material = material_parameters(
+        surface,
+        phi,
+        5.0 * cohesion / (rho * a0 * a0 * rate2),
+        dilatancy,
+        10.0 * viscosity / (rho * a0 * a0 * np.sqrt(rate2)),
+        expansion,
+    )
+    rigid = state.rigid_shape((axes[0] / a0) ** 2, (axes[1] / a0) ** 2, (axes[2] / a0) ** 2)
+    return state.Parameters(material, rigid)
 
 
 @kernel
 def _set_flowing(axes: Array, omega: Array, deformation: Array, attitude: Array, y: Array) -> None:
-    """State of a body that flows with the velocity gradient ``deformation[3, 3]`` on top of its spin (body axes)."""
+    """State of a body that flows with its spin and the velocity gradient ``deformation[3, 3]``, along the body axes."""
     a, b, back = np.empty((3, 3)), np.zeros((3, 3)), attitude.T.copy()
     for i in range(3):
         b[i, i] = axes[i] ** 2
@@ -120,58 +161,44 @@ def _set_flowing(axes: Array, omega: Array, deformation: Array, attitude: Array,
 
 
 @inlined
-def carry(
-    axes: Array,
-    rho: float,
-    omega: Array,
-    attitude: Array,
-    t_start: float,
-    t_stop: float,
-    t_rest: float,
+def evolve(
+    body: BodyState,
+    span: Span,
     tide: TidePanels,
     ground: Ground,
-    phi: float,
-    cohesion: float,
-    dilatancy: float,
-    surface: int,
-    brittle: bool,
-    expansion: float,
+    limits: Limits,
     unyielding: bool,
-    tolerance: float,
-    max_axis_ratio: float,
-    max_steps: int,
+    deformation: Array,
     shape: Array,
     gradient: Array,
-    hist: Array,
-    events: Array,
-    count: Counts,
-    mark: Array,
-    deformation: Array,
-) -> tuple[int, float, int]:
-    """Follow a body; the arguments are those of `passage`, with a `deformation` of zero for a rigid start.
+    log: Log,
+) -> FinalState:
+    """Follow a body through its regimes, in SI units.
 
-    Writes ``S`` (m2) and ``L`` (1/s) at the end, and the history (in the units of the body, but with the stresses
-    in Pa and times in s), event log (s), counts and mark (rad, s) of
-    :func:`flybystab.core.dynamics.regimes.follow`; returns the reason, time (s) and regime of the end.
+    `deformation` is a velocity gradient on top of the spin as in `integrate`; zero for a rigid start. Writes ``S``
+    (m2) and ``L`` (1/s) at the end; history (in the units of the body, but with the stresses in Pa and times in s),
+    events and counts go to `log`.
     """
-    t0 = 1.0 / np.sqrt(np.pi * G * rho)
-    a0 = np.cbrt(axes[0] * axes[1] * axes[2])
-    par = parameters(axes, rho, phi, cohesion, dilatancy, surface, 0.0, expansion)
+    t0 = 1.0 / np.sqrt(np.pi * G * body.rho)
+    a0 = np.cbrt(body.axes[0] * body.axes[1] * body.axes[2])
+    par = parameters(
+        body.axes, body.rho, body.phi, body.cohesion, body.dilatancy, body.surface, 0.0, body.expansion
+    )
     y = np.zeros(state.N_FULL)
-    regimes.quaternion(attitude, y)
+    regimes.quaternion(body.attitude, y)
     for i in range(3):
-        y[4 + i] = omega[i] * t0
+        y[4 + i] = body.omega[i] * t0
     start = state.RIGID
     if np.any(deformation != 0.0):
         start = state.FLOWING
-        _set_flowing(axes / a0, omega * t0, deformation * t0, attitude, y)
+        _set_flowing(body.axes / a0, body.omega * t0, deformation * t0, body.attitude, y)
     scaled = TidePanels(tide.tau / t0, tide.start, tide.width, tide.coefficients * t0**2)
     below = Ground(
         ground.tau / t0, ground.start, ground.width, ground.floor, ground.least, a0, ground.coefficients
     )
-    reason, t, regime = regimes.follow(
-        t_start / t0, t_stop / t0, t_rest / t0, start, y, par, scaled, below, tolerance, max_axis_ratio,
-        brittle, unyielding, max_steps, hist, events, count, mark, workspace(),
+    reason, t, regime, peak = regimes.follow(
+        Span(span.start / t0, span.rest / t0, span.stop / t0), start, y, par, scaled, below, limits,
+        body.brittle, unyielding, log, workspace(),
     )  # fmt: skip
     unpack(y[0:6], shape)
     state.gradient(y, gradient)
@@ -179,23 +206,23 @@ def carry(
         for j in range(3):
             shape[i, j] *= a0 * a0
             gradient[i, j] /= t0
-    for i in range(count[0]):
+    for i in range(log.counts[0]["rows"]):
+        row = log.history[i]
         # T = 5 sigma/rho, and the density has changed with the volume
-        stress = rho * a0**2 / t0**2 / 5.0 / np.sqrt(determinant(hist[i, 2:8]))
-        hist[i, 0] *= t0
-        hist[i, 17] *= stress
-        hist[i, 18] *= stress
-    for i in range(min(count[1], events.shape[0])):
-        events[i, 1] *= t0
-    mark[1] *= t0
-    return reason, t * t0, regime
+        stress = body.rho * a0**2 / t0**2 / 5.0 / np.sqrt(determinant(row["state"]))
+        row["time"] *= t0
+        row["pressure"] *= stress
+        row["deviator"] *= stress
+    for i in range(min(log.counts[0]["events"], log.events.shape[0])):
+        log.events[i]["time"] *= t0
+    return FinalState(reason, t * t0, regime, Peak(peak.friction, peak.time * t0))
 
 
 # Outside of a kernel the plain function, which calls the compiled `follow`; as a kernel it would be compiled anew.
-_carry = getattr(carry, "py_func", carry)
+_evolve = getattr(evolve, "py_func", evolve)
 
 
-def passage(
+def integrate(
     axes: Array,
     rho: float,
     omega: Array,
@@ -210,7 +237,7 @@ def passage(
     dilatancy: float = 0.0,
     surface: int = 0,
     brittle: bool = False,
-    expansion: float = 1.5,
+    expansion: float = EXPANSION,
     unyielding: bool = False,
     tolerance: float = 1e-9,
     max_axis_ratio: float = 6.0,
@@ -218,7 +245,7 @@ def passage(
     keep: int = 0,
     deformation: Array | None = None,
     ground: Ground | None = None,
-) -> Passage:
+) -> Run:
     """Follow a body that starts rigid, or in flow, through a tide.
 
     Parameters
@@ -229,19 +256,20 @@ def passage(
         Rotation matrix, body axes -> frame of the tide.
     t_start, t_stop : float
         Span, s, on the clock of the tide.
-    t_rest : float, optional
-        A body that is rigid at or after this time ends the run; `t_stop` by default.
     tide : TidePanels
         SI.
+    t_rest : float, optional
+        A body that is rigid at or after this time ends the run; `t_stop` by default.
     phi, cohesion, dilatancy, surface, brittle, expansion
-        Material: rad, Pa, ``beta / min k``, code of the yield surface, loss of cohesion at first yield,
-        ``V/V0`` at which dilation ends.
+        Material, as in :class:`BodyState`.
     unyielding : bool
-        Stay rigid whatever the stress, to learn the friction that would be needed.
+        Stay rigid whatever the stress, for the friction that would be needed.
     tolerance : float
         Relative error allowed in a step.
     max_axis_ratio : float
-        Where the homogeneous model is left.
+        Axis ratio beyond which the homogeneous model is left.
+    max_steps : int
+        Steps after which the run is given up.
     keep : int
         Rows of history to keep at most; 0 for none.
     deformation : ndarray (3, 3), optional
@@ -250,75 +278,72 @@ def passage(
         Ends the run where the body reaches it; none by default.
     """
     shape, gradient = np.empty((3, 3)), np.empty((3, 3))
-    hist = np.zeros((max(keep, 1), N_HISTORY))
-    events = np.zeros((64, N_EVENT))
-    count = np.zeros(4, dtype=np.int64)
-    mark = np.zeros(2)
-    reason, time, regime = _carry(
+    log = new_log(keep, 64)
+    body = BodyState(
         np.array(axes, dtype=float),
         rho,
         np.array(omega, dtype=float),
         np.array(attitude, dtype=float, order="C"),
-        t_start,
-        t_stop,
-        t_stop if t_rest is None else t_rest,
-        tide,
-        no_ground() if ground is None else ground,
         phi,
         cohesion,
         dilatancy,
         surface,
         brittle,
         expansion,
+    )
+    span = Span(float(t_start), float(t_stop if t_rest is None else t_rest), float(t_stop))
+    end = _evolve(
+        body,
+        span,
+        tide,
+        no_ground() if ground is None else ground,
+        Limits(float(tolerance), float(max_axis_ratio), max_steps),
         unyielding,
-        tolerance,
-        max_axis_ratio,
-        max_steps,
-        shape,
-        gradient,
-        hist,
-        events,
-        count,
-        mark,
         np.zeros((3, 3)) if deformation is None else np.array(deformation, dtype=float, order="C"),
-    )
-    return Passage(
-        EVENTS[reason],
-        REGIMES[regime],
-        float(time),
         shape,
         gradient,
-        float(mark[0]),
-        float(mark[1]),
-        event_log(events, count),
-        unpacked_history(hist[: count[0]], axes, rho) if keep > 1 else None,
-        int(count[2]),
-        int(count[3]),
+        log,
+    )
+    counts = log.counts[0]
+    return Run(
+        EVENTS[end.reason],
+        REGIMES[end.regime],
+        float(end.time),
+        shape,
+        gradient,
+        float(end.peak.friction),
+        float(end.peak.time),
+        event_log(log),
+        unpacked_history(log.history[: counts["rows"]], axes, rho) if keep > 1 else None,
+        int(counts["steps"]),
+        int(counts["rejected"]),
     )
 
 
-def event_log(events: Array, count: Counts) -> list[tuple[str, float, float]]:
-    """Name, time (s) and Lode angle (rad; nan where there is none) of the events that `carry` wrote."""
-    log = []
-    for code, when, det, _ in events[: count[1]]:
+def event_log(log: Log) -> list[tuple[str, float, float]]:
+    """Name, time (s) and Lode angle (rad; nan where there is none) of the events of a run."""
+    out = []
+    for event in log.events[: log.counts[0]["events"]]:
+        det = event["determinant"]
         lode = np.arcsin(np.clip(-3.0 * np.sqrt(6.0) * det, -1.0, 1.0)) / 3.0 if det != 0.0 else np.nan
-        log.append((EVENTS[int(code)], float(when), float(lode)))
-    return log
+        out.append((EVENTS[event["code"]], float(event["time"]), float(lode)))
+    return out
 
 
-def unpacked_history(rows: Array, axes: Array, rho: float) -> dict[str, Array]:
-    """The columns of :class:`Passage` from the rows that `carry` wrote."""
+def unpacked_history(rows: NDArray[Any], axes: Array, rho: float) -> dict[str, Array]:
+    """The history of :class:`Run` from the rows that `evolve` wrote."""
     t0 = 1.0 / np.sqrt(np.pi * G * rho)
     a0 = np.cbrt(np.prod(axes))
+    y = rows["state"]
     return {
-        "time": rows[:, 0].copy(),
-        "regime": rows[:, 1].astype(int),
-        "shape": _symmetric(rows[:, 2:8]) * a0**2,
-        "velocity_gradient": _gradient(rows[:, 8:14], rows[:, 14:17]) / t0,
-        "pressure": rows[:, 17].copy(),
-        "deviator": rows[:, 18].copy(),
-        "determinant": rows[:, 19].copy(),
-        "quaternion": rows[:, 20:24].copy(),
+        "time": rows["time"].copy(),
+        "regime": rows["regime"].copy(),
+        "shape": _symmetric(y[:, 0:6]) * a0**2,
+        "velocity_gradient": _gradient(y[:, 6:12], y[:, 12:15]) / t0,
+        "pressure": rows["pressure"].copy(),
+        "deviator": rows["deviator"].copy(),
+        "determinant": rows["determinant"].copy(),
+        "quaternion": rows["quaternion"].copy(),
     }
 
 

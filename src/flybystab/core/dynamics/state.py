@@ -1,12 +1,10 @@
-"""The state of a body, the parameters of a run and the scratch of its rates, as flat arrays.
+"""State of a body, parameters of a run and scratch of its rates.
 
 Kernels work in the units of the body: length ``a0 = (a1 a2 a3)^(1/3)``, time ``1/sqrt(pi G rho0)`` at the
 initial density, stress in the form ``T = 5 sigma/rho``. Then ``det S = (V/V0)^2``. Two states:
 
 RIGID, 7 numbers: unit quaternion (body axes -> fixed frame, scalar first), ``omega`` along the body axes.
 Every other regime, 15 numbers, fixed frame: ``S`` (6 components), ``D = sym L`` (6), ``w``: ``W x = w x x``.
-
-The parameters of a run are one flat array, see the slots below and in :mod:`flybystab.core.material.parameters`.
 """
 
 from __future__ import annotations
@@ -15,7 +13,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from flybystab.core.ellipsoid.potential import gravity_coefficients
 from flybystab.core.ellipsoid.tide import COMPONENTS
+from flybystab.core.material.parameters import MaterialParameters
 from flybystab.core.numerics.jit import code, kernel
 from flybystab.core.numerics.tensors import multiply, pack, unpack
 from flybystab.typing import Array
@@ -29,16 +29,40 @@ FLUID = code(3)
 N_RIGID = code(7)
 N_FULL = code(15)
 
-# Slots of the parameter array beside those of the material (:mod:`flybystab.core.material.parameters`).
-S1 = 7  # squared semi-axes of the rigid body, and its gravity K_g,i
-S2 = 8
-S3 = 9
-G1 = 10
-G2 = 11
-G3 = 12
-N_PARAMETERS = 16
 
-# Matrices of `Buffers.m` that `field` fills and the rates read.
+class RigidShape(NamedTuple):
+    """Squared semi-axes of a rigid body, and its self-gravity ``K_g,i = -2 (V0/V) A_i`` along them."""
+
+    s1: float
+    s2: float
+    s3: float
+    g1: float
+    g2: float
+    g3: float
+
+
+class Parameters(NamedTuple):
+    """Parameters of a run: the material, and the shape that the body has while it is rigid."""
+
+    material: MaterialParameters
+    rigid: RigidShape
+
+
+@kernel
+def rigid_shape(s1: float, s2: float, s3: float) -> RigidShape:
+    """Shape record of squared semi-axes."""
+    a1, a2, a3 = gravity_coefficients(s1, s2, s3)
+    c = -2.0 / np.sqrt(s1 * s2 * s3)
+    return RigidShape(s1, s2, s3, c * a1, c * a2, c * a3)
+
+
+@kernel
+def rigid_volume(shape: RigidShape) -> float:
+    """``V/V0`` of the rigid body."""
+    return np.sqrt(shape.s1 * shape.s2 * shape.s3)
+
+
+# Matrices of `Buffers.m` that `gravity_terms` fills and the rates read.
 W_SINV = 0
 W_K = 1  # K_g + K_t
 W_L = 2
@@ -65,13 +89,13 @@ J_NORMAL = 21
 N_WORK = 22
 
 
-# Numbers of `Buffers.s` that `field` and the rates leave.
+# Numbers of `Buffers.s` that `gravity_terms` and the rates leave.
 VOLUME = 0  # V/V0
 STRENGTH = 1  # k P + k c
 PRESSURE = 2
 DETERMINANT = 3  # of the unit stress deviator
 PLACE = 4  # of the stress on a face, between the corners (0: extension, 1: compression)
-PAST = 5  # angle of D past the normal of the face, rad
+BEYOND_FACE = 5  # Lode angle of D beyond the normal of the face, rad
 N_NUMBERS = 6
 
 
@@ -123,10 +147,10 @@ def rotated_to_body(q: Array, k: Array, m: Array, out: Array) -> None:
 
 
 @kernel
-def to_fixed_frame(y: Array, par: Array, m: Array, shape: Array, spin: Array) -> None:
+def to_fixed_frame(y: Array, rigid: RigidShape, m: Array, shape: Array, spin: Array) -> None:
     """Write ``S`` (``shape[6]``) and ``w`` (``spin[3]``) of a RIGID state; ``m[3, 3]`` gets the rotation."""
     rotation_matrix(y, m)
-    s1, s2, s3 = par[S1], par[S2], par[S3]
+    s1, s2, s3 = rigid.s1, rigid.s2, rigid.s3
     for c, (i, j) in enumerate(COMPONENTS):
         shape[c] = s1 * m[i, 0] * m[j, 0] + s2 * m[i, 1] * m[j, 1] + s3 * m[i, 2] * m[j, 2]
     for i in range(3):

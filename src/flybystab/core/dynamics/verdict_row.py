@@ -1,15 +1,18 @@
-"""One row of many: a body through an encounter, its verdict and what there is to say of it, without Python objects."""
+"""A body through an encounter and its verdict, for many rows, without Python objects."""
 
 from __future__ import annotations
+
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.constants import G
 from flybystab.core.dynamics.ground import Ground
-from flybystab.core.dynamics.run import carry
+from flybystab.core.dynamics.regimes import Span
+from flybystab.core.dynamics.run import EXPANSION, BodyState, evolve
 from flybystab.core.dynamics.state import RIGID
-from flybystab.core.dynamics.workspace import BEYOND, N_EVENT, N_HISTORY, ONSET, STUCK, TOUCH, Counts
+from flybystab.core.dynamics.workspace import BEYOND, ONSET, STUCK, TOUCH, Limits, Log, new_log, reset
 from flybystab.core.ellipsoid.bound_mass import (
     angle_between,
     bound_share,
@@ -23,132 +26,193 @@ from flybystab.core.numerics.jit import inlined, kernel
 from flybystab.core.verdict_codes import BEYOND_MODEL, FAILED, FLOWED, IMPACT, INTACT, NOT_IN_EQUILIBRIUM
 from flybystab.typing import Array
 
-# Columns of a body's material.
-PHI = 0  # rad
-COHESION = 1  # Pa
-DILATANCY = 2
-SURFACE = 3  # code
-BRITTLE = 4  # 0 or 1
+#: A body at the start of its encounter: axes (m), density (kg/m3), spin along the axes (rad/s), rotation body axes ->
+#: frame of the encounter, material as in :class:`flybystab.core.dynamics.run.BodyState`, number of the encounter.
+BODY = np.dtype(
+    [
+        ("axes", "f8", 3),
+        ("rho", "f8"),
+        ("omega", "f8", 3),
+        ("attitude", "f8", (3, 3)),
+        ("phi", "f8"),
+        ("cohesion", "f8"),
+        ("dilatancy", "f8"),
+        ("surface", "i8"),
+        ("brittle", "i8"),
+        ("encounter", "i8"),
+    ]
+)
 
-# Columns of an encounter: times (s).
-START = 0
-REST = 1  # a body that is rigid after this ends the run
-STOP = 2
+#: Series on panels of equal width in ``asinh(t/tau)``: the panels `first` to `last` of a joined array of coefficients.
+_SERIES = [("tau", "f8"), ("start", "f8"), ("width", "f8"), ("first", "i8"), ("last", "i8")]
 
-#: A body whose centre stays higher than this many long semi-axes is not looked at for touching the ground.
+#: An encounter: span (s; see :class:`flybystab.core.dynamics.regimes.Span`), tide, and ground (m; see
+#: :class:`flybystab.core.dynamics.ground.Ground`).
+ENCOUNTER = np.dtype(
+    [
+        ("start", "f8"),
+        ("rest", "f8"),
+        ("stop", "f8"),
+        ("tide", _SERIES),
+        ("ground", _SERIES),
+        ("floor", "f8"),
+        ("least", "f8"),
+    ]
+)
+
+#: Outcome of a row.
+OUTCOME = np.dtype(
+    [
+        ("verdict", "i8"),  # code
+        ("bound_fraction", "f8"),
+        ("axes", "f8", 3),  # m, longest first
+        ("spin", "f8", 3),  # rad/s, frame of the encounter
+        ("friction", "f8"),  # largest friction angle mobilised if rigid throughout, rad
+        ("friction_time", "f8"),  # s
+        ("spin_ratio", "f8"),
+        ("pole_change", "f8"),  # rad
+        ("lacking", "f8"),  # cohesion that a body lacks which cannot exist on its own, Pa
+        ("time", "f8"),  # end of the run, s
+        ("reason", "i8"),
+        ("regime", "i8"),
+        ("steps", "i8"),
+    ]
+)
+
+#: A body whose centre stays higher than this many long semi-axes is not tested for contact with the ground.
 NEAR_GROUND = 100.0
 
-# Columns of a row of answers.
-VERDICT = 0
-BOUND = 1
-AXES = 2  # three, m, longest first
-SPIN = 5  # three, rad/s, frame of the encounter
-FRICTION = 8  # largest friction angle mobilised if rigid throughout, rad
-FRICTION_TIME = 9  # s
-SPIN_RATIO = 10
-POLE_CHANGE = 11  # rad
-LACKING = 12  # cohesion that a body lacks which cannot exist on its own, Pa
-TIME = 13  # end of the run, s
-REASON = 14
-REGIME = 15
-STEPS = 16
-N_ANSWER = 17
 
+class Encounters(NamedTuple):
+    """Encounters of many rows.
 
-@inlined
-def judge(
-    axes: Array,
-    rho: float,
-    omega: Array,
-    attitude: Array,
-    material: Array,
-    span: Array,
-    tide: TidePanels,
-    ground: Ground,
-    tolerance: float,
-    limit: float,
-    needs: bool,
-    max_steps: int,
-    shape: Array,
-    gradient: Array,
-    hist: Array,
-    events: Array,
-    count: Counts,
-    out: Array,
-) -> None:
-    """Carry a body through an encounter and judge it.
-
-    Parameters
+    Attributes
     ----------
-    axes, rho, omega, attitude
-        As in :func:`flybystab.core.dynamics.run.passage`.
-    material, span : ndarray (5,), (3,)
-        See the columns above.
-    tide : TidePanels
-        SI.
-    ground : Ground
-        A body that reaches it ends there.
-    tolerance, limit, max_steps
-        Relative error a step, axis ratio where the model is left (never below that of the body), most steps.
-    needs : bool
-        Whether to follow a body that yields once more without yielding, for the friction that it would need.
+    rows : ndarray of ENCOUNTER, shape (e,)
+    tides : ndarray, shape (panels, degree + 1, 6)
+        Coefficients of all tides, s^-2.
+    positions : ndarray, shape (panels, degree + 1, 3)
+        Coefficients of the positions of the planets, m.
+    """
+
+    rows: NDArray[Any]
+    tides: Array
+    positions: Array
+
+
+class Output(NamedTuple):
+    """Output of rows: outcomes of all, and end state and record of the last.
+
+    Attributes
+    ----------
+    outcomes : ndarray of OUTCOME, shape (n,)
     shape, gradient : ndarray (3, 3)
         ``S`` (m2) and ``L`` (1/s) at the end.
-    hist, events, count : ndarray
-        History and event log of :func:`flybystab.core.dynamics.regimes.follow`; times in s.
-    out : ndarray (17,)
-        The answers, see the columns above. FAILED: the integrator could not go on.
+    log : Log
+        Times in s.
     """
-    surface = int(material[SURFACE])
-    stress = np.empty(6)
-    s1, s2, s3 = axes[0] ** 2, axes[1] ** 2, axes[2] ** 2
-    rigid_stress(s1, s2, s3, rho, np.pi * G * rho, omega, np.zeros(6), stress)
+
+    outcomes: NDArray[Any]
+    shape: Array
+    gradient: Array
+    log: Log
+
+
+@kernel
+def _equilibrium(body: BodyState, stress: Array) -> bool:
+    """Whether the body can exist on its own; writes its stress without a tide, Pa."""
+    s1, s2, s3 = body.axes[0] ** 2, body.axes[1] ** 2, body.axes[2] ** 2
+    rigid_stress(s1, s2, s3, body.rho, np.pi * G * body.rho, body.omega, np.zeros(6), stress)
     size = 0.0
     for i in range(6):
         size = max(size, abs(stress[i]))
-    holds = overload(surface, material[PHI], material[COHESION], stress) <= 1e-12 * size
-    ratio = max(limit, 1.001 * axes[0] / axes[2])
-    mark = np.zeros(2)
-    # A body that cannot exist on its own is not carried on: its demand at the start is the answer.
-    reason, time, regime = carry(
-        axes, rho, omega, attitude, span[START], span[STOP], span[REST], tide, ground,
-        material[PHI], material[COHESION], material[DILATANCY], surface, material[BRITTLE] > 0.0, 1.5,
-        not holds, tolerance, ratio, max_steps, shape, gradient, hist, events, count, mark, np.zeros((3, 3)),
-    )  # fmt: skip
-    out[TIME], out[REASON], out[REGIME], out[STEPS] = time, reason, regime, count[2]
-    out[FRICTION], out[FRICTION_TIME] = mark[0], mark[1]
-    out[LACKING] = 0.0
-    if not holds:
-        out[LACKING] = demand(surface, material[PHI], material[COHESION], stress)[1]
-    yielded = count[1] > 0 and int(events[0, 0]) == ONSET
-    vectors = np.empty((3, 3))
-    principal_axes(shape, out[AXES : AXES + 3], vectors)
-    spin_vector(gradient, out[SPIN : SPIN + 3])
+    return overload(body.surface, body.phi, body.cohesion, stress) <= 1e-12 * size
+
+
+@kernel
+def _final_state(body: BodyState, regime: int, holds: bool, out: Any, shape: Array, gradient: Array) -> None:
+    """Write axes, spin, bound mass fraction and their changes from the state at the end."""
+    axes, vectors = out["axes"], np.empty((3, 3))
+    principal_axes(shape, axes, vectors)
+    spin_vector(gradient, out["spin"])
     bound = 1.0
     if holds and regime != RIGID:
-        rho_now = rho * axes[0] * axes[1] * axes[2] / (out[AXES] * out[AXES + 1] * out[AXES + 2])
+        rho_now = body.rho * body.axes[0] * body.axes[1] * body.axes[2] / (axes[0] * axes[1] * axes[2])
         bound = bound_share(shape, gradient, rho_now)
-    out[BOUND] = bound
+    out["bound_fraction"] = bound
     before, after = np.empty(3), np.empty(3)
     rate = momentum(shape, gradient, after)
     first = np.empty((3, 3))
     still = np.empty((3, 3))
-    _initial(axes, omega, attitude, still, first)
+    _initial(body.axes, body.omega, body.attitude, still, first)
     rate_before = momentum(still, first, before)
-    out[SPIN_RATIO] = rate / rate_before if rate_before > 0.0 else (np.inf if rate > 0.0 else 1.0)
-    out[POLE_CHANGE] = angle_between(before, after)
-    if yielded and needs and reason != STUCK:
-        no_rows = np.zeros((1, N_HISTORY))
-        no_events = np.zeros((1, N_EVENT))
-        tries = np.zeros(4, dtype=np.int64)
-        second, _, _ = carry(
-            axes, rho, omega, attitude, span[START], span[STOP], span[REST], tide, ground,
-            material[PHI], material[COHESION], material[DILATANCY], surface, False, 1.5, True, tolerance,
-            ratio, max_steps, still, first, no_rows, no_events, tries, mark, np.zeros((3, 3)),
+    out["spin_ratio"] = rate / rate_before if rate_before > 0.0 else (np.inf if rate > 0.0 else 1.0)
+    out["pole_change"] = angle_between(before, after)
+
+
+@inlined
+def verdict_row(
+    body: BodyState,
+    span: Span,
+    tide: TidePanels,
+    ground: Ground,
+    limits: Limits,
+    required: bool,
+    out: Any,
+    shape: Array,
+    gradient: Array,
+    log: Log,
+) -> None:
+    """Follow a body through an encounter and classify the outcome.
+
+    Parameters
+    ----------
+    body : BodyState
+    span : Span
+        s.
+    tide : TidePanels
+        SI.
+    ground : Ground
+        A body that reaches it ends there.
+    limits : Limits
+        The axis ratio is never below that of the body.
+    required : bool
+        Whether to follow a body that yields once more without yielding, for the friction that it would need.
+    out : record of OUTCOME
+        The verdict FAILED: the integrator could not go on.
+    shape, gradient : ndarray (3, 3)
+        ``S`` (m2) and ``L`` (1/s) at the end.
+    log : Log
+        Times in s.
+    """
+    stress = np.empty(6)
+    holds = _equilibrium(body, stress)
+    limits = Limits(
+        limits.tolerance, max(limits.axis_ratio, 1.001 * body.axes[0] / body.axes[2]), limits.max_steps
+    )
+    # A body that cannot exist on its own does not yield in the run: its demand at the start is the answer.
+    end = evolve(body, span, tide, ground, limits, not holds, np.zeros((3, 3)), shape, gradient, log)
+    reason = end.reason
+    out["time"], out["reason"], out["regime"] = end.time, end.reason, end.regime
+    out["steps"] = log.counts[0]["steps"]
+    out["friction"], out["friction_time"] = end.peak.friction, end.peak.time
+    out["lacking"] = 0.0
+    if not holds:
+        out["lacking"] = demand(body.surface, body.phi, body.cohesion, stress)[1]
+    yielded = log.counts[0]["events"] > 0 and log.events[0]["code"] == ONSET
+    _final_state(body, end.regime, holds, out, shape, gradient)
+    if yielded and required and reason != STUCK:
+        tough = BodyState(
+            body.axes, body.rho, body.omega, body.attitude, body.phi, body.cohesion, body.dilatancy,
+            body.surface, False, body.expansion,
         )  # fmt: skip
-        out[FRICTION], out[FRICTION_TIME] = mark[0], mark[1]
-        reason = STUCK if second == STUCK else reason
-    out[VERDICT] = _verdict(reason, holds, out[REASON] == TOUCH or ground.least < 0.0, yielded)
+        second = evolve(
+            tough, span, tide, ground, limits, True, np.zeros((3, 3)), np.empty((3, 3)), np.empty((3, 3)),
+            new_log(0, 1),
+        )  # fmt: skip
+        out["friction"], out["friction_time"] = second.peak.friction, second.peak.time
+        reason = STUCK if second.reason == STUCK else reason
+    out["verdict"] = _verdict(reason, holds, end.reason == TOUCH or ground.least < 0.0, yielded)
 
 
 @kernel
@@ -183,66 +247,46 @@ def _initial(axes: Array, omega: Array, attitude: Array, shape: Array, gradient:
 
 
 @kernel
-def judge_rows(
+def _body(row: Any) -> BodyState:
+    """State record of a row of BODY."""
+    return BodyState(
+        row["axes"], row["rho"], row["omega"], row["attitude"], row["phi"], row["cohesion"], row["dilatancy"],
+        row["surface"], row["brittle"] > 0, EXPANSION,
+    )  # fmt: skip
+
+
+@kernel
+def verdict_rows(
     rows: NDArray[np.int64],
-    axes: Array,
-    rho: Array,
-    omega: Array,
-    attitude: Array,
-    material: Array,
-    which: NDArray[np.int64],
-    spans: Array,
-    scales: Array,
-    first: NDArray[np.int64],
-    coefficients: Array,
-    grounds: Array,
-    first_ground: NDArray[np.int64],
-    positions: Array,
-    tolerance: float,
-    limit: float,
-    max_steps: int,
-    needs: bool,
-    shape: Array,
-    gradient: Array,
-    hist: Array,
-    events: Array,
-    count: Counts,
-    out: Array,
+    bodies: NDArray[Any],
+    encounters: Encounters,
+    limits: Limits,
+    required: bool,
+    output: Output,
 ) -> None:
-    """`judge` for the given rows of arrays over bodies; writes those rows of ``out[n, 17]``.
+    """`verdict_row` for the given rows of ``bodies[n]`` (BODY); writes those rows of the outcomes.
 
     Parameters
     ----------
     rows : ndarray of int (m,)
-    axes, rho, omega, attitude, material : ndarray (n, 3), (n,), (n, 3), (n, 3, 3), (n, 5)
-    which : ndarray of int (n,)
-        Encounter of each row.
-    spans, scales : ndarray (e, 3), (e, 3)
-        Of each encounter: its span; ``tau``, ``start`` and ``width`` of its panels.
-    first : ndarray of int (e + 1,)
-        Where its panels begin in ``coefficients[panels, degree + 1, 6]``.
-    grounds : ndarray (e, 5)
-        Of each encounter: the first five of :class:`flybystab.core.dynamics.ground.Ground`.
-    first_ground : ndarray of int (e + 1,)
-        Where its panels begin in ``positions[panels, degree + 1, 3]``.
-    shape, gradient, hist, events, count
-        As in `judge`, of the last row.
+    bodies : ndarray of BODY (n,)
+    encounters : Encounters
+    limits, required
+        As in `verdict_row`.
+    output : Output
     """
     for i in rows:
-        e = which[i]
-        tide = TidePanels(
-            scales[e, 0],
-            scales[e, 1],
-            scales[e, 2],
-            np.ascontiguousarray(coefficients[first[e] : first[e + 1]]),
-        )
-        g = grounds[e]
-        a, b = first_ground[e], first_ground[e + 1]
-        if g[4] > NEAR_GROUND * axes[i, 0]:
-            b = a
-        ground = Ground(g[0], g[1], g[2], g[3], g[4], 1.0, np.ascontiguousarray(positions[a:b]))
-        count[:] = 0
-        judge(
-            axes[i], rho[i], omega[i], attitude[i], material[i], spans[e], tide, ground, tolerance,
-            limit, needs, max_steps, shape, gradient, hist, events, count, out[i],
+        body = _body(bodies[i])
+        e = encounters.rows[bodies[i]["encounter"]]
+        s = e["tide"]
+        panels = np.ascontiguousarray(encounters.tides[s["first"] : s["last"]])
+        tide = TidePanels(s["tau"], s["start"], s["width"], panels)
+        g = e["ground"]
+        last = g["first"] if e["least"] > NEAR_GROUND * body.axes[0] else g["last"]
+        positions = np.ascontiguousarray(encounters.positions[g["first"] : last])
+        ground = Ground(g["tau"], g["start"], g["width"], e["floor"], e["least"], 1.0, positions)
+        reset(output.log)
+        verdict_row(
+            body, Span(e["start"], e["rest"], e["stop"]), tide, ground, limits, required,
+            output.outcomes[i], output.shape, output.gradient, output.log,
         )  # fmt: skip

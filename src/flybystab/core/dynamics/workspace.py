@@ -1,4 +1,4 @@
-"""What the followers of the regimes share: buffers, codes, the history and the event log."""
+"""Buffers and codes that the regimes share, limits of a run, and its record: history, events, counts."""
 
 from __future__ import annotations
 
@@ -7,12 +7,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from flybystab.core.dynamics.state import RIGID, W_SCRATCH, Buffers, empty_buffers, to_fixed_frame
-from flybystab.core.dynamics.steppers import N_STAGES
+from flybystab.core.dynamics.state import RIGID, W_SCRATCH, Buffers, Parameters, empty_buffers, to_fixed_frame
+from flybystab.core.numerics.dop853 import N_EXTENDED
 from flybystab.core.numerics.jit import borrowed, code, kernel
 from flybystab.typing import Array
-
-Counts = NDArray[np.int64]
 
 # Why a regime (or the run) ended; the same codes head the rows of the event log.
 DONE = code(0)
@@ -27,16 +25,63 @@ SWITCH = code(8)  # flow passes from one part of the yield section to another (n
 TOUCH = code(9)  # the body has reached the ground
 FADE = code(10)  # the dilatancy of a flow begins to fade (not logged)
 
-#: Columns of the history: time, regime, S (6), D (6), w (3), pressure, deviator norm, unit determinant, and
-#: the unit quaternion (body axes -> fixed frame) of a rigid body, zero otherwise.
-N_HISTORY = 24
-#: Columns of the event log: code, time, Lode determinant, volume.
-N_EVENT = 4
+#: Row of the history, in the units of the body: state in the fixed frame, stress, and the unit quaternion (body axes
+#: -> fixed frame) of a rigid body, zero otherwise.
+HISTORY = np.dtype(
+    [
+        ("time", "f8"),
+        ("regime", "i8"),
+        ("state", "f8", 15),  # S (6), D (6), w (3)
+        ("pressure", "f8"),
+        ("deviator", "f8"),  # norm
+        ("determinant", "f8"),  # of the unit deviator
+        ("quaternion", "f8", 4),
+    ]
+)
+#: Row of the event log.
+EVENT = np.dtype([("code", "i8"), ("time", "f8"), ("determinant", "f8"), ("volume", "f8")])
+#: Rows of the history, events, steps tried and steps rejected.
+COUNTS = np.dtype([("rows", "i8"), ("events", "i8"), ("steps", "i8"), ("rejected", "i8")])
 #: Samples in a step: history rows, and the grid on which extrema of the yield function are looked for while rigid.
 N_SAMPLE = 4
 
 #: Rate of strain, in dynamical units, below which the body is at rest.
 D_REST = 1e-10
+
+
+class Limits(NamedTuple):
+    """Limits of a run.
+
+    Attributes
+    ----------
+    tolerance : float
+        Relative error allowed in a step.
+    axis_ratio : float
+        Axis ratio beyond which the homogeneous model is left.
+    max_steps : int
+        Steps after which the run is given up.
+    """
+
+    tolerance: float
+    axis_ratio: float
+    max_steps: int
+
+
+class Log(NamedTuple):
+    """Record of a run: ``history[n]`` of `HISTORY` (one row or less: none is kept), ``events[m]`` of `EVENT`, and
+    ``counts[1]`` of `COUNTS`.
+    """
+
+    history: NDArray[np.void]
+    events: NDArray[np.void]
+    counts: NDArray[np.void]
+
+
+class Peak(NamedTuple):
+    """Largest friction angle (rad) that a rigid body has mobilised, and its time."""
+
+    friction: float
+    time: float
 
 
 class Workspace(NamedTuple):
@@ -55,8 +100,13 @@ class Workspace(NamedTuple):
     stress: Array
     sample: Array
     spare: Array  # 36 of an impulse, its 6 zeros, 3 of the ground; of a flow the first 30
-    mark: Array  # largest mobilised friction, its time; step size; in flow: code of the event nearest, volume ahead
     ends: Array  # flow: event functions at the samples of a step, and last
+
+
+@kernel
+def new_log(rows: int, events: int) -> Log:
+    """An empty record with room for the given rows and events."""
+    return Log(np.zeros(max(rows, 1), HISTORY), np.zeros(events, EVENT), np.zeros(1, COUNTS))
 
 
 @kernel
@@ -71,7 +121,7 @@ def workspace() -> Workspace:
     """Fresh buffers."""
     return Workspace(
         empty_buffers(),
-        np.zeros((N_STAGES, 15)),
+        np.zeros((N_EXTENDED, 15)),
         np.zeros((15, 16)),
         np.zeros((15, 15)),
         np.zeros(15, dtype=np.int64),
@@ -83,7 +133,6 @@ def workspace() -> Workspace:
         np.zeros(6),
         np.zeros((2, N_SAMPLE + 1)),
         np.zeros(45),
-        np.zeros(5),
         np.zeros((4, N_SAMPLE + 2)),
     )
 
@@ -105,58 +154,97 @@ def borrowed_workspace(ws: Workspace) -> Workspace:
         borrowed(ws.stress),
         borrowed(ws.sample),
         borrowed(ws.spare),
-        borrowed(ws.mark),
         borrowed(ws.ends),
     )
 
 
 @kernel
-def record(
-    t: float,
-    regime: int,
-    y: Array,
-    par: Array,
-    p: float,
-    s: float,
-    det: float,
-    ws: Workspace,
-    hist: Array,
-    count: Counts,
-) -> None:
-    """Append a row to the history; when it is full every second row is dropped first."""
-    if hist.shape[0] < 2:
-        return
-    n = count[0]
-    if n == hist.shape[0]:
-        m = n // 2
-        for i in range(m):
-            for j in range(N_HISTORY):
-                hist[i, j] = hist[2 * i, j]
-        n = m
-    row = hist[n]
-    row[0] = t
-    row[1] = regime
-    if regime == RIGID:
-        to_fixed_frame(y, par, ws.work.m[W_SCRATCH], row[2:8], row[14:17])
-        for i in range(6):
-            row[8 + i] = 0.0
-        for i in range(4):
-            row[20 + i] = y[i]
-    else:
-        for i in range(15):
-            row[2 + i] = y[i]
-        for i in range(4):
-            row[20 + i] = 0.0
-    row[17] = p
-    row[18] = s
-    row[19] = det
-    count[0] = n + 1
+def borrowed_log(log: Log) -> Log:
+    """The same record without reference counts, for use inside a kernel that has it as an argument."""
+    return Log(borrowed(log.history), borrowed(log.events), borrowed(log.counts))
 
 
 @kernel
-def log(what: int, t: float, det: float, volume: float, events: Array, count: Counts) -> None:
+def reset(log: Log) -> None:
+    """Set the counts to zero."""
+    counts = log.counts[0]
+    counts["rows"] = counts["events"] = counts["steps"] = counts["rejected"] = 0
+
+
+@kernel
+def keeps_history(log: Log) -> bool:
+    """Whether a history is kept."""
+    return log.history.shape[0] > 1
+
+
+@kernel
+def count_step(log: Log) -> None:
+    """Count a step that was tried."""
+    log.counts[0]["steps"] += 1
+
+
+@kernel
+def count_rejected(log: Log) -> None:
+    """Count a step that was rejected."""
+    log.counts[0]["rejected"] += 1
+
+
+@kernel
+def exhausted(log: Log, limits: Limits) -> bool:
+    """Whether no further step is allowed."""
+    return log.counts[0]["steps"] >= limits.max_steps
+
+
+@kernel
+def drop_last_row(log: Log) -> None:
+    """Remove the last row of the history, of a step that is to be made again."""
+    log.counts[0]["rows"] = max(log.counts[0]["rows"] - 1, 0)
+
+
+@kernel
+def record(
+    t: float, regime: int, y: Array, par: Parameters, p: float, s: float, det: float, ws: Workspace, log: Log
+) -> None:
+    """Append a row to the history; when it is full every second row is dropped first."""
+    history = log.history
+    if history.shape[0] < 2:
+        return
+    n = log.counts[0]["rows"]
+    if n == history.shape[0]:
+        m = n // 2
+        for i in range(m):
+            history[i] = history[2 * i]
+        n = m
+    row = history[n]
+    row["time"] = t
+    row["regime"] = regime
+    state = row["state"]
+    turn = row["quaternion"]
+    if regime == RIGID:
+        to_fixed_frame(y, par.rigid, ws.work.m[W_SCRATCH], state[0:6], state[12:15])
+        for i in range(6):
+            state[6 + i] = 0.0
+        for i in range(4):
+            turn[i] = y[i]
+    else:
+        for i in range(15):
+            state[i] = y[i]
+        for i in range(4):
+            turn[i] = 0.0
+    row["pressure"] = p
+    row["deviator"] = s
+    row["determinant"] = det
+    log.counts[0]["rows"] = n + 1
+
+
+@kernel
+def log_event(what: int, t: float, det: float, volume: float, log: Log) -> None:
     """Append a row to the event log; a full log keeps its first rows and counts on."""
-    if count[1] < events.shape[0]:
-        row = events[count[1]]
-        row[0], row[1], row[2], row[3] = what, t, det, volume
-    count[1] += 1
+    n = log.counts[0]["events"]
+    if n < log.events.shape[0]:
+        row = log.events[n]
+        row["code"] = what
+        row["time"] = t
+        row["determinant"] = det
+        row["volume"] = volume
+    log.counts[0]["events"] = n + 1

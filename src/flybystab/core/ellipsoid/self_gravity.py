@@ -1,4 +1,4 @@
-"""Self-gravity of an ellipsoid straight from its shape tensor, without principal axes, and its derivative.
+"""Self-gravity of an ellipsoid from its shape tensor, without principal axes, and its derivative.
 
 With ``S`` the shape tensor (squared semi-axes ``s_i`` as eigenvalues) the acceleration is ``-2 pi G rho A x``,
 
@@ -46,10 +46,10 @@ _N0, _N1, _N2, _N3, _N4 = (2.0 * _WEIGHT * _X ** (6 - k) * (1.0 - _X) ** k for k
 
 
 @kernel
-def _rule(spread: float) -> int:
+def _rule(ratio: float) -> int:
     """The rule for a value of ``I1 I2/I3``; the longest beyond all of them."""
     rule = 0
-    while rule < len(NODES) - 1 and spread > REACH[rule]:
+    while rule < len(NODES) - 1 and ratio > REACH[rule]:
         rule += 1
     return rule
 
@@ -93,7 +93,7 @@ def _invariants(s: Array, sinv: Array, det: float) -> tuple[float, float, float]
 
 
 @kernel
-def spread(s: Array, sinv: Array) -> float:
+def invariant_ratio(s: Array, sinv: Array) -> float:
     """``I1 I2/I3 = tr S tr S^-1``: 9 for a sphere; below ``(r + 1 + 1/r)^2`` no axis ratio exceeds ``r``."""
     return (s[0] + s[1] + s[2]) * (sinv[0, 0] + sinv[1, 1] + sinv[2, 2])
 
@@ -109,8 +109,8 @@ def gravity_tensor(s: Array, sinv: Array, det: float, values: Array, vectors: Ar
     values, vectors : ndarray (3,), ndarray (3, 3)
         Scratch for the principal axes, which are taken beyond the reach of the Gauss rules only.
     """
-    wide = spread(s, sinv)
-    if wide > REACH[-1]:
+    ratio = invariant_ratio(s, sinv)
+    if ratio > REACH[-1]:
         eigensystem(s, values, vectors)
         a1, a2, a3 = gravity_coefficients(values[0], values[1], values[2])
         c = 1.0 / np.sqrt(det)
@@ -121,7 +121,7 @@ def gravity_tensor(s: Array, sinv: Array, det: float, values: Array, vectors: Ar
         return
     i1, i2, m = _invariants(s, sinv, det)
     r = 1.0 / m
-    rule = _rule(wide)
+    rule = _rule(ratio)
     m0, m1, m2 = _first_moments(_FIRST[rule], _FIRST[rule + 1], i1 * r, i2 * r * r, det * r * r * r)
     f = r * r * r * np.sqrt(r)  # m^(-7/2)
     m0 *= f * det
@@ -145,7 +145,7 @@ def gravity_derivative(s: Array, sinv: Array, det: float, out: Array) -> None:
     """
     i1, i2, m = _invariants(s, sinv, det)
     r = 1.0 / m
-    rule = _rule(spread(s, sinv))
+    rule = _rule(invariant_ratio(s, sinv))
     a, b = _FIRST[rule], _FIRST[rule + 1]
     j1, j2, j3 = i1 * r, i2 * r * r, det * r * r * r
     m0, m1, _ = _first_moments(a, b, j1, j2, j3)

@@ -30,7 +30,7 @@ from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import multiply
 from flybystab.typing import Array
 
-#: ``V/V0`` at which dilation ends, as in :func:`flybystab.core.dynamics.run.passage`, and where its fade begins.
+#: ``V/V0`` at which dilation ends, as in :func:`flybystab.core.dynamics.run.integrate`, and where its fade begins.
 LARGEST_VOLUME = 1.5
 FADE_BEGINS = LARGEST_VOLUME - 0.1 * (LARGEST_VOLUME - 1.0)
 

@@ -1,21 +1,13 @@
-"""What a rate of strain says of the stress and of the dilation: the flow rule (theory, section 3).
+"""Flow rule of the material: stress and dilation that belong to a rate of strain (theory, section 3).
 
 The stress deviator over ``p sin(phi) + c cos(phi)`` is an isotropic function of the direction ``u`` of ``D'``,
-``N = a u + b (u^2 - 1/3)``; the dilation ``tr D`` is a share of ``|D'|``, or of the support of the yield section.
+``N = a u + b (u^2 - 1/3)``; the dilation ``tr D`` is proportional to ``|D'|``, or to the support function of the yield
+section.
 """
 
 from __future__ import annotations
 
-from flybystab.core.material.parameters import (
-    BETA,
-    COMPRESSION_CORNER,
-    EXPANSION,
-    NORMAL,
-    PART,
-    SIN_PHI,
-    SMOOTH,
-    SURFACE,
-)
+from flybystab.core.material.parameters import COMPRESSION_CORNER, SMOOTH, MaterialParameters
 from flybystab.core.material.yield_surface import corner, normal, slope_over_sine
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import deviator, unpack
@@ -23,14 +15,14 @@ from flybystab.typing import Array
 
 
 @kernel
-def fade(par: Array) -> float:
-    """``V/V0`` where the dilatancy begins to fade."""
-    return par[EXPANSION] - 0.1 * (par[EXPANSION] - 1.0)
+def fade_start(material: MaterialParameters) -> float:
+    """``V/V0`` at which the dilatancy begins to fade."""
+    return material.expansion - 0.1 * (material.expansion - 1.0)
 
 
 @kernel
 def fade_share(volume: float, end: float) -> tuple[float, float]:
-    """Share of the dilatancy left at ``V/V0``, and its derivative: a cubic over the last tenth of the expansion.
+    """Fraction of the dilatancy left at ``V/V0``, and its derivative: a cubic over the last tenth of the expansion.
 
     `end` is the ``V/V0`` at which dilation has ended: a critical state reached smoothly.
     """
@@ -44,33 +36,33 @@ def fade_share(volume: float, end: float) -> tuple[float, float]:
 
 
 @kernel
-def dilatancy(volume: float, par: Array) -> tuple[float, float]:
-    """``beta`` and ``d beta/dV`` at ``V/V0``: constant, then faded to zero where the material is loosest.
+def dilatancy(volume: float, material: MaterialParameters) -> tuple[float, float]:
+    """``beta`` and ``d beta/dV`` at ``V/V0``: constant, then faded to zero (:func:`fade_share`).
 
-    Where NORMAL is on, the share of the dilation ``m(D')`` of the normal. The fade is that of :func:`fade_share`.
+    For flow along the normal, the fraction of the associative dilation ``m(D')``.
     """
-    share, slope = fade_share(volume, par[EXPANSION])
-    return par[BETA] * share, par[BETA] * slope
+    share, slope = fade_share(volume, material.expansion)
+    return material.beta * share, material.beta * slope
 
 
 @kernel
-def flow_coefficients(det: float, par: Array) -> tuple[float, float, float, float, float]:
-    """``a, b`` of the stress with the direction ``u`` of ``D'``, ``det u`` given, and what belongs to them.
+def flow_coefficients(det: float, material: MaterialParameters) -> tuple[float, float, float, float, float]:
+    """Coefficients ``a, b`` of the stress for a direction ``u`` of ``D'`` with the determinant `det`.
 
     Returns ``a, b``, the support ``N:u``, the norm of ``N`` and the determinant of the unit stress deviator.
     """
-    surface = int(par[SURFACE])
-    if par[NORMAL] == 0.0:
-        g = slope_over_sine(surface, par[SIN_PHI], det)
+    if not material.normal:
+        g = slope_over_sine(material.surface, material.sin_phi, det)
         return g, 0.0, g, g, det
-    part = int(par[PART])
-    if part == SMOOTH:
-        return normal(surface, par[SIN_PHI], det)
-    return corner(par[SIN_PHI], det, part != COMPRESSION_CORNER)
+    if material.part == SMOOTH:
+        return normal(material.surface, material.sin_phi, det)
+    return corner(material.sin_phi, det, material.part != COMPRESSION_CORNER)
 
 
 @kernel
-def flow_stress(d: Array, par: Array, unit: Array, n: Array) -> tuple[float, float, float, float]:
+def flow_stress(
+    d: Array, material: MaterialParameters, unit: Array, n: Array
+) -> tuple[float, float, float, float]:
     """Stress deviator ``n[3, 3]`` over ``p sin(phi) + c cos(phi)`` of a flow with rate of strain ``d[6]``.
 
     Returns ``|D'|``, the norm of `n`, the support ``n:Dhat`` and the determinant of the unit stress deviator; sets
@@ -78,10 +70,10 @@ def flow_stress(d: Array, par: Array, unit: Array, n: Array) -> tuple[float, flo
     """
     _, norm, det = deviator(d, unit)
     if norm == 0.0:
-        g = slope_over_sine(int(par[SURFACE]), par[SIN_PHI], det)
+        g = slope_over_sine(material.surface, material.sin_phi, det)
         unpack(unit, n)
         return norm, g, g, det
-    a, b, support, g, det = flow_coefficients(det, par)
+    a, b, support, g, det = flow_coefficients(det, material)
     isotropic(a, b, unit, n)
     return norm, g, support, det
 
@@ -99,6 +91,6 @@ def isotropic(a: float, b: float, u: Array, n: Array) -> None:
 
 
 @kernel
-def dilation(beta: float, norm: float, support: float, par: Array) -> float:
-    """``tr D`` of the flow rule: ``beta |D'|``, or the share `beta` of ``m(D')`` where NORMAL is on."""
-    return beta * norm * (support * par[SIN_PHI] if par[NORMAL] > 0.0 else 1.0)
+def dilation(beta: float, norm: float, support: float, material: MaterialParameters) -> float:
+    """``tr D`` of the flow rule: ``beta |D'|``, or for flow along the normal the fraction `beta` of ``m(D')``."""
+    return beta * norm * (support * material.sin_phi if material.normal else 1.0)

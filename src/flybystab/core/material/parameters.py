@@ -1,22 +1,97 @@
-"""Parameters of the material in a run, as slots of the parameter array (:mod:`flybystab.core.dynamics.state`)."""
+"""Parameters of the material in a run, in the units of the body (:mod:`flybystab.core.dynamics.state`)."""
 
 from __future__ import annotations
 
-from flybystab.core.numerics.jit import code
+from typing import NamedTuple
 
-SURFACE = 0  # code of the yield surface
-SIN_PHI = 1
-COS_PHI = 2
-BETA = 3  # dilatancy beta (not beta over k); 1 where NORMAL is on
-COHESION = 4  # 5 Y/rho0 in units of a0^2 pi G rho0
-VISCOSITY = 5  # 5 (2 mu)/rho0 in units of a0^2 sqrt(pi G rho0), FLUID only
-EXPANSION = 6  # V/V0 at which dilation has ended
-NORMAL = 13  # 1: associative flow on a slope k(theta), the true normal; 0: D along the stress deviator
-PART = 14  # which part of the yield section the stress is on, see the codes below
-BESIDE = 15  # angle past the normal of a Mohr-Coulomb face, rad, up to which a corner keeps the stress
+import numpy as np
 
-# Where the stress is on the hexagon of Mohr-Coulomb in associative flow; SMOOTH on any other section.
+from flybystab.core.material.yield_surface import is_circular, least_slope
+from flybystab.core.numerics.jit import code, kernel
+
+# Part of the yield section on which the stress of an associative flow lies: a face or a corner of the hexagon of
+# Mohr-Coulomb; SMOOTH on any other section.
 SMOOTH = code(0)
 EXTENSION_CORNER = code(1)
 COMPRESSION_CORNER = code(2)
 FACE = code(3)
+
+
+class MaterialParameters(NamedTuple):
+    """Parameters of the flow rule.
+
+    Attributes
+    ----------
+    surface : int
+        Code of the yield surface (:mod:`flybystab.core.material.surfaces`).
+    sin_phi, cos_phi : float
+        Of the friction angle.
+    beta : float
+        Dilatancy ``tr D/|D'|``; 1 where `normal` is set.
+    normal : bool
+        Associative flow on a slope ``k(theta)``: D is normal to the yield surface. Otherwise D' is parallel to the
+        stress deviator.
+    cohesion : float
+        ``5 Y/rho0`` in units of ``a0^2 pi G rho0``.
+    viscosity : float
+        ``5 (2 mu)/rho0`` in units of ``a0^2 sqrt(pi G rho0)``, of a fluid.
+    expansion : float
+        ``V/V0`` at which dilation has ended.
+    part : int
+        Part of the yield section on which the stress lies.
+    fan_limit : float
+        Angle beyond the normal of a Mohr-Coulomb face, rad, up to which the stress stays at a corner.
+    """
+
+    surface: int
+    sin_phi: float
+    cos_phi: float
+    beta: float
+    normal: bool
+    cohesion: float
+    viscosity: float
+    expansion: float
+    part: int
+    fan_limit: float
+
+
+@kernel
+def material_parameters(
+    surface: int, phi: float, cohesion: float, dilatancy: float, viscosity: float, expansion: float
+) -> MaterialParameters:
+    """Parameters from the friction angle (rad), `cohesion` and `viscosity` in the units of the body.
+
+    `dilatancy` is ``beta/min k``. Associative flow on a slope ``k(theta)`` follows the normal of the yield surface;
+    less dilatant flow the stress deviator.
+    """
+    normal = dilatancy >= 1.0 and not is_circular(surface)
+    beta = 1.0 if normal else dilatancy * least_slope(surface, np.sin(phi))
+    return MaterialParameters(
+        surface, np.sin(phi), np.cos(phi), beta, normal, cohesion, viscosity, expansion, SMOOTH, 0.0
+    )
+
+
+@kernel
+def without_cohesion(m: MaterialParameters) -> MaterialParameters:
+    """The material after brittle failure."""
+    return MaterialParameters(
+        m.surface, m.sin_phi, m.cos_phi, m.beta, m.normal, 0.0, m.viscosity, m.expansion, m.part, m.fan_limit
+    )
+
+
+@kernel
+def with_friction(m: MaterialParameters, sin_phi: float) -> MaterialParameters:
+    """The material with another slope ``sin(phi)``; its strength at zero pressure stays."""
+    return MaterialParameters(
+        m.surface, sin_phi, m.cos_phi, m.beta, m.normal, m.cohesion, m.viscosity, m.expansion, m.part,
+        m.fan_limit,
+    )  # fmt: skip
+
+
+@kernel
+def on_part(m: MaterialParameters, part: int, fan_limit: float) -> MaterialParameters:
+    """The material with the stress on another part of the yield section."""
+    return MaterialParameters(
+        m.surface, m.sin_phi, m.cos_phi, m.beta, m.normal, m.cohesion, m.viscosity, m.expansion, part,
+        fan_limit,
+    )  # fmt: skip

@@ -1,0 +1,116 @@
+"""DOP853, the explicit Runge-Kutta method of Dormand & Prince of order 8(5,3).
+
+Hairer, Norsett & Wanner (1993), section II.5, with dense output of order 7; coefficients as tabulated in SciPy. The
+combinations of the stages are pasted into their callers, where they follow the floating-point flags of the caller.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.integrate import DOP853
+
+from flybystab.core.numerics.jit import pasted_kernel
+from flybystab.typing import Array
+
+#: Stages of a step; the rate at its end is one more, and dense output takes three more.
+N_STAGES = 12
+N_EXTENDED = 16
+#: Powers of the dense output.
+N_POWERS = 7
+
+# Rows of the tableau without their zeros (a third of it): row s combines the stages STAGE[FROM[s] : FROM[s + 1]]. Row
+# 12 gives the solution, rows 13 to 15 the stages of the dense output.
+_ROWS = [*(DOP853.A[s, :s] for s in range(N_STAGES)), DOP853.B, *DOP853.A_EXTRA]
+STAGE = np.concatenate([np.flatnonzero(row) for row in _ROWS])
+WEIGHT = np.concatenate([row[row != 0.0] for row in _ROWS])
+FROM = np.concatenate([[0], np.cumsum([np.count_nonzero(row) for row in _ROWS])])
+#: Nodes of the rows.
+NODE = np.concatenate([DOP853.C[:N_STAGES], [1.0], DOP853.C_EXTRA])
+_E3 = np.ascontiguousarray(DOP853.E3)
+_E5 = np.ascontiguousarray(DOP853.E5)
+_D = np.ascontiguousarray(DOP853.D)
+
+
+@pasted_kernel
+def stage_state(s: int, y: Array, n: int, h: float, k: Array, out: Array) -> None:
+    """Write the state ``out[n]`` at which the rate of stage `s` is taken (the solution for ``s = 12``)."""
+    for i in range(n):
+        out[i] = 0.0
+    for m in range(FROM[s], FROM[s + 1]):
+        a = WEIGHT[m]
+        stage = k[STAGE[m]]
+        for i in range(n):
+            out[i] += a * stage[i]
+    for i in range(n):
+        out[i] = y[i] + h * out[i]
+
+
+@pasted_kernel
+def stage_state_6(s: int, y: Array, h: float, k: Array, out: Array) -> None:
+    """As `stage_state` for six numbers, with the sums in registers."""
+    w0 = w1 = w2 = w3 = w4 = w5 = 0.0
+    for m in range(FROM[s], FROM[s + 1]):
+        a = WEIGHT[m]
+        i = STAGE[m]
+        w0 += a * k[i, 0]
+        w1 += a * k[i, 1]
+        w2 += a * k[i, 2]
+        w3 += a * k[i, 3]
+        w4 += a * k[i, 4]
+        w5 += a * k[i, 5]
+    out[0] = y[0] + h * w0
+    out[1] = y[1] + h * w1
+    out[2] = y[2] + h * w2
+    out[3] = y[3] + h * w3
+    out[4] = y[4] + h * w4
+    out[5] = y[5] + h * w5
+
+
+@pasted_kernel
+def error_sums(n: int, k: Array, scale: Array) -> tuple[float, float]:
+    """Sums of squares of the error estimates of order 5 and 3, over ``scale[n]``, from the rates ``k[13, n]``."""
+    five = 0.0
+    three = 0.0
+    for j in range(n):
+        e5 = 0.0
+        e3 = 0.0
+        for i in range(N_STAGES + 1):
+            e5 += _E5[i] * k[i, j]
+            e3 += _E3[i] * k[i, j]
+        five += (e5 / scale[j]) ** 2
+        three += (e3 / scale[j]) ** 2
+    return five, three
+
+
+@pasted_kernel
+def error_norm(five: float, three: float, n: int, h: float) -> float:
+    """Error of a step of `n` numbers from the sums of `error_sums`."""
+    if five == 0.0 and three == 0.0:
+        return 0.0
+    return abs(h) * five / np.sqrt((five + 0.01 * three) * n)
+
+
+@pasted_kernel
+def dense_coefficients(y: Array, y1: Array, n: int, h: float, k: Array, dense: Array) -> None:
+    """Write the interpolant ``dense[7, n]`` of a step from `y` to `y1` with the rates ``k[16, n]``."""
+    for i in range(n):
+        dy = y1[i] - y[i]
+        dense[0, i] = dy
+        dense[1, i] = h * k[0, i] - dy
+        dense[2, i] = 2.0 * dy - h * (k[N_STAGES, i] + k[0, i])
+        for r in range(N_POWERS - 3):
+            total = 0.0
+            for j in range(N_EXTENDED):
+                total += _D[r, j] * k[j, i]
+            dense[3 + r, i] = h * total
+
+
+@pasted_kernel
+def dense_state(x: float, y: Array, n: int, dense: Array, out: Array) -> None:
+    """State ``out[n]`` at the fraction ``x`` of a step with the interpolant `dense`."""
+    for i in range(n):
+        value = 0.0
+        for r in range(N_POWERS):
+            value += dense[N_POWERS - 1 - r, i]
+            value *= x if r % 2 == 0 else 1.0 - x
+        out[i] = y[i] + value
