@@ -43,7 +43,7 @@ from flybystab.core.ellipsoid.tide import TidePanels
 from flybystab.core.material.flow_rule import fade_start
 from flybystab.core.material.mohr_coulomb_hexagon import on_hexagon, part_of_flow, restore_flow_rule
 from flybystab.core.material.parameters import FACE, SMOOTH, on_part
-from flybystab.core.numerics.jit import kernel
+from flybystab.core.numerics.jit import inlined, kernel
 from flybystab.core.numerics.tensors import determinant, deviator
 from flybystab.typing import Array
 
@@ -92,7 +92,7 @@ def _choose_part(t: float, near: float, par: Parameters, tide: TidePanels, ws: W
     return Parameters(part_of_flow(s[BEYOND_FACE], s[PLACE], near, par.material), par.rigid)
 
 
-@kernel
+@inlined
 def _step(explicit: bool, t: float, h: float, flow: Flow, ws: Workspace) -> float:
     """One step of flow from ``ws.y`` to ``ws.y1``; an explicit one has its first rate in ``ws.k[0]``."""
     if explicit:
@@ -126,7 +126,7 @@ def _stiffness(jac: Array, v: Array) -> float:
     return size
 
 
-@kernel
+@inlined
 def _choose_method(
     method: Method, t: float, h: float, d: float, f0: Array, flow: Flow, ws: Workspace
 ) -> Method:
@@ -143,7 +143,7 @@ def _choose_method(
     return Method(explicit, pull, slow, ahead)
 
 
-@kernel
+@inlined
 def _accepted_step(
     explicit: bool, t: float, t1: float, h: float, flow: Flow, limits: Limits, ws: Workspace, log: Log
 ) -> tuple[float, float, float]:
@@ -171,22 +171,22 @@ def _accepted_step(
 
 
 @kernel
-def _set_scale(d: float, tolerance: float, ws: Workspace) -> None:
-    """Set the errors allowed in a step that starts at ``|D|`` = `d`."""
+def _set_scale(d: float, tolerance: float, scale: Array) -> None:
+    """Set the errors ``scale[15]`` allowed in a step that starts at ``|D|`` = `d`."""
     for i in range(6):
-        ws.scale[i] = tolerance
-        ws.scale[6 + i] = tolerance * max(d, 1e-4)
+        scale[i] = tolerance
+        scale[6 + i] = tolerance * max(d, 1e-4)
     for i in range(12, 15):
-        ws.scale[i] = tolerance
+        scale[i] = tolerance
 
 
 @kernel
-def _strain_rate(f0: Array, ws: Workspace) -> tuple[float, float]:
-    """``|D'|`` of ``ws.y`` and its derivative ``Dhat:Ddot`` from the rate `f0`."""
-    _, d, _ = deviator(ws.y[6:12], ws.stress)
+def _strain_rate(y: Array, f0: Array, unit: Array) -> tuple[float, float]:
+    """``|D'|`` of ``y[15]`` and its derivative ``Dhat:Ddot`` from the rate ``f0[15]``; writes ``unit[6]``."""
+    _, d, _ = deviator(y[6:12], unit)
     trend = 0.0
     for i in range(3):
-        trend += ws.stress[i] * f0[6 + i] + 2.0 * ws.stress[3 + i] * f0[9 + i]
+        trend += unit[i] * f0[6 + i] + 2.0 * unit[3 + i] * f0[9 + i]
     return d, trend
 
 
@@ -238,7 +238,7 @@ def follow_flow(
     while t < t1:
         # Here f0 and the stress in `ws.work` belong to (t, y).
         record_flow(t, y, flow.par, ws, log)
-        d, trend = _strain_rate(f0, ws)
+        d, trend = _strain_rate(y, f0, ws.stress)
         fastest = max(fastest, d)
         if d < 1e-2 * fastest and d < _BRIEF * max(tol, _TIGHT) * -trend:
             # The time to rest is below the tolerance: the direction of so small a D is noise, and on a sharp corner
@@ -253,7 +253,7 @@ def follow_flow(
         if trend < 0.0:
             # |D| falls linearly to arrest, its direction relaxes as 1/|D|: approach it geometrically.
             h = min(h, _APPROACH * d / -trend)
-        _set_scale(d, tol, ws)
+        _set_scale(d, tol, ws.scale)
         error, h, growth = _accepted_step(method.explicit, t, t1, h, flow, limits, ws, log)
         if not error <= 1.0:
             return STUCK, t

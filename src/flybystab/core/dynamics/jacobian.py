@@ -47,7 +47,7 @@ from flybystab.core.ellipsoid.tide import COMPONENTS, TidePanels, tide_at
 from flybystab.core.material.flow_rule import dilatancy, flow_coefficients, isotropic
 from flybystab.core.material.parameters import FACE, MaterialParameters
 from flybystab.core.material.yield_surface import corner
-from flybystab.core.numerics.jit import kernel
+from flybystab.core.numerics.jit import inlined, kernel
 from flybystab.core.numerics.tensors import contract, deviator, multiply, unpack
 from flybystab.typing import Array
 
@@ -120,7 +120,7 @@ def _shape_rows(j: int, a: Array, out: Array) -> None:
         out[c, j] = a[i, k] + a[k, i]
 
 
-@kernel
+@inlined
 def _stress(y: Array, f0: Array, material: MaterialParameters, work: Buffers) -> _Stress:
     """Stress of the flow ``y[15]`` with the rate ``f0[15]``; fills `work` with ``u``, ``N``, ``X``, ``N S^-1``..."""
     sinv, n, rate = work.m[W_SINV], work.m[W_N], work.m[J_RATE]
@@ -160,7 +160,7 @@ def _stress(y: Array, f0: Array, material: MaterialParameters, work: Buffers) ->
     )  # fmt: skip
 
 
-@kernel
+@inlined
 def _conditions(f: _Stress, material: MaterialParameters, work: Buffers) -> _Conditions:
     """Coefficients of ``dP, dq``; fills `work` with ``B = 1 - beta U``, ``(1 - sin N) S^-1`` and ``T S^-1``."""
     sinv, n, b, u = work.m[W_SINV], work.m[W_N], work.m[W_B], work.m[J_UNIT]
@@ -180,7 +180,7 @@ def _conditions(f: _Stress, material: MaterialParameters, work: Buffers) -> _Con
     return _Conditions(contract(b, slip), contract(b, across), contract(x, slip), contract(x, across))
 
 
-@kernel
+@inlined
 def _shape_columns(
     y: Array, f: _Stress, system: _Conditions, work: Buffers, jac: Array, gravity: Array
 ) -> None:
@@ -213,7 +213,7 @@ def _shape_columns(
         _shape_rows(c, turn, jac)
 
 
-@kernel
+@inlined
 def _strain_terms(f: _Stress, material: MaterialParameters, work: Buffers) -> tuple[float, float]:
     """Subtract ``(F dN + q dX) S^-1`` from ``M`` for a change of ``D`` in ``work.m[J_TURN]``.
 
@@ -256,7 +256,7 @@ def _strain_terms(f: _Stress, material: MaterialParameters, work: Buffers) -> tu
     return fading, x_rate
 
 
-@kernel
+@inlined
 def _gradient_columns(
     f: _Stress, material: MaterialParameters, system: _Conditions, work: Buffers, jac: Array, one: Array
 ) -> None:

@@ -42,7 +42,7 @@ from flybystab.core.ellipsoid.tide import TidePanels, tide_at
 from flybystab.core.material.flow_rule import dilatancy, dilation, flow_stress, isotropic
 from flybystab.core.material.parameters import FACE, SMOOTH, MaterialParameters
 from flybystab.core.material.yield_surface import beyond_face, corner, slope_over_sine
-from flybystab.core.numerics.jit import kernel
+from flybystab.core.numerics.jit import inlined, kernel
 from flybystab.core.numerics.tensors import contract, determinant, deviator, inverse, multiply, pack, unpack
 from flybystab.typing import Array
 
@@ -116,7 +116,7 @@ def gravity_terms(t: float, y: Array, tide: TidePanels, work: Buffers) -> None:
     k[1, 2] = k[2, 1] = kt[5] - 2.0 * k[1, 2]
 
 
-@kernel
+@inlined
 def _kinematics(y: Array, dy: Array, work: Buffers) -> None:
     """Write ``Sdot`` into ``dy[:6]``, and ``L`` and ``R = K - L^2`` into `work`."""
     big_l = work.m[W_L]
@@ -138,7 +138,7 @@ def _kinematics(y: Array, dy: Array, work: Buffers) -> None:
     dy[5] = a[1, 2] + a[2, 1]
 
 
-@kernel
+@inlined
 def _face_stress(
     numerator: float, denominator: float, e: float, cohesive: float, sin: float, det_d: float, work: Buffers
 ) -> tuple[float, float, float]:
@@ -184,7 +184,7 @@ def _face_stress(
     return pressure, denominator, size
 
 
-@kernel
+@inlined
 def _flow_acceleration(d: Array, material: MaterialParameters, work: Buffers) -> float:
     """Add the acceleration ``-T S^-1`` of plastic flow to ``R``; returns the denominator of the pressure."""
     sinv, r, n, b = work.m[W_SINV], work.m[W_R], work.m[W_N], work.m[W_B]
@@ -222,7 +222,7 @@ def _flow_acceleration(d: Array, material: MaterialParameters, work: Buffers) ->
     return denominator
 
 
-@kernel
+@inlined
 def _viscous_acceleration(d: Array, viscosity: float, work: Buffers) -> None:
     """Add the acceleration ``-T S^-1`` of an incompressible fluid to ``R``."""
     sinv, r, n, b = work.m[W_SINV], work.m[W_R], work.m[W_N], work.m[W_B]

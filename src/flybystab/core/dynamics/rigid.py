@@ -28,7 +28,7 @@ from flybystab.core.dynamics.workspace import (
 from flybystab.core.ellipsoid.tide import TidePanels
 from flybystab.core.material.flow_rule import dilatancy
 from flybystab.core.material.yield_surface import required_friction, slope
-from flybystab.core.numerics.jit import code, kernel
+from flybystab.core.numerics.jit import code, inlined, kernel
 from flybystab.typing import Array
 
 # What `_rigid_values` returns.
@@ -162,7 +162,7 @@ def _interval(j: int, last: int) -> tuple[float, float]:
     return max(j - 1.0, 0.0) / N_SAMPLE, min(j + 1.0, last) / N_SAMPLE
 
 
-@kernel
+@inlined
 def _sample_step(
     t: float, h: float, par: Parameters, tide: TidePanels, unyielding: bool, ws: Workspace
 ) -> tuple[float, int]:
@@ -206,7 +206,7 @@ def _record_samples(
         record(t + x * h, RIGID, ws.ys, par, p, norm, det, ws, log)
 
 
-@kernel
+@inlined
 def _friction_peak(
     t: float, h: float, n: int, par: Parameters, tide: TidePanels, peak: Peak, ws: Workspace
 ) -> Peak:
