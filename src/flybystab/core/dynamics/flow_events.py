@@ -81,25 +81,26 @@ def least_event(t: float, y: Array, dy: Array, flow: Flow, ws: Workspace) -> tup
     """
     par = flow.par
     material = par.material
-    denominator = rate(FLOWING, t, y, dy, par, flow.tide, ws.work)
-    strength = ws.work.s[STRENGTH]
+    work, ends = ws.work, ws.ends
+    s = work.s
+    denominator = rate(FLOWING, t, y, dy, par, flow.tide, work)
+    strength = s[STRENGTH]
     if material.sin_phi == 0.0 and material.cohesion == 0.0:
-        strength = ws.work.s[PRESSURE]
+        strength = s[PRESSURE]
     below = np.inf
     ratio = np.sqrt(flow.limit2)
-    if invariant_ratio(y[0:6], ws.work.m[W_SINV]) > (ratio + 1.0 + 1.0 / ratio) ** 2:
+    if invariant_ratio(y[0:6], work.m[W_SINV]) > (ratio + 1.0 + 1.0 / ratio) ** 2:
         below = flow.limit2 - axis_ratio2(y, ws)
     # Past a vanishing denominator the sign of the strength is undefined.
     if not denominator > 0.0:
         strength = np.inf
     inside = np.inf
     if material.part != SMOOTH and denominator > 0.0 and strength > 0.0:
-        place, beyond = ws.work.s[PLACE], ws.work.s[BEYOND_FACE]
+        place, beyond = s[PLACE], s[BEYOND_FACE]
         if material.part == FACE:
             inside = min(place, 1.0 - place)
         else:
             inside = material.fan_limit + (beyond if material.part == COMPRESSION_CORNER else -beyond)
-    ends = ws.ends
     ends[0, -1], ends[1, -1], ends[2, -1], ends[3, -1] = below, denominator, strength, inside
     least, code = below, BEYOND
     if denominator < least:
@@ -108,7 +109,7 @@ def least_event(t: float, y: Array, dy: Array, flow: Flow, ws: Workspace) -> tup
         least, code = strength, LOSS
     if inside < least:
         least, code = inside, SWITCH
-    ahead = flow.fade_volume - ws.work.s[VOLUME]
+    ahead = flow.fade_volume - s[VOLUME]
     if ahead < least:
         least, code = ahead, FADE
     return least, code

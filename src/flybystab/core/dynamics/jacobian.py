@@ -214,13 +214,23 @@ def _shape_columns(
 
 
 @inlined
-def _strain_terms(f: _Stress, material: MaterialParameters, work: Buffers) -> tuple[float, float]:
-    """Subtract ``(F dN + q dX) S^-1`` from ``M`` for a change of ``D`` in ``work.m[J_TURN]``.
+def _strain_terms(
+    f: _Stress,
+    material: MaterialParameters,
+    volume: float,
+    u: Array,
+    square: Array,
+    rate: Array,
+    turn: Array,
+    product: Array,
+    dn: Array,
+) -> tuple[float, float]:
+    """Write ``dN' = F dN + q dX`` into ``dn[3, 3]`` for a change `turn` of ``D``, which becomes that of ``u``.
 
+    `u`, `square` and `rate` are ``u``, ``u^2 - 1/3`` and the rate of the velocity gradient; `product` is scratch.
     Returns the right sides of the two conditions.
     """
-    u, square, rate, x_rate = work.m[J_UNIT], work.m[J_SQUARE], work.m[J_RATE], 0.0
-    m, turn, product, dn = work.m[J_CHANGE], work.m[J_TURN], work.m[J_PRODUCT], work.m[J_NORMAL]
+    x_rate = 0.0
     dnorm = contract(u, turn)
     trace = turn[0, 0] + turn[1, 1] + turn[2, 2]
     # du, then u du
@@ -236,9 +246,9 @@ def _strain_terms(f: _Stress, material: MaterialParameters, work: Buffers) -> tu
     dweight = f.dsupport * ddet * material.sin_phi if material.normal else 0.0
     du_rate = material.sin_phi * contract(dn, rate) if material.normal else contract(turn, rate)
     fading = (
-        f.dbeta * work.s[VOLUME] * (trace * f.norm * f.weight + f.trace_d * (dnorm * f.weight + f.norm * dweight))
+        f.dbeta * volume * (trace * f.norm * f.weight + f.trace_d * (dnorm * f.weight + f.norm * dweight))
         + f.beta * du_rate
-    )  # fmt: skip
+    )
     for i in range(3):
         for k in range(3):
             dn[i, k] *= f.factor
@@ -249,10 +259,6 @@ def _strain_terms(f: _Stress, material: MaterialParameters, work: Buffers) -> tu
                 dx = ddet * (f.dxa * u[i, k] + f.dxb * square[i, k]) + f.xa * turn[i, k] + f.xb * sides
                 x_rate -= dx * rate[i, k]
                 dn[i, k] += f.share * dx
-    multiply(dn, work.m[W_SINV], product)
-    for i in range(3):
-        for k in range(3):
-            m[i, k] -= product[i, k]
     return fading, x_rate
 
 
@@ -261,8 +267,9 @@ def _gradient_columns(
     f: _Stress, material: MaterialParameters, system: _Conditions, work: Buffers, jac: Array, one: Array
 ) -> None:
     """Columns of ``D`` and ``w``: ``M = -(G L + L G) - (F dN + q dX) S^-1``; ``one[15]`` is scratch."""
-    s, big_l = work.m[W_S], work.m[W_L]
+    s, sinv, big_l, u, square = work.m[W_S], work.m[W_SINV], work.m[W_L], work.m[J_UNIT], work.m[J_SQUARE]
     m, turn, product = work.m[J_CHANGE], work.m[J_TURN], work.m[J_PRODUCT]
+    dn, rate, volume = work.m[J_NORMAL], work.m[J_RATE], work.s[VOLUME]
     for i in range(15):
         one[i] = 0.0
     for j in range(6, 15):
@@ -279,7 +286,11 @@ def _gradient_columns(
         fading = 0.0
         x_rate = 0.0
         if j < 12:
-            fading, x_rate = _strain_terms(f, material, work)
+            fading, x_rate = _strain_terms(f, material, volume, u, square, rate, turn, product, dn)
+            multiply(dn, sinv, product)
+            for i in range(3):
+                for k in range(3):
+                    m[i, k] -= product[i, k]
         _solve_column(j, fading, x_rate, system, work, jac)
 
 

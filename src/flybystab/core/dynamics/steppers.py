@@ -38,10 +38,11 @@ def explicit_step(
 
     Writes ``ws.y1`` and ``ws.k[1..12]`` (``k[12]``: the rate at the end); returns the error norm (accept at <= 1).
     """
+    y, k, y1, work = ws.y, ws.k, ws.y1, ws.work
     for s in range(1, N_STAGES + 1):
-        stage_state(s, ws.y, n, h, ws.k, ws.y1)
-        rate(regime, t + NODE[s] * h, ws.y1, ws.k[s], par, tide, ws.work)
-    five, three = error_sums(n, ws.k, ws.scale)
+        stage_state(s, y, n, h, k, y1)
+        rate(regime, t + NODE[s] * h, y1, k[s], par, tide, work)
+    five, three = error_sums(n, k, ws.scale)
     if not np.isfinite(five + three):
         return np.inf
     return error_norm(five, three, n, h)
@@ -52,10 +53,11 @@ def explicit_dense(
     regime: int, t: float, n: int, h: float, par: Parameters, tide: TidePanels, ws: Workspace
 ) -> None:
     """Write the interpolant ``ws.dense`` of a step just made by `explicit_step` (three more rates)."""
+    y, k, ys, work = ws.y, ws.k, ws.ys, ws.work
     for s in range(N_STAGES + 1, N_EXTENDED):
-        stage_state(s, ws.y, n, h, ws.k, ws.ys)
-        rate(regime, t + NODE[s] * h, ws.ys, ws.k[s], par, tide, ws.work)
-    dense_coefficients(ws.y, ws.y1, n, h, ws.k, ws.dense)
+        stage_state(s, y, n, h, k, ys)
+        rate(regime, t + NODE[s] * h, ys, k[s], par, tide, work)
+    dense_coefficients(y, ws.y1, n, h, k, ws.dense)
 
 
 @kernel
@@ -80,13 +82,14 @@ def implicit_step(t: float, h: float, par: Parameters, tide: TidePanels, ws: Wor
     Writes ``ws.y1`` and the interpolant ``ws.dense[:3]``; accept at an error <= 1.
     """
     n = N_FULL
-    y, y1, k, jac, lu = ws.y, ws.y1, ws.k, ws.jac, ws.lu
+    y, y1, k, jac, lu, pivots = ws.y, ws.y1, ws.k, ws.jac, ws.lu, ws.pivots
+    scale, dense, work = ws.scale, ws.dense, ws.work
     d = 1.0 / (GAMMA * h)
     for i in range(n):
         for j in range(n):
             lu[i, j] = -jac[i, j]
         lu[i, i] += d
-    if not factorise(lu, n, ws.pivots):
+    if not factorise(lu, n, pivots):
         return np.inf
     for s in range(8):
         stage = k[s]
@@ -97,7 +100,7 @@ def implicit_step(t: float, h: float, par: Parameters, tide: TidePanels, ws: Wor
             before = k[j]
             for i in range(n):
                 y1[i] += a * before[i]
-        rate(FLOWING, t + NODES[s] * h, y1, stage, par, tide, ws.work)
+        rate(FLOWING, t + NODES[s] * h, y1, stage, par, tide, work)
         for i in range(n):
             stage[i] += h * TIME[s] * jac[i, n]
         for j in range(s):
@@ -105,14 +108,14 @@ def implicit_step(t: float, h: float, par: Parameters, tide: TidePanels, ws: Wor
             before = k[j]
             for i in range(n):
                 stage[i] += a * before[i]
-        solve(lu, n, ws.pivots, stage)
+        solve(lu, n, pivots, stage)
     error = 0.0
     last = k[7]
     for i in range(n):
         y1[i] += last[i]
-        error += (last[i] / ws.scale[i]) ** 2
+        error += (last[i] / scale[i]) ** 2
     for r in range(3):
-        row = ws.dense[r]
+        row = dense[r]
         for i in range(n):
             row[i] = 0.0
         for j in range(8):

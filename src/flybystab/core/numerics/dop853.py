@@ -38,9 +38,9 @@ def stage_state(s: int, y: Array, n: int, h: float, k: Array, out: Array) -> Non
         out[i] = 0.0
     for m in range(FROM[s], FROM[s + 1]):
         a = WEIGHT[m]
-        stage = k[STAGE[m]]
+        j = STAGE[m]
         for i in range(n):
-            out[i] += a * stage[i]
+            out[i] += a * k[j, i]
     for i in range(n):
         out[i] = y[i] + h * out[i]
 
