@@ -165,3 +165,120 @@ def test_a_reader_is_one_registered_function(tmp_path, monkeypatch):
 
     (tmp_path / "x.any").write_text("MINE Own")
     assert [a.name for a in catalogue(tmp_path / "x.any")] == ["Own"]
+
+
+FULL = {
+    "epoch": "2461000.5", "epoch_mjd": "61000", "epoch_cal": "20251121.0", "e": ".1911469283812541",
+    "a": ".9223803173917017", "q": ".7460701534", "ad": "1.098690481", "n": "1.112600168", "per": "323.5663561",
+    "i": "3.340958441017069", "om": "203.8996515621043", "w": "126.6728325163065", "ma": "312.7902829503998",
+    "tp": "2461042.9319", "tp_cal": "20260102.4319",
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    "columns",
+    [
+        "epoch e a i om w ma",
+        "epoch_mjd e a i om w ma",
+        "epoch_cal e a i om w ma",
+        "epoch e q i om w tp",
+        "epoch_cal e q i om w tp_cal",
+        "epoch e a i om w tp",
+        "epoch e n i om w ma",
+        "epoch e per i om w ma",
+        "epoch e ad i om w ma",
+        "epoch q ad i om w ma",
+        "epoch a ad i om w ma",
+        "epoch q a i om w tp",
+        "epoch e q i om w ma",
+    ],
+)
+def test_any_columns_that_define_an_orbit(tmp_path, columns):
+    """Apophis, with a mean motion and so on of ten digits; the state is that of a, e and M within these digits."""
+    names = columns.split()
+    rows = {key: ",".join(FULL[c] for c in key.split()) for key in (columns, "epoch e a i om w ma")}
+    found = []
+    for key, row in rows.items():
+        (tmp_path / "x.csv").write_text(
+            f"full_name,{key.replace(' ', ',')}\n99942 Apophis (2004 MN4),{row}\n"
+        )
+        found.append(catalogue(tmp_path / "x.csv")[0])
+    assert found[0].epoch == found[-1].epoch
+    difference = found[0].orbit.position - found[-1].orbit.position
+    loose = 400.0 if {"tp", "tp_cal"} & set(names) else 40.0  # four decimals of a day: 4 s
+    assert np.linalg.norm(difference.to_value(u.km)) < loose
+
+
+@pytest.mark.parametrize(
+    ("lacking", "named"), [("w", "w"), ("ma", "ma or tp"), ("a", "a or q"), ("epoch", "epoch or")]
+)
+def test_a_jpl_query_without_a_column_says_which(tmp_path, lacking, named):
+    names = [c for c in ("epoch", "e", "a", "i", "om", "w", "ma") if c != lacking]
+    path = tmp_path / "x.csv"
+    path.write_text("full_name," + ",".join(names) + "\nx," + ",".join(FULL[c] for c in names) + "\n")
+    with pytest.raises(InvalidInput, match=f"JPL query without {named}"):
+        catalogue(path)
+
+
+def test_one_sigmas_do_not_hide_few_digits(tmp_path):
+    """1-sigmas of 1e-9 beside elements of four digits: the digits are the error."""
+    header, row = (FILES / "sbdb_query_results.csv").read_text().splitlines()[:2]
+    sigmas = [f"sigma_{c}" for c in ("a", "e", "i", "om", "w", "ma")]
+    path = tmp_path / "x.csv"
+    path.write_text(f"{header},{','.join(sigmas)}\n{row},{','.join(['1e-9'] * 6)}\n")
+    (a,) = catalogue(path)
+    (b,) = [catalogue(FILES / "sbdb_query_results.csv")[0]]
+    assert "digits" in a.orbit.covariance.caveat
+    spread = [
+        np.linalg.norm(
+            x.orbit.covariance.deviations(x.orbit.covariance.values + x.orbit.covariance.factor.T)[0][:, :3]
+        )
+        for x in (a, b)
+    ]
+    assert spread[0] == pytest.approx(spread[1], rel=0.05)
+
+
+def test_an_answer_of_few_digits_is_no_better_than_its_digits(tmp_path):
+    """The default of the API, without full-prec, rounds the elements but not their errors."""
+    text = (FILES / "sbdb_covariance_same_epoch.json").read_text()
+    (a,) = catalogue(FILES / "sbdb_covariance_same_epoch.json")
+    for value in (a.row["a_au"], a.row["e"], *(a.row[c] for c in ("i_deg", "node_deg", "peri_deg", "M_deg"))):
+        text = text.replace(f'"{value}"', f'"{float(value):.4g}"')
+    (tmp_path / "x.json").write_text(text)
+    (b,) = catalogue(tmp_path / "x.json")
+    assert a.orbit.covariance.correlated
+    assert "digits" in b.orbit.covariance.caveat
+
+
+def test_a_covariance_that_is_no_matrix_names_the_query(tmp_path):
+    import json
+
+    document = json.loads((FILES / "2001VB.json").read_text())
+    matrix = document["orbit"]["covariance"]["data"]
+    document["orbit"]["covariance"]["data"] = [x for line in matrix for x in line]
+    (tmp_path / "x.json").write_text(json.dumps(document))
+    with pytest.raises(InvalidInput, match="cov=mat"):
+        catalogue(tmp_path / "x.json")
+
+
+@pytest.mark.parametrize(
+    "path", sorted(p for p in FILES.iterdir() if p.suffix != ".gz"), ids=lambda p: p.name
+)
+def test_line_ends_and_marks_do_not_matter(tmp_path, path):
+    """Windows line ends, a byte-order mark and a missing last line end change nothing."""
+    text = path.read_text()
+
+    def outcome(raw):
+        (tmp_path / path.name).write_bytes(raw)
+        try:
+            return [
+                (a.row, None if a.covariance is None else a.covariance.matrix.tolist())
+                for a in catalogue(tmp_path / path.name)
+            ]
+        except InvalidInput as error:
+            return str(error)
+
+    expected = outcome(text.encode())
+    assert outcome(text.replace("\n", "\r\n").encode()) == expected
+    assert outcome(b"\xef\xbb\xbf" + text.encode()) == expected
+    assert outcome(text.rstrip("\n").encode()) == expected

@@ -215,6 +215,44 @@ def test_horizons_text_that_is_no_csv(tmp_path):
     assert separation(a, catalogue(FILES / "ceres_elements.txt")[0]) < 1e-6
 
 
+def test_horizons_in_json(tmp_path):
+    """Without ``format=text`` the API puts the same text into a JSON document."""
+    import json
+
+    (tmp_path / "x").write_text(
+        json.dumps({"signature": {"source": "NASA/JPL Horizons API"}, "result": TEXT})
+    )
+    (a,) = catalogue(tmp_path / "x")
+    assert separation(a, catalogue(FILES / "ceres_elements.txt")[0]) < 1e-6
+
+
+PAGE = """*******************************************************************************
+JPL/HORIZONS                  1 Ceres (A801 AA)            2021-Sep-22 17:02:01
+Rec #:       1 (+COV) Soln.date: 2021-Apr-13_11:04:44   # obs: 1075 (1995-2021)
+
+IAU76/J2000 helio. ecliptic osc. elements (au, days, deg., period=Julian yrs):
+
+  EPOCH=  2458849.5 ! 2020-Jan-01.00 (TDB)         Residual RMS= .24563
+   EC= .07687465013145245  QR= 2.556401146697176   TP= 2458240.1791309435
+   OM= 80.3011901917491    W=  73.80896808746482   IN= 10.59127767086216
+   A= 2.769289292143484    MA= 130.3159688200986   ADIST= 2.982177437589792
+
+Asteroid physical parameters (km, seconds, rotational period in hours):
+   GM= 62.6284             RAD= 469.7              ROTPER= 9.07417
+   H= 3.53                 G= .120                 B-V= .713
+*******************************************************************************
+"""
+
+
+def test_the_page_of_an_object(tmp_path):
+    """Its state as Horizons prints it beside the elements: X = 1.007608869613381 au, ... (ICRF)."""
+    (tmp_path / "x.txt").write_text(PAGE)
+    (a,) = catalogue(tmp_path / "x.txt")
+    state = [1.007608869613381, -2.390064275223502, -1.332124522752402]
+    np.testing.assert_allclose(a.orbit.position.to_value(u.au), state, atol=1e-12)
+    assert (a.row["H_mag"], a.row["diameter_m"], a.row["spin_period_h"]) == ("3.53", "939400", "9.07417")
+
+
 def test_horizons_vectors_of_the_icrf_in_km_relative_to_the_barycentre(tmp_path):
     """The same state, turned, shifted by the Sun of the ephemeris and in other units."""
     (a,) = catalogue(FILES / "ceres_vectors.txt")
@@ -339,6 +377,41 @@ def test_openorb_with_and_without_a_header(tmp_path):
     x, y, z = position.to_value(u.au)
     jpl = np.array([-0.52266867184861, 0.935304708306426, 0.0134637474765193])
     assert np.linalg.norm(np.array([x, c * y + s * z, c * z - s * y]) - jpl) * AU_KM < 450.0
+
+
+ORB = """# OpenOrb orbit file
+#
+#
+#-0001-|-0002-|-0003-|-0004-|-0005-|-0006-|-0007-|-0008-
+"""
+
+
+def test_orbit_files_of_openorb(tmp_path):
+    """Keplerian, cometary and cartesian lines of one orbit, in the widths of the Fortran formats."""
+    (a,) = catalogue(FILES / "sorcha_kep.csv")
+    orbit = [2.7423446, 0.0251904999999999, 6.21767, 69.84901, 33.18081, 154.5357]
+
+    def line(values, rest):
+        return f"{'1998 WD8':16s}" + "".join(f" {v:21.14E}" for v in values) + rest + "\n"
+
+    path = tmp_path / "x.orb"
+    path.write_text(ORB + line(orbit, " 2023  9 13.00000"))
+    (b,) = catalogue(path)
+    assert separation(a, b) < 1e-3
+    state = np.concatenate([a.orbit.position.to_value(u.au), a.orbit.velocity.to_value(u.au / u.d)])
+    c, s = np.cos(np.radians(84381.448 / 3600)), np.sin(np.radians(84381.448 / 3600))
+    turn = np.array([[1, 0, 0], [0, c, s], [0, -s, c]])
+    values = np.concatenate([turn @ state[:3], turn @ state[3:]])
+    tags = "|".join(f"-{k:04d}-" for k in (1, 39, 40, 41, 42, 43, 44, 74, *range(9, 30)))
+    sigma = [1e-7, 2e-7, 3e-7, 1e-9, 2e-9, 3e-9]
+    errors = "".join(f" {x:15.7E}" for x in (*sigma, 0.5, *[0.0] * 14))
+    path.write_text(ORB.rpartition("#-")[0] + f"#{tags}\n" + line(values, f" {60200.0:16.10f}" + errors))
+    (d,) = catalogue(path)
+    assert separation(a, d) < 0.01
+    assert d.orbit.covariance.correlated
+    # x is the same axis in ecliptic and equator; y is not.
+    assert d.orbit.covariance.sigma[0] == pytest.approx(1e-7 * AU)
+    assert np.trace(d.orbit.covariance.matrix[:3, :3]) == pytest.approx(14e-14 * AU**2)
 
 
 def test_columns_of_sorcha_in_any_order_and_with_tabs(tmp_path):

@@ -115,12 +115,12 @@ def catalogue_argument(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
         "--catalogue",
         metavar="FILE",
-        help="catalogue file (own CSV, JPL SBDB, MPC, NEOCC .ke1) instead of the embedded catalogue",
+        help="catalogue file (own CSV or a format of docs/inputs.md) instead of the embedded catalogue",
     )
 
 
 def asteroid_named(options: argparse.Namespace) -> Any:
-    """The asteroid, from the embedded catalogue or from --catalogue."""
+    """The asteroid, from the embedded catalogue, from --catalogue, or the only one of a file of orbits."""
     from pathlib import Path
 
     from flybystab.catalogues.asteroid import Asteroid
@@ -128,6 +128,14 @@ def asteroid_named(options: argparse.Namespace) -> Any:
     from flybystab.screening.selection import listed
 
     file = getattr(options, "catalogue", None)
+    if file is None and Path(options.name).is_file():
+        found = listed(Path(options.name))
+        if len(found) != 1:
+            names = ", ".join(a.name for a in found[:5]) + (", ..." if len(found) > 5 else "")
+            raise WrongUsage(
+                f"{options.name} has {len(found)} asteroids ({names}): NAME --catalogue {options.name}"
+            )
+        return found[0]
     return (
         Asteroid.from_catalogue(options.name)
         if file is None

@@ -20,12 +20,12 @@ def arguments(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
         "name",
         nargs="?",
-        help="number, name or designation; or a file of orbits (.ke1, .json, .csv)",
+        help="number, name or designation; or a file of orbits (docs/inputs.md)",
     )
     sub.add_argument(
         "--all",
         action="store_true",
-        help="the whole embedded catalogue or file (own CSV, JPL SBDB, MPC), without predictability",
+        help="the whole embedded catalogue or file (own CSV or a format of docs/inputs.md), without predictability",
     )
     span_arguments(sub, "2020-01-01", "2050-01-01")
     sub.add_argument(

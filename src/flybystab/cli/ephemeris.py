@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from flybystab.cli.common import dates_arguments, show, tdb
+from flybystab.cli.common import asteroid_named, dates_arguments, show, tdb
 from flybystab.errors import InvalidInput, WrongUsage
 
 HELP = "positions of an asteroid in the sky"
@@ -32,7 +32,6 @@ def arguments(sub: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Answer the command."""
-    from flybystab.catalogues.asteroid import Asteroid
     from flybystab.cli.common import check_table
     from flybystab.flybys.document import table_document
     from flybystab.orbit.observation import sky_positions
@@ -43,7 +42,7 @@ def run(options: argparse.Namespace) -> None:
     check_table(options.output)
     times = _times(tdb(options.start, "--from"), tdb(options.stop, "--to"), step)
     place = observer(options.observer)
-    asteroid = Asteroid.from_catalogue(options.name)
+    asteroid = asteroid_named(options)
     table = sky_positions(
         asteroid.orbit, times, place, _number(asteroid.row.get("H_mag")), _number(asteroid.row.get("G_slope"))
     )

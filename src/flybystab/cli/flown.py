@@ -20,7 +20,10 @@ SPAN = ("2000-01-01", "2050-01-01")
 
 def passage_arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of asteroid, encounter, material and sampled attitudes."""
-    sub.add_argument("name", help="number, name or designation in the embedded catalogue or in --catalogue")
+    sub.add_argument(
+        "name",
+        help="number, name or designation in the embedded catalogue or in --catalogue, or a file of one orbit",
+    )
     catalogue_argument(sub)
     sub.add_argument(
         "--date",

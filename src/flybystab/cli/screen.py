@@ -47,7 +47,7 @@ def study_arguments(sub: argparse.ArgumentParser) -> None:
         "asteroids",
         nargs="*",
         metavar="FILE",
-        help="catalogue files (own CSV, JPL SBDB, MPC, NEOCC .ke1) or names (default: the embedded catalogue)",
+        help="catalogue files (own CSV or a format of docs/inputs.md) or names (default: the embedded catalogue)",
     )
     span_arguments(sub, "2026-01-01", "2036-01-01")
     material_arguments(sub)

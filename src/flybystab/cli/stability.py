@@ -30,7 +30,7 @@ def arguments(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
         "--all",
         action="store_true",
-        help="classify the embedded catalogue or a file (own CSV, JPL SBDB, MPC, NEOCC .ke1)",
+        help="classify the embedded catalogue or a file (own CSV or a format of docs/inputs.md)",
     )
     material_arguments(sub)
     shape_arguments(sub)

@@ -47,6 +47,10 @@ def mpc_orbit(name):
     return json.dumps(document)
 
 
+OPENORB = (
+    "# OpenOrb\n#\n#\n#-0001-|-0002-|-0003-|-0004-|-0005-|-0006-|-0007-|-0008-\n"
+    "2020 AB          1.6E+00 0.4E+00 4.8E+00 2.8E+02 1.5E+02 7.5E+01 2020  5 31.00000\n"
+)
 HORIZONS = (
     "Comet non-gravitational force model (AMRAT=m^2/kg;A1-A3=au/d^2;DT=days;R0=au):\n"
     "   AMRAT=  0.       DT=  0.\n   A1= 4.8E-10  A2= 0.  XYZ= 3.\n*****\n"
@@ -80,6 +84,7 @@ UNKNOWN = {
     "JPL elements": "\n".join([ELEMENTS[0] + "          XYZ", ELEMENTS[1] + " ---", ELEMENTS[2] + "      3.0"]),
     "JPL Horizons": HORIZONS + text("ceres_elements.txt"),
     "Sorcha, layup, OpenOrb": text("sorcha_kep.csv").replace("\n", ",XYZ\n", 1).rstrip("\n") + ",3\n",
+    "OpenOrb orbits": OPENORB.replace("# OpenOrb", "# OpenOrb XYZ = 3.0"),
     "Find_Orb elements": with_item("find_orb_total.json", ["objects", "Test_1001", "elements"], {"XYZ": 3.0}),
     "Find_Orb covariance": json.dumps(
         json.loads(text("find_orb_covar.json")) | {"covar": [[float(i == j) for i in range(7)] for j in range(7)]}
@@ -119,6 +124,7 @@ def test_the_same_file_without_it_is_read(tmp_path, name):
         "MPC web service (JSON)": json.dumps([SERVICE]), "MPC CometEls": text("CometEls.txt"),
         "MPC comets (JSON)": json.dumps([COMET]), "JPL elements": text("ELEMENTS.COMET"),
         "JPL Horizons": text("ceres_elements.txt"), "Sorcha, layup, OpenOrb": text("sorcha_kep.csv"),
+        "OpenOrb orbits": OPENORB,
         "Find_Orb elements": text("find_orb_total.json"), "Find_Orb covariance": text("find_orb_covar.json"),
         "ECSV table": text("ceres_elements.ecsv"), "MPC table": MPC.replace(",XYZ", "").replace(",5,6", ",5"),
     }  # fmt: skip

@@ -88,6 +88,13 @@ def since_perihelion(mean: float, axis: float) -> float:
     return float(mean * DEGREE * np.sqrt(abs(axis * AU) ** 3 / GM_SUN) / DAY)
 
 
+def axis_of(motion: float) -> float:
+    """Semi-major axis (au) of a mean motion (deg/d)."""
+    from flybystab.orbit.elements import GM_SUN
+
+    return float(np.cbrt(GM_SUN / (motion * DEGREE / DAY) ** 2) / AU)
+
+
 def equatorial_to_ecliptic(right_ascension: float, declination: float) -> tuple[float, float]:
     """Longitude and latitude (deg, J2000) of a direction of the equator (deg)."""
     from flybystab.orbit.elements import ecliptic_to_icrf
@@ -299,19 +306,20 @@ def printed_covariance(
         What is subtracted from the text of ``tp``.
     """
     values = [float(t) - (offset if n == "tp" else 0.0) for n, t in zip(names, texts, strict=True)]
-    decimals = [decimals_of(t) for t in texts]
-    angular = [d for n, d in zip(names, decimals, strict=True) if _UNITS[n] == "deg"]
-    sigma = np.array(
-        [
-            0.5 * 10.0 ** -(max(angular) if _UNITS[n] == "deg" else d) / np.sqrt(3.0)
-            for n, d in zip(names, decimals, strict=True)
-        ]
-    )
+    sigma = printed_sigmas(names, texts)
     found = cartesian_covariance(
         jd, names, values, np.diag(sigma**2), f"digits of {source}",
         gm=gm, correlated=False, caveat="by the digits of its elements",
     )  # fmt: skip
     return found if float(np.linalg.norm(found.sigma[:3])) > _NEGLIGIBLE else None
+
+
+def printed_sigmas(names: Sequence[str], texts: Sequence[str]) -> Array:
+    """1-sigmas of elements that are uniform within half a unit of their last printed digit."""
+    decimals = [decimals_of(t) for t in texts]
+    angular = [d for n, d in zip(names, decimals, strict=True) if _UNITS[n] == "deg"]
+    shown = [max(angular) if _UNITS[n] == "deg" else d for n, d in zip(names, decimals, strict=True)]
+    return np.asarray(0.5 * 10.0 ** -np.array(shown, dtype=float) / np.sqrt(3.0))
 
 
 def decimals_of(text: str) -> int:

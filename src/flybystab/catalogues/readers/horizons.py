@@ -31,6 +31,7 @@ from flybystab.catalogues.readers.parameters import check_parameters, looks_like
 from flybystab.catalogues.readers.sbdb_answer import LAWS
 from flybystab.constants import AU, DAY
 from flybystab.errors import InvalidInput
+from flybystab.files import parse_json
 
 if TYPE_CHECKING:
     from flybystab.catalogues.readers import Entry
@@ -47,8 +48,8 @@ _PAIR = re.compile(r"([A-Za-z][A-Za-z0-9-]*) ?= *([-+]?[.\d]+(?:[EeDd][-+]?\d+)?
 
 def _is_horizons(text: str) -> bool:
     head = text[:60000]
-    if text.lstrip()[:1] in "{[":
-        return False
+    if text.lstrip()[:1] in "{[":  # the API wraps the same text in JSON
+        return '"result"' in text and ("JPL/HORIZONS" in text or "$$SOE" in text)
     return (
         "$$SOE" in text and "Target body name:" in head and ("Output units" in head or "JDT" in head)
     ) or ("JPL/HORIZONS" in head and "osc. elements" in head and "EPOCH=" in head)
@@ -64,6 +65,8 @@ def read_horizons(text: str, file: str) -> list[Entry]:
         Another centre than the Sun or the barycentre of the solar system, other axes than ecliptic or ICRF, or
         parameters of the force model that are not modelled.
     """
+    if text.lstrip().startswith("{"):
+        text = str(parse_json(text, "orbit file", file).get("result", ""))
     header, _, table = text.partition("$$SOE")
     row = _physical(header) | _nongravitational(header, file)
     if not table:

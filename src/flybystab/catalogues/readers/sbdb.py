@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
+from dataclasses import replace
+from datetime import date
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,11 +18,12 @@ from flybystab.catalogues.designations import is_comet, name_columns, names_of
 from flybystab.catalogues.readers import FRAME, header_of, reader, rows_of
 from flybystab.catalogues.readers.conversion import (
     MJD,
+    axis_of,
     covariance_of,
-    decimals_of,
     number,
     perihelion_row,
     printed_covariance,
+    printed_sigmas,
     since_perihelion,
 )
 from flybystab.catalogues.readers.parameters import (
@@ -63,6 +66,7 @@ _OTHER = frozenset({"H", "G", "M1", "M2", "K1", "K2", "PC", "GM", "BV", "UB", "I
 _JPL = frozenset(
     {"om", "w", "ma", "tp", "pdes", "full_name", "spkid", "epoch_mjd", "epoch_cal", "moid", "per_y"}
 )
+_MONTHS = ("Jan", "Feb", "Mar", "Apr", "May", "Jun", "Jul", "Aug", "Sep", "Oct", "Nov", "Dec")
 #: Classes of comets in the SBDB.
 _COMETS = frozenset({"COM", "CTc", "ETc", "HTC", "HYP", "JFC", "JFc", "PAR"})
 
@@ -80,13 +84,21 @@ def from_sbdb(row: Mapping[str, str], file: str) -> dict[str, str]:
     InvalidInput
         Parameters of the force model that are not modelled, or elements that are no numbers.
     """
-    out = {mine: row[theirs] for theirs, mine in _SBDB.items() if row.get(theirs)}
+    row = completed(row, file)
+    out = {mine: row[theirs] for theirs, mine in _SBDB.items() if row.get(theirs) and theirs not in _ELEMENTS}
     _check(row, file)
     full = row.get("full_name", "").strip()
     key = row.get("pdes", "").strip() or _key_of(full, row.get("spkid", "") or row.get("id", ""))
+    comet = comet_orbit(row.get("class", ""), key) or row.get("prefix", "").strip() in (
+        "C",
+        "P",
+        "D",
+        "X",
+        "I",
+    )
     out |= _elements(row, file)
     if any(row.get(c) for c in _ACCELERATIONS):
-        out["nongrav_law"] = "comet" if comet_orbit(row.get("class", ""), key) else "asteroid"
+        out["nongrav_law"] = "comet" if comet else "asteroid"
     out |= _names(row, full, key)
     out["pha"] = {"True": "Y", "False": "N"}.get(row.get("pha", ""), row.get("pha", ""))
     taxonomy = row.get("spec_B") or row.get("spec_T")
@@ -129,10 +141,69 @@ def _key_of(full: str, spkid: str) -> str:
     return str(n - 20000000 if n > 20000000 else n - 2000000) if n > 2000000 else spkid
 
 
-def _epoch(row: Mapping[str, str], file: str) -> float:
-    if row.get("epoch"):
-        return number(row["epoch"], "epoch", file)
-    return number(row.get("epoch_mjd", ""), "epoch_mjd", file) + MJD
+def _significant(text: str) -> int:
+    """Significant digits of a printed number."""
+    digits = text.lower().partition("e")[0].replace(".", "").replace("-", "").lstrip("+0")
+    return max(len(digits), 1)
+
+
+def _calendar(text: str, name: str, file: str) -> str:
+    """Julian date of a date as ``20220809.0`` or ``2022-Aug-09.0``, with its digits."""
+    plain = text.strip()
+    for month, word in enumerate(_MONTHS, start=1):
+        plain = plain.replace(f"-{word}-", f"-{month:02d}-")
+    whole, _, fraction = plain.replace("-", "").partition(".")
+    try:
+        day = date(int(whole[:-4]), int(whole[-4:-2]), int(whole[-2:])).toordinal() + 1721424
+    except ValueError:
+        raise InvalidInput(name, text, f"a date as 20220809.0 in {file}") from None
+    half = float(f"0.{fraction or 0}") + 0.5
+    return f"{day + half:.{max(len(fraction), 1)}f}"
+
+
+def completed(row: Mapping[str, str], file: str) -> dict[str, str]:
+    """A row with epoch, e, and a or q, from whichever columns of JPL define them; with the digits of their source.
+
+    Raises
+    ------
+    InvalidInput
+        A date or a number cannot be read.
+    """
+    out = dict(row)
+
+    def given(*names: str) -> bool:
+        return all(out.get(c) for c in names)
+
+    def put(name: str, value: float, *sources: str) -> None:
+        digits = min(_significant(out[c]) for c in sources)
+        out[name] = f"{value:.{max(digits, 1)}g}"
+
+    def values(*names: str) -> list[float]:
+        return [number(out[c], c, file) for c in names]
+
+    if not given("epoch") and given("epoch_mjd"):
+        fraction = out["epoch_mjd"].partition(".")[2]
+        out["epoch"] = f"{values('epoch_mjd')[0] + MJD:.{max(len(fraction), 1)}f}"
+    for name in ("epoch", "tp"):
+        if not given(name) and given(f"{name}_cal"):
+            out[name] = _calendar(out[f"{name}_cal"], f"{name}_cal", file)
+    if given("e", "ad") and not (given("a") or given("q")):
+        ad, e = values("ad", "e")
+        put("a", ad / (1.0 + e), "ad")
+    if not given("e"):
+        for inner, outer in (("q", "ad"), ("q", "a"), ("a", "ad")):
+            if given(inner, outer):
+                x, y = values(inner, outer)
+                e = {"q,ad": (y - x) / (y + x), "q,a": 1.0 - x / y, "a,ad": y / x - 1.0}[f"{inner},{outer}"]
+                put("e", e, inner, outer)
+                break
+    if not (given("a") or given("q")):
+        motion = values("n")[0] if given("n") else 360.0 / values("per")[0] if given("per") else 0.0
+        motion = motion or (360.0 / (values("per_y")[0] * 365.25) if given("per_y") else 0.0)
+        if motion:
+            source = next(c for c in ("n", "per", "per_y") if given(c))
+            put("a", axis_of(motion), source)
+    return out
 
 
 def _keplerian(row: Mapping[str, str]) -> bool:
@@ -140,12 +211,12 @@ def _keplerian(row: Mapping[str, str]) -> bool:
 
 
 def _elements(row: Mapping[str, str], file: str) -> dict[str, str]:
-    """Epoch and elements of a row, from whichever columns define them."""
-    epoch = _epoch(row, file)
+    """Epoch and elements of a completed row."""
+    epoch = number(row.get("epoch", ""), "epoch", file)
     if _keplerian(row):
         for c in _ELEMENTS:
             number(row.get(c, ""), c, file)
-        return {} if row.get("epoch") else {"epoch_jd_tdb": repr(epoch)}
+        return {mine: row[c] for c, mine in _ELEMENTS.items()} | {"epoch_jd_tdb": row["epoch"]}
     e = number(row.get("e", ""), "e", file)
     q = number(row.get("q") or row.get("a", ""), "q or a", file) * (1.0 if row.get("q") else 1.0 - e)
     if row.get("tp"):
@@ -159,30 +230,35 @@ def _elements(row: Mapping[str, str], file: str) -> dict[str, str]:
 
 
 def _covariance(row: Mapping[str, str], file: str) -> Covariance | None:
-    """Covariance where the catalogue row alone does not say it: by q and tp, or with errors of A1, A2, A3."""
+    """Covariance where the catalogue row alone does not say it: 1-sigmas of q, tp, A1, A2, A3, or coarse digits.
+
+    The printed digits count beside the 1-sigmas: the default of the query tool has four.
+    """
     pushes = [c for c in _ACCELERATIONS if row.get(c) and row.get(f"{c}_sigma")]
     keplerian = _keplerian(row)
     columns = tuple(_ELEMENTS) if keplerian else _COMETARY
-    if (keplerian and not pushes) or not all(row.get(c) for c in columns):
+    if not all(row.get(c) for c in columns):
         return None
-    jd = _epoch(row, file)
+    jd = number(row["epoch"], "epoch", file)
     texts = [row[c] for c in columns]
     names = [_NAMES[c] for c in columns]
     sigmas = [row.get(f"sigma_{c}", "") for c in columns]
     source = f"JPL SBDB ({file})"
+    digits = printed_covariance(jd, names, texts, jd, source)
     if not all(sigmas) and not pushes:
-        return printed_covariance(jd, names, texts, jd, source)
+        return None if keplerian else digits
+    if keplerian and not pushes and digits is None:
+        return None
     values = [number(t, c, file) - (jd if c == "tp" else 0.0) for c, t in zip(columns, texts, strict=True)]
-    sigma = [
-        number(s, "sigma", file) if s else 0.5 * 10.0 ** -decimals_of(t) / np.sqrt(3.0)
-        for s, t in zip(sigmas, texts, strict=True)
-    ]
+    sigma = np.array([number(s, "sigma", file) if s else 0.0 for s in sigmas])
+    if digits is not None or not all(sigmas):
+        sigma = np.hypot(sigma, printed_sigmas(names, texts))
     values += [number(row[c], c, file) for c in pushes]
-    sigma += [number(row[f"{c}_sigma"], f"{c}_sigma", file) for c in pushes]
-    matrix = np.diag(np.square(sigma))
-    what = "1-sigmas" if all(sigmas) else "printed digits and 1-sigmas"
+    sigma = np.array([*sigma, *(number(row[f"{c}_sigma"], f"{c}_sigma", file) for c in pushes)])
+    what = "1-sigmas" if digits is None else "printed digits and 1-sigmas"
     label = f"{what} without correlations, {source}"
-    return covariance_of(jd, [*names, *pushes], values, matrix, label, file, correlated=False)
+    found = covariance_of(jd, [*names, *pushes], values, np.diag(sigma**2), label, file, correlated=False)
+    return found if digits is None else replace(found, caveat="by the digits of its elements")
 
 
 def thousandfold(text: str, name: str, file: str) -> str:
@@ -192,9 +268,15 @@ def thousandfold(text: str, name: str, file: str) -> str:
 
 def _missing(columns: set[str]) -> list[str]:
     """What columns of a query lack to define an orbit and name its object."""
-    out = [c for c in ("e", "i", "om", "w") if c not in columns]
-    for either in (("epoch", "epoch_mjd"), ("a", "q"), ("ma", "tp"), ("full_name", "pdes", "spkid", "name")):
-        if not {*either, *(("id",) if "spkid" in either else ())} & columns:
+    pair = len({"a", "q", "ad"} & columns) >= 2
+    out = [c for c in ("e", "i", "om", "w") if c not in columns and not (c == "e" and pair)]
+    for either in (
+        ("epoch", "epoch_mjd", "epoch_cal"),
+        ("a", "q", "ad", "n", "per", "per_y"),
+        ("ma", "tp", "tp_cal"),
+        ("full_name", "pdes", "spkid", "name", "id"),
+    ):
+        if not {*either} & columns:
             out.append(" or ".join(either))
     return out
 
@@ -210,7 +292,8 @@ def _entries(rows: list[dict[str, str]], columns: set[str], file: str) -> list[E
         raise InvalidInput(
             "columns", "a JPL query without " + ", ".join(missing), f"columns that define an orbit in {file}"
         )
-    return [(from_sbdb(row, file), _covariance(row, file)) for row in rows]
+    whole = [completed(row, file) for row in rows]
+    return [(from_sbdb(row, file), _covariance(row, file)) for row in whole]
 
 
 @reader("SBDB query (CSV)", _is_query)

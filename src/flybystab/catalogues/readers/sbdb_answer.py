@@ -20,6 +20,7 @@ from flybystab.catalogues.readers.conversion import (
     julian,
     number,
     perihelion_row,
+    printed_covariance,
 )
 from flybystab.catalogues.readers.parameters import check_parameters
 from flybystab.catalogues.readers.sbdb import comet_orbit, thousandfold
@@ -79,7 +80,21 @@ def from_sbdb_answer(text: str, file: str) -> tuple[dict[str, str], Covariance |
     row |= {f"{name}_au_d2": str(p["value"]) for name, p in pushes.items()}
     if pushes:
         row["nongrav_law"] = _law_of(model, comet, file)
-    return row, _covariance(orbit, pushes, f"JPL SBDB, solution {solution} ({file})", file)
+    covariance = _covariance(orbit, pushes, f"JPL SBDB, solution {solution} ({file})", file)
+    return row, _with_digits(row, covariance)
+
+
+def _with_digits(row: Mapping[str, str], covariance: Covariance | None) -> Covariance | None:
+    """The covariance of the printed digits in place of one that they exceed: an answer without ``full-prec=1``."""
+    if not all(row.get(c) for c in _COLUMNS.values()):
+        return covariance
+    names = ("a", "e", "i", "node", "peri", "M")
+    texts = [row[c] for c in _COLUMNS.values()]
+    digits = printed_covariance(float(row["epoch_jd_tdb"]), names, texts, 0.0, row["orbit_source"])
+    if digits is None or covariance is None:
+        return covariance
+    states, _ = covariance.deviations(covariance.values + covariance.factor.T)
+    return covariance if np.linalg.norm(states[:, :3]) > np.linalg.norm(digits.sigma[:3]) else digits
 
 
 def _names(full: str, key: str) -> dict[str, str]:
@@ -181,6 +196,8 @@ def _covariance(
         # Digits of the time of perihelion are lost neither as a Julian date nor as a difference.
         whole, fraction = julian(mean["tp"])
         values = [(whole - epoch) + fraction if n == "tp" else float(mean[n]) for n in names]
+        if not all(isinstance(line, list | tuple | np.ndarray) for line in found["data"]):
+            raise InvalidInput("covariance", "a vector", f"a matrix (cov=mat in the query) in {file}")
         matrix = np.array([[float(c) for c in line] for line in found["data"]])
         return covariance_of(epoch, names, values, matrix, source, file)
     except (KeyError, TypeError, ValueError) as error:
