@@ -14,7 +14,8 @@ from matplotlib.figure import Figure
 
 import flybystab as fs
 from flybystab.cli.main import main
-from flybystab.plots.outcome_map import outcome_map, outcome_plot, target_map, target_plot
+from flybystab.flybys.outcome_map import target_map
+from flybystab.plots.outcome_map import outcome_plot, target_plot
 from flybystab.plots.population import population_figure
 from flybystab.plots.scene import animation, scene_plot
 from flybystab.plots.shape_map import surface_history_figure
@@ -36,7 +37,7 @@ for what in ("regions", "spin", "barrier", "failure"):
 
 figure = Figure(figsize=(6.4, 4.8), layout="constrained")
 q, v = np.linspace(1.1, 3.2, 15) * fs.R_earth, np.linspace(0, 21, 8) * u.km / u.s
-outcome_plot(figure.subplots(), outcome_map(PILE, q, v, phases=8))
+outcome_plot(figure.subplots(), fs.outcome_map(PILE, q, v, phases=8))
 save("outcome_map.png", figure)
 
 figure = Figure(figsize=(6.0, 6.0), layout="constrained")

@@ -31,6 +31,9 @@ _HOME = {
     "Verdict": "flybys.verdict",
     "atlas": "io.atlas",
     "binary_flyby": "flybys.binary",
+    "attitude_at_start": "encounter.attitude_at_periapsis",
+    "critical": "flybys.critical",
+    "outcome_map": "flybys.outcome_map",
     "catalogue": "catalogues.catalogue",
     "encounter_distribution": "encounter.distribution",
     "cite": "io.citation",
@@ -67,13 +70,16 @@ if TYPE_CHECKING:
     from flybystab.catalogues.asteroid import Asteroid
     from flybystab.catalogues.catalogue import catalogue
     from flybystab.encounter.attitude import periapsis_axes
+    from flybystab.encounter.attitude_at_periapsis import attitude_at_start
     from flybystab.encounter.distribution import encounter_distribution
     from flybystab.encounter.encounter import Encounter
     from flybystab.errors import FlybystabError
     from flybystab.flybys.binary import binary_flyby
+    from flybystab.flybys.critical import critical
     from flybystab.flybys.flyby import flyby
     from flybystab.flybys.flyby_many import flyby_many
     from flybystab.flybys.margin import flyby_margin
+    from flybystab.flybys.outcome_map import outcome_map
     from flybystab.flybys.result import FlybyResult
     from flybystab.flybys.shape_spin import shape_spin
     from flybystab.flybys.spin_sample import spin_sample

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING, Any, Protocol
 
 import astropy.units as u
 import numpy as np
@@ -234,10 +234,11 @@ class Encounter:
         planet : str or Planet
             The body encountered.
         periapsis : Quantity
-            Distance of closest approach from the planet's centre; inside the planet it is an impact, not
-            an error.
+            Distance of closest approach from the planet's centre, at least 1 m; inside the planet it is an impact,
+            not an error.
         v_inf : Quantity
-            Speed far from the planet, zero or more.
+            Hyperbolic excess speed, zero or more. Periapsis and `v_inf` may be arrays, which broadcast: the result is
+            then an array of encounters.
         start_distance : Quantity, optional
             Where the encounter starts; 10 planet radii by default, or 10 periapsis distances if larger.
         settle : Quantity
@@ -254,6 +255,8 @@ class Encounter:
             For a bad argument, with its value.
         """
         body = _planet(planet)
+        if np.ndim(periapsis) or np.ndim(v_inf):
+            return _each(cls, planet, periapsis, v_inf, start_distance, settle, j2, pole)
         q = to_si(periapsis, u.m, "periapsis", low=1.0)
         v = to_si(v_inf, u.m / u.s, "v_inf", low=0.0)
         wait = to_si(settle, u.s, "settle", low=0.0)
@@ -499,6 +502,24 @@ class Encounter:
             f"<Encounter {self.planet.name}, {when}: {brief(self.distance, u.km)} ({radii:.4g} radii), "
             f"v_inf {brief(self.v_inf, u.km / u.s)}{hit}>"
         )
+
+
+def _each(
+    cls: type[Encounter], planet: str | Planet, periapsis: Quantity, v_inf: Quantity, *options: Any
+) -> Any:
+    """Encounters of arrays of periapsis and speed, in an array of the broadcast shape."""
+    q = to_si(periapsis, u.m, "periapsis", shape=None, low=1.0)
+    v = to_si(v_inf, u.m / u.s, "v_inf", shape=None, low=0.0)
+    try:
+        q, v = np.broadcast_arrays(q, v)
+    except ValueError:
+        raise InvalidInput(
+            "v_inf", f"shape {np.shape(v_inf)}", f"a shape that broadcasts with {np.shape(q)}"
+        ) from None
+    out = np.empty(q.shape, dtype=object)
+    for k in np.ndindex(q.shape):
+        out[k] = cls.hyperbolic(planet, float(q[k]) * u.m, float(v[k]) * u.m / u.s, *options)
+    return out
 
 
 def _planet(name: str | Planet) -> Planet:

@@ -8,6 +8,7 @@ from typing import Any
 from flybystab.body.body import YIELD_SURFACES, Body, check_settled
 from flybystab.body.pile import Pile
 from flybystab.encounter.attitude import attitude_matrix
+from flybystab.encounter.attitude_at_periapsis import attitude_at_start
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput, NotConverged
 from flybystab.flybys.batch import TOLERANCE, FlybyRun, RowInputs, axis_ratio, one_row, step_tolerance
@@ -36,6 +37,7 @@ def flyby(
     grains: int | str | None = None,
     seeds: int | Sequence[int] | None = None,
     model: str | None = None,
+    attitude_at: str = "start",
 ) -> FlybyResult:
     """Follow a body through an encounter.
 
@@ -70,6 +72,9 @@ def flyby(
         one alone, or as many from its seed on.
     model : str, optional
         ``"grains"`` forces grains, ``"ellipsoid"`` excludes them.
+    attitude_at : str
+        ``"start"``: `attitude` is that at the start of the encounter; ``"periapsis"``: that which the freely rotating
+        body would have at closest approach (:func:`attitude_at_start`).
 
     Returns
     -------
@@ -96,6 +101,10 @@ def flyby(
             raise InvalidInput(name, value, "True or False")
     tolerance, max_axis_ratio = step_tolerance(tolerance), axis_ratio(max_axis_ratio)
     asked, phases = request(grains, seeds, model, pile), phases_of(robustness)
+    if attitude_at not in ("start", "periapsis"):
+        raise InvalidInput("attitude_at", attitude_at, '"start" or "periapsis"')
+    if attitude_at == "periapsis":
+        attitude = attitude_at_start(body, encounter, attitude)
     rotation = encounter.periapsis_axes.T @ attitude_matrix(attitude)
     inputs = FlybyInputs(body, encounter, rotation, tolerance, max_axis_ratio)
     row = one_row(body, encounter, rotation)

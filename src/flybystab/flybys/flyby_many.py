@@ -46,8 +46,9 @@ def flyby_many(
 
     Parameters
     ----------
-    bodies, encounters : sequences of equal length n
-    attitudes : sequence of rotations, optional
+    bodies, encounters : sequences of equal length n, or one of which the other has n
+        An array of encounters (:meth:`Encounter.hyperbolic` of arrays) is taken row by row.
+    attitudes : sequence of n rotations, or one, optional
         As in :func:`flyby`; identity by default.
     tolerance, max_axis_ratio
         As in :func:`flyby`.
@@ -64,8 +65,7 @@ def flyby_many(
         If the lengths differ, for anything but bodies and encounters, a tolerance outside [1e-13, 1e-3], or
         `workers` that is not a positive whole number. An invalid attitude or an unsettled body only fails its own row.
     """
-    bodies, encounters = _all(Body, bodies, "bodies"), _all(Encounter, encounters, "encounters")
-    attitudes = None if attitudes is None else _all(object, attitudes, "attitudes")
+    bodies, encounters, attitudes = _broadcast(bodies, encounters, attitudes)
     n = len(bodies)
     if len(encounters) != n or (attitudes is not None and len(attitudes) != n):
         raise InvalidInput("encounters", len(encounters), f"as many encounters and attitudes as bodies, {n}")
@@ -123,10 +123,28 @@ def _fail(rows: Any) -> None:
         rows[name] = FAILED if OUTCOME[name].kind == "i" else np.nan
 
 
+def _broadcast(
+    bodies: Any, encounters: Any, attitudes: Any
+) -> tuple[list[Body], list[Encounter], list[Any] | None]:
+    """The arguments as lists; a single body, encounter or rotation stands for all rows."""
+    if hasattr(attitudes, "as_matrix"):  # a scipy Rotation, of one or of many
+        attitudes = attitudes.as_matrix()
+    one_attitude = isinstance(attitudes, np.ndarray) and attitudes.shape == (3, 3)
+    single = isinstance(bodies, Body), isinstance(encounters, Encounter), attitudes is None or one_attitude
+    lists: tuple[list[Any], ...] = (
+        [bodies] if single[0] else _all(Body, bodies, "bodies"),
+        [encounters] if single[1] else _all(Encounter, encounters, "encounters"),
+        [attitudes] if single[2] else _all(object, attitudes, "attitudes"),
+    )
+    n = next((len(x) for x, one in zip(lists, single, strict=True) if not one), 1)
+    first, second, third = (x * n if one else x for x, one in zip(lists, single, strict=True))
+    return first, second, None if attitudes is None else third
+
+
 def _all(kind: type[T], values: Any, name: str) -> list[T]:
     """The values as a list; an error names the first that is not of the kind."""
     try:
-        out = list(values)
+        out = list(values.ravel() if isinstance(values, np.ndarray) and values.dtype == object else values)
     except TypeError:
         raise InvalidInput(name, values, "a sequence, one for each row") from None
     for i, value in enumerate(out):

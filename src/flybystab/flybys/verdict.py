@@ -31,6 +31,19 @@ class Verdict(StrEnum):
     NOT_IN_EQUILIBRIUM = "NOT IN EQUILIBRIUM"
 
 
+#: Verdicts from the least to the most severe, then those without one.
+SEVERITY: tuple[str, ...] = (
+    Verdict.INTACT,
+    Verdict.RESHAPED,
+    Verdict.MASS_LOSS,
+    Verdict.DISRUPTED,
+    Verdict.BEYOND_MODEL,
+    Verdict.IMPACT,
+    Verdict.NOT_IN_EQUILIBRIUM,
+    "FAILED",
+)
+
+
 class MassClass(NamedTuple):
     """Outcome of a body that has flowed and ended inside the model."""
 

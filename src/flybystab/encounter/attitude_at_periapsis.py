@@ -1,0 +1,63 @@
+"""Attitudes given for the moment of closest approach, carried back to the start of the encounter by free rotation."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
+
+from flybystab.body.body import Body
+from flybystab.encounter.attitude import attitude_matrix
+from flybystab.encounter.encounter import Encounter
+from flybystab.typing import Array
+
+#: Relative tolerance of the rotation of a tumbler.
+_TOLERANCE = 1e-11
+
+
+def attitude_at_start(body: Body, encounter: Encounter, at_periapsis: Any) -> Array:
+    """Attitude at the start of an encounter of a body that would have a given one at closest approach without a tide.
+
+    Parameters
+    ----------
+    body : Body
+        With its spin at the start, along its axes.
+    encounter : Encounter
+    at_periapsis : array_like (3, 3) or scipy Rotation
+        Rotation, body axes -> periapsis frame, at closest approach.
+
+    Returns
+    -------
+    ndarray (3, 3)
+        Rotation, body axes -> periapsis frame, at the start: the attitude that :func:`flybystab.flyby` takes.
+
+    Notes
+    -----
+    The free body turns by ``Q(t)`` from the start, ``dQ/dt = Q [omega]``, with Euler's equations for ``omega``;
+    the attitude at the start is ``A Q(t)^T``. The tide changes the rotation on the way, so that the true attitude at
+    closest approach differs somewhat.
+    """
+    target = attitude_matrix(at_periapsis)
+    span = -encounter.t_start
+    omega = np.asarray(body.omega, dtype=float)
+    size = float(np.linalg.norm(omega))
+    if size == 0.0 or span <= 0.0:
+        return target
+    s = body.axes**2
+    moments = s.sum() - s
+    if np.count_nonzero(omega) == 1:
+        turned = Rotation.from_rotvec(omega * span)
+    else:
+
+        def rates(_: float, y: Array) -> Array:
+            q, w = y[:4], y[4:]
+            # scalar last, as scipy has it: q' = q (w, 0)/2
+            vector = 0.5 * (q[3] * w + np.cross(q[:3], w))
+            return np.concatenate([vector, [-0.5 * q[:3] @ w], np.cross(moments * w, w) / moments])
+
+        start = np.concatenate([[0.0, 0.0, 0.0, 1.0], omega])
+        found = solve_ivp(rates, (0.0, span), start, method="DOP853", rtol=_TOLERANCE, atol=_TOLERANCE * size)
+        turned = Rotation.from_quat(found.y[:4, -1])
+    return target @ turned.as_matrix().T
