@@ -67,6 +67,10 @@ class UnknownName(FlybystabError, KeyError):
         return self.message
 
 
+class NotModelled(FlybystabError, NotImplementedError):
+    """What was asked for is outside the model; the message says what is inside it."""
+
+
 class OutOfSpan(FlybystabError, ValueError):
     """A date lies outside the time span of the ephemeris (or of a table)."""
 

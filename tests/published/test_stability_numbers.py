@@ -63,3 +63,20 @@ def test_cohesion_of_2000_gd65(density, ratio, surface):
     for friction in (30.0, 35.0, 40.0):
         required = equilibrium(spinning(axes, density, 1.9529, friction, surface)).required_cohesion
         assert 150 * u.Pa < required < 450 * u.Pa
+
+
+@pytest.mark.parametrize("axes", [(1.0, 1.0, 1.0), (1.0, 0.8, 0.7), (1.0, 0.5, 0.5)])
+def test_cohesion_of_2016_ho3(axes):
+    """At least 10 to 20 Pa of bulk cohesion by grains; less than 60 m, 28 min, 2 g/cm3.
+
+    The compression cone alone asks for 5 to 9 Pa. A tensile strength of half the cohesion, as bonds between grains
+    have, doubles that: 10 to 25 Pa.
+    """
+    size = np.array(axes)
+    size *= 30.0 / np.cbrt(size.prod())
+    body = spinning(size, 2000.0, 28.0 / 60.0)
+    cone = equilibrium(body).required_cohesion
+    assert 4 * u.Pa < cone < 9.5 * u.Pa
+    cut = equilibrium(body.with_(material=body.material.with_(tensile_strength=0.5))).required_cohesion
+    assert 9.5 * u.Pa < cut < 25 * u.Pa
+    assert cut > 2 * cone

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from flybystab.constants import G
 from flybystab.core.material.surfaces import DEFAULT, NAMES
-from flybystab.errors import InvalidInput, UnitMismatch, UnknownName, UnsettledBody
+from flybystab.errors import InvalidInput, NotModelled, UnitMismatch, UnknownName, UnsettledBody
 from flybystab.units import brief, frozen, to_si
 
 if TYPE_CHECKING:
@@ -51,6 +51,10 @@ class Material:
         Whether cohesion is lost for good at first yield.
     bulk_modulus : Quantity or None
         Plastic bulk modulus ``kappa`` of the energy criterion, Pa; None leaves it out.
+    tensile_strength : Quantity or float, optional
+        Tension cut-off ``T``: the yield surface is closed at ``sigma_1 <= T``. Pa, or a number for a share of the
+        cohesion. It counts in equilibrium, spin limits, admissibility and onset of yield; flow with a cut-off is not
+        modelled (:class:`~flybystab.errors.NotModelled`).
 
     Raises
     ------
@@ -63,9 +67,11 @@ class Material:
     yield_surface: str = DEFAULT_SURFACE
     brittle: bool = False
     bulk_modulus: Quantity | None = None
+    tensile_strength: Quantity | float | None = None
 
     phi: float = field(init=False, repr=False)  #: friction angle, rad
     c_pa: float = field(init=False, repr=False)  #: cohesion, Pa
+    t_pa: float = field(init=False, repr=False)  #: tension cut-off, Pa; infinite without one
 
     def __post_init__(self) -> None:
         phi_deg = to_si(self.friction_angle, u.deg, "friction_angle", low=0.0, high=90.0, open_high=True)
@@ -80,6 +86,21 @@ class Material:
             raise InvalidInput("brittle", self.brittle, "True or False")
         if self.bulk_modulus is not None:
             to_si(self.bulk_modulus, u.Pa, "bulk_modulus", low=0.0)
+        object.__setattr__(self, "t_pa", self._cut_off())
+
+    def _cut_off(self) -> float:
+        """Tension cut-off, Pa."""
+        t = self.tensile_strength
+        if t is None:
+            return float("inf")
+        if isinstance(t, Quantity) and t.unit.physical_type != "dimensionless":
+            return to_si(t, u.Pa, "tensile_strength", low=0.0)
+        return self.c_pa * to_si(t, u.dimensionless_unscaled, "tensile_strength", low=0.0)
+
+    @property
+    def cut_off(self) -> bool:
+        """Whether the yield surface is closed in tension."""
+        return self.tensile_strength is not None
 
     @property
     def surface_code(self) -> int:
@@ -94,6 +115,7 @@ class Material:
         more = [f"dilatancy {self.dilatancy:g}"] if self.dilatancy else []
         more += ["brittle"] if self.brittle else []
         more += [] if self.bulk_modulus is None else [f"bulk modulus {brief(self.bulk_modulus)}"]
+        more += [f"tensile strength {brief(self.t_pa * u.Pa)}"] if self.cut_off else []
         said = [self.yield_surface, brief(self.friction_angle), brief(self.cohesion), *more]
         return f"<Material {', '.join(said)}>"
 
@@ -102,6 +124,15 @@ def check_body(body: Any) -> None:
     """Raise InvalidInput for anything but a body."""
     if not isinstance(body, Body):
         raise InvalidInput("body", body, "a flybystab.Body (of an asteroid: asteroid.body)")
+
+
+def refuse_cut_off(material: Material, what: str) -> None:
+    """Raise NotModelled for a material with a tension cut-off."""
+    if material.cut_off:
+        raise NotModelled(
+            f"{what} does not model a tension cut-off (tensile_strength = {material.tensile_strength}); equilibrium, "
+            "spin limits, admissibility and the onset of yield do"
+        )
 
 
 def check_settled(body: Any) -> None:

@@ -17,7 +17,14 @@ import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
 
-from flybystab.body.body import DEFAULT_SURFACE, YIELD_SURFACES, Body, check_body
+from flybystab.body.body import (
+    DEFAULT_SURFACE,
+    YIELD_SURFACES,
+    Body,
+    Material,
+    check_body,
+    refuse_cut_off,
+)
 from flybystab.constants import G
 from flybystab.core.ellipsoid.rigid_stress import demand, invariants, load_interval, overload, rigid_stress
 from flybystab.core.ellipsoid.tide import components, tensor
@@ -42,8 +49,12 @@ class Equilibrium:
     required_friction_angle : Quantity
         Mobilised friction angle, deg: the least angle that bears the stress with the body's own cohesion.
         Infinite where no angle below 90 deg does (a cohesionless body in mean tension, say).
+        So it is where the stress passes the tension cut-off.
     required_cohesion : Quantity
-        Least cohesion at the body's friction angle, Pa; zero where friction alone suffices.
+        Least cohesion at the body's friction angle, Pa; zero where friction alone suffices. With a tensile strength
+        that is a share of the cohesion, the one that bears the tension too; infinite where a fixed one is passed.
+    largest_tension : Quantity
+        Largest principal stress, Pa: the least tensile strength; negative in compression.
     lode_angle : Quantity
         Of the deviator, deg: -30 triaxial extension, +30 triaxial compression; nan without a deviator.
     admissible : bool
@@ -59,6 +70,7 @@ class Equilibrium:
     mean_pressure: Quantity
     required_friction_angle: Quantity
     required_cohesion: Quantity
+    largest_tension: Quantity
     lode_angle: Quantity
     admissible: bool
     margin: Quantity
@@ -167,6 +179,11 @@ def equilibrium(body: Body, tide: Quantity | None = None) -> Equilibrium:
     c = stress_components(body, tide)
     p, s, det = invariants(c)
     phi_required, cohesion = demand(m.surface_code, m.phi, m.c_pa, c)
+    tension = float(np.linalg.eigvalsh(tensor(c))[-1])
+    holds = tension <= m.t_pa
+    if not holds:
+        phi_required = np.inf
+    cohesion = max(cohesion, cohesion_for(m, tension))
     required = np.rad2deg(phi_required)
     return Equilibrium(
         body=body,
@@ -174,11 +191,23 @@ def equilibrium(body: Body, tide: Quantity | None = None) -> Equilibrium:
         mean_pressure=p * u.Pa,
         required_friction_angle=required * u.deg,
         required_cohesion=cohesion * u.Pa,
+        largest_tension=tension * u.Pa,
         lode_angle=(np.rad2deg(lode_angle(det)) if s > 0.0 else np.nan) * u.deg,
-        admissible=bool(overload(m.surface_code, m.phi, m.c_pa, c) <= 0.0),
+        admissible=bool(holds and overload(m.surface_code, m.phi, m.c_pa, c) <= 0.0),
         margin=(np.rad2deg(m.phi) - required) * u.deg,
         in_tension=bool(p < 0.0),
     )
+
+
+def cohesion_for(material: Material, tension: float) -> float:
+    """Least cohesion, Pa, with which the tension cut-off of a material bears a largest principal stress, Pa."""
+    t = material.tensile_strength
+    if t is None or tension <= 0.0:
+        return 0.0
+    if isinstance(t, Quantity) and t.unit.physical_type != "dimensionless":
+        return 0.0 if tension <= material.t_pa else np.inf
+    share = float(u.Quantity(t).to_value(u.dimensionless_unscaled))
+    return tension / share if share > 0.0 else np.inf
 
 
 def spin_limits(body: Body, friction_angle: Quantity | None = None) -> Quantity:
@@ -197,7 +226,16 @@ def spin_limits(body: Body, friction_angle: Quantity | None = None) -> Quantity:
         Angular rates, rad/s; nan where no spin is borne. A lower limit above zero belongs to a shape too
         long to stand still.
     """
-    return _loads(body, friction_angle, *_spin_line(body)) ** 0.5 * u.rad / u.s
+    base, load = _spin_line(body)
+    limits = _loads(body, friction_angle, base, load)
+    if body.material.cut_off:  # both are diagonal
+        with np.errstate(divide="ignore"):
+            most = float(np.min((body.material.t_pa - base[:2]) / load[:2]))
+        if base[2] > body.material.t_pa or not most >= 0.0:
+            most = np.nan
+        limits[..., 1] = np.minimum(limits[..., 1], most)
+        limits[~(limits[..., 0] <= limits[..., 1])] = np.nan
+    return limits**0.5 * u.rad / u.s
 
 
 def failure_distance(
@@ -233,6 +271,7 @@ def failure_distance(
     The stress is affine in ``GM/d^3``, so that the tides that can be borne form one interval. A synchronous
     body may need a tide: its own lower limit (a distance beyond which it fails) is not returned here.
     """
+    refuse_cut_off(body.material, "failure_distance")
     gm = to_si(mass_parameter, u.m**3 / u.s**2, "mass_parameter", low=0.0, open_low=True)
     unit = point_tide(1.0 * u.m**3 / u.s**2, 1.0 * u.m, direction)
     load = _tide_load(body, components(unit.value))

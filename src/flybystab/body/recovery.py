@@ -15,7 +15,7 @@ import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
 
-from flybystab.body.body import Body, check_body
+from flybystab.body.body import Body, check_body, refuse_cut_off
 from flybystab.body.equilibrium import equilibrium
 from flybystab.body.stability import unit_deviator
 from flybystab.constants import G
@@ -323,6 +323,7 @@ def _deviator(x: Array) -> Array:
 
 def _dilatancy(body: Body, dilatancy: float | None) -> float:
     check_body(body)
+    refuse_cut_off(body.material, "recovery")
     own = body.material.dilatancy if dilatancy is None else dilatancy
     return float(to_si(own, u.dimensionless_unscaled, "dilatancy", low=0.0, high=1.0))
 

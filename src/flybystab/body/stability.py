@@ -12,8 +12,13 @@ order is a certified minimum for associative flow on a circular cone and the res
 What the criterion is, and is not. Holding the direction of strain is a constraint, so that the barrier over such
 paths is an upper bound of the least barrier over all of them: a body need not recover from less. For flow that is
 not associative no potential exists and the number is an estimate. The differences between the three orders show
-its quality; :func:`flybystab.recovery` integrates the full dynamics of perturbed bodies and is the reference: for
-18 combinations of shape, surface and dilatancy it gives 0.92 to 1.29 of the barrier.
+its quality; :func:`flybystab.recovery` integrates the full dynamics of perturbed bodies and is the reference: over
+16 directions it gives 0.92 to 1.44 of the barrier, with and without cohesion (``python benchmarks/stability.py push``).
+
+Below associative flow a body near yield can have critical energies of zero although it is admissible: once it flows, its
+pressure is the reaction, which can be less than that of the equilibrium, so that its friction no longer stops it. An
+example is 1 : 1 : 0.6 with ``omega^2/(pi G rho)`` = 0.8 and 28.2 deg, of which it requires 27.9: any perturbation grows
+at first. It need not leave the model: that takes 0.12 of the binding energy (Mohr-Coulomb, dilatancy 0).
 
 Without a plastic bulk modulus the pressure is that reaction. With one, ``kappa``, it starts at the pressure of
 equilibrium and falls as the material dilates, ``pdot = -kappa tr D``. Under associative flow neither has an effect:
@@ -31,7 +36,7 @@ import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
 
-from flybystab.body.body import Body, check_body
+from flybystab.body.body import Body, check_body, refuse_cut_off
 from flybystab.body.equilibrium import Equilibrium, equilibrium, spin_limits
 from flybystab.body.spin_state import SpinState, spin_state
 from flybystab.constants import G
@@ -196,6 +201,11 @@ def stability(body: Body, *, dilatancy: float | None = 1.0) -> Stability:
         ``beta/min k``: 1 (default) is associative flow, the classical energy criterion; 0 preserves volume;
         None takes that of the material.
 
+    Notes
+    -----
+    A tension cut-off of the material counts for admissibility and spin limits. The energies are those without it, an
+    upper bound.
+
     Returns
     -------
     Stability
@@ -212,10 +222,13 @@ def stability(body: Body, *, dilatancy: float | None = 1.0) -> Stability:
     flow: Any = (flow_cohesion(body) / units.stress, beta, kappa / units.stress)
     out: Any = (5, row, found)
     arguments: Any = (*shape, m.c_pa / units.stress, *flow, *out)
+    e = equilibrium(body)
     classify(*arguments)
+    if not e.admissible and row[columns.LEVEL] > 0 and m.cut_off:
+        row[columns.LEVEL] = 0
+        row[columns.ENERGY_2 : columns.STRAIN_B + 1] = 0.0
     arguments = (*shape, *flow)
     scene = pile(*arguments)
-    e = equilibrium(body)
     energies = Orders(
         *(row[i] * units.energy * u.J for i in (columns.ENERGY_2, columns.ENERGY_3, columns.ENERGY_B))
     )
@@ -313,6 +326,7 @@ def push(body: Body, direction: Any, strain: Any, *, dilatancy: float = 1.0) -> 
         ]
     )
     m = body.material
+    refuse_cut_off(m, "push")
     units = body_units(body)
     arguments: Any = (
         *(body.axes**2),

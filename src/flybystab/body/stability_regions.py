@@ -15,7 +15,7 @@ import numpy as np
 from astropy.units import Quantity
 from numpy.typing import NDArray
 
-from flybystab.body.body import DEFAULT_SURFACE, YIELD_SURFACES, Body
+from flybystab.body.body import DEFAULT_SURFACE, YIELD_SURFACES, Body, refuse_cut_off
 from flybystab.body.stability import LEVELS, flow_cohesion
 from flybystab.constants import G
 from flybystab.core.ellipsoid.potential import carlson_fd
@@ -103,6 +103,8 @@ def stability_many(
     StabilityTable, shape (n,)
     """
     bodies = list(bodies)
+    for b in bodies:
+        refuse_cut_off(b.material, "stability_many")
     surfaces = {b.material.yield_surface for b in bodies}
     if len(surfaces) > 1:
         raise InvalidInput("bodies", sorted(surfaces), "bodies with one yield surface")

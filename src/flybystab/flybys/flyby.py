@@ -15,6 +15,7 @@ from flybystab.flybys.batch import TOLERANCE, FlybyRun, RowInputs, axis_ratio, o
 from flybystab.flybys.grains_flyby import handed_on, request
 from flybystab.flybys.inputs import FlybyInputs
 from flybystab.flybys.result import FlybyResult
+from flybystab.flybys.rigid_course import check_tension
 from flybystab.flybys.robustness import phases_of, robustness_of
 
 #: The run that measures the error allows this many times more error in a step.
@@ -86,6 +87,8 @@ def flyby(
         For an attitude that is not a rotation, or a tolerance outside [1e-13, 1e-3].
     UnsettledBody
         For the body of an earlier result that was still flowing, dispersed, partly unbound or on the ground.
+    NotModelled
+        For a body with a tension cut-off that yields.
     NotConverged
         If the integrator cannot go on; the message says where.
     """
@@ -106,6 +109,7 @@ def flyby(
     if attitude_at == "periapsis":
         attitude = attitude_at_start(body, encounter, attitude)
     rotation = encounter.periapsis_axes.T @ attitude_matrix(attitude)
+    check_tension(body, encounter, attitude)
     inputs = FlybyInputs(body, encounter, rotation, tolerance, max_axis_ratio)
     row = one_row(body, encounter, rotation)
     run = inputs.run(keep=ROWS if history else 0, required=True, row=row)

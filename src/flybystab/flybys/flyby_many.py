@@ -16,7 +16,7 @@ from flybystab.core.numerics.threads import in_order, worker_count
 from flybystab.core.verdict_codes import FAILED
 from flybystab.encounter.attitude import attitude_matrices
 from flybystab.encounter.encounter import Encounter
-from flybystab.errors import InvalidInput, UnsettledBody
+from flybystab.errors import InvalidInput, NotModelled, UnsettledBody
 from flybystab.flybys.batch import (
     MAX_STEPS,
     TOLERANCE,
@@ -27,6 +27,7 @@ from flybystab.flybys.batch import (
     step_tolerance,
     verdict_rows,
 )
+from flybystab.flybys.rigid_course import check_tension
 from flybystab.flybys.table import FlybyTable
 from flybystab.flybys.verdict import Verdict, verdict_of
 
@@ -79,6 +80,11 @@ def flyby_many(
         try:
             check_settled(bodies[i])
         except UnsettledBody as reason:
+            failures[i] = str(reason)
+    for i in (k for k, b in enumerate(bodies) if b.material.cut_off and not failures[k]):
+        try:
+            check_tension(bodies[i], encounters[i], None if attitudes is None else attitudes[i])
+        except NotModelled as reason:
             failures[i] = str(reason)
     rows = np.flatnonzero(failures == "")
     phi = np.array([b.material.phi for b in bodies], dtype=float)

@@ -15,7 +15,7 @@ import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
 
-from flybystab.body.body import Body
+from flybystab.body.body import Body, check_body, refuse_cut_off
 from flybystab.body.stability import body_units, flow_cohesion
 from flybystab.body.stability_regions import stability_many
 from flybystab.core.ellipsoid.tide import tensor
@@ -107,6 +107,8 @@ def flyby_margin(
     -------
     FlybyMargin
     """
+    check_body(body)
+    refuse_cut_off(body.material, "flyby_margin")
     course = rigid_course(body, encounter, attitude)
     m, units = body.material, body_units(body)
     beta = m.dilatancy if dilatancy is None else dilatancy

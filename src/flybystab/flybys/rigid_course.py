@@ -6,6 +6,7 @@ Surface slopes and the stability margin of a flyby follow from it.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import astropy.units as u
@@ -13,13 +14,15 @@ import numpy as np
 from astropy.units import Quantity
 
 from flybystab.body.body import Body, check_settled
+from flybystab.constants import G
 from flybystab.core.dynamics.run import integrate
 from flybystab.core.dynamics.state import rotated_to_body, rotation_matrix
-from flybystab.core.ellipsoid.tide import TidePanels, tide_at
+from flybystab.core.ellipsoid.rigid_stress import overload, rigid_stress
+from flybystab.core.ellipsoid.tide import TidePanels, tensor, tide_at
 from flybystab.core.numerics.jit import kernel
 from flybystab.encounter.attitude import attitude_matrix, periapsis_axes
 from flybystab.encounter.encounter import Encounter
-from flybystab.errors import InvalidInput, NotConverged
+from flybystab.errors import InvalidInput, NotConverged, NotModelled
 from flybystab.flybys.batch import ground_near, span_of
 from flybystab.typing import Array
 from flybystab.units import brief
@@ -61,6 +64,41 @@ class Course:
 
     def __len__(self) -> int:
         return len(self.time)
+
+    @cached_property
+    def largest_tension(self) -> Quantity:
+        """Largest principal stress at each instant, shape (n,), Pa; negative in compression."""
+        return self._stresses[0] * u.Pa
+
+    @cached_property
+    def onset_time(self) -> Quantity | None:
+        """First instant at which the stress passes the yield surface or the tension cut-off, s; None if it never does.
+
+        From closest approach, linear between the rows.
+        """
+        tension, overload = self._stresses
+        beyond = np.maximum(overload, tension - self.body.material.t_pa)
+        passed = np.flatnonzero(beyond > 0.0)
+        if not len(passed):
+            return None
+        i = int(passed[0])
+        if i == 0:
+            return self.time[0]
+        part = -beyond[i - 1] / (beyond[i] - beyond[i - 1])
+        return self.time[i - 1] + part * (self.time[i] - self.time[i - 1])
+
+    @cached_property
+    def _stresses(self) -> tuple[Array, Array]:
+        """Largest principal stress and overload of the yield surface at each instant, Pa."""
+        body, m = self.body, self.body.material
+        tension, beyond = np.empty(len(self)), np.empty(len(self))
+        s, stress = body.axes**2, np.empty(6)
+        for i, (w, k) in enumerate(zip(self.spin.value, self.tide.value, strict=True)):
+            spin, tide = np.ascontiguousarray(w), np.ascontiguousarray(k)
+            rigid_stress(s[0], s[1], s[2], body.rho, np.pi * G * body.rho, spin, tide, stress)
+            tension[i] = np.linalg.eigvalsh(tensor(stress))[-1]
+            beyond[i] = overload(m.surface_code, m.phi, m.c_pa, stress)
+        return tension, beyond
 
     def __repr__(self) -> str:
         return f"<Course {len(self)} rows: mobilises {brief(self.max_required_friction_angle)} at most>"
@@ -119,6 +157,21 @@ def rigid_course(
         spin=spin * u.rad / u.s,
         tide=tide / u.s**2,
         max_required_friction_angle=np.rad2deg(run.max_friction) * u.deg,
+    )
+
+
+def check_tension(body: Body, encounter: Encounter, attitude: Any = None) -> None:
+    """Raise NotModelled for a body with a tension cut-off that yields in an encounter: its flow is not modelled."""
+    if not body.material.cut_off:
+        return
+    course = rigid_course(body, encounter, attitude)
+    if course.onset_time is None:
+        return
+    first = (course.onset_time - course.time[0]).to_value(u.h)
+    raise NotModelled(
+        f"flow with a tension cut-off is not modelled, and this body yields {first:.3g} h after the start of the "
+        f"encounter (largest tension {course.largest_tension.max().value:.3g} Pa, tensile strength "
+        f"{body.material.t_pa:.3g} Pa); without tensile_strength it is followed on its yield surface alone"
     )
 
 

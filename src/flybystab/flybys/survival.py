@@ -11,7 +11,7 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 from scipy.stats import binomtest
 
-from flybystab.body.body import Body, Material
+from flybystab.body.body import Body, Material, refuse_cut_off
 from flybystab.core.ellipsoid.yield_bound import INTACT, quick_margins
 from flybystab.encounter.distribution import EncounterDistribution
 from flybystab.encounter.encounter import Encounter
@@ -117,6 +117,8 @@ def survival(
         raise InvalidInput("distribution", distribution, "what fs.encounter_distribution gives")
     n = len(distribution)
     bodies, rotations = spin_states(body, n, seed, material)
+    if bodies:
+        refuse_cut_off(bodies[0].material, "survival")
     if attitude is not None:
         matrix = np.asarray(attitude, dtype=float)
         if matrix.shape != (3, 3):

@@ -20,7 +20,7 @@ from astropy.table import QTable, vstack
 from astropy.units import Quantity
 
 from flybystab._version import __version__
-from flybystab.body.body import Material
+from flybystab.body.body import Material, refuse_cut_off
 from flybystab.errors import FlybystabWarning, InvalidInput
 from flybystab.flybys.verdict import Verdict
 from flybystab.orbit.planets import planet
@@ -104,6 +104,7 @@ def disruption_rates(
     orbits = elements_table(population)
     if diameter is None and "H" not in orbits.colnames:
         raise InvalidInput("diameter", None, "a diameter, or a population with absolute magnitudes H")
+    refuse_cut_off(material or Material(), "disruption_rates")
     plan = Plan(
         orbits,
         tuple(planet(name).name for name in planets),

@@ -13,7 +13,7 @@ from astropy.time import Time
 from astropy.units import Quantity
 
 from flybystab._version import __version__
-from flybystab.body.body import Material
+from flybystab.body.body import Material, refuse_cut_off
 from flybystab.constants import AU
 from flybystab.errors import InvalidInput
 from flybystab.orbit.ephemeris import ephemeris
@@ -118,6 +118,8 @@ def settings(
     ephemeris().check(*(Time(d, format="jd", scale="tdb") for d in dates))
     if not isinstance(material, Material | None):
         raise InvalidInput("material", material, "a Material, or None")
+    if material is not None:
+        refuse_cut_off(material, "a screening")
     if not isinstance(population, Population | None):
         raise InvalidInput("population", population, "a Population, or None")
     if not isinstance(planets, Iterable):
