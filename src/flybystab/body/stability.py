@@ -15,8 +15,8 @@ not associative no potential exists and the number is an estimate. The differenc
 its quality; :func:`flybystab.recovery` integrates the full dynamics of perturbed bodies and is the reference: over
 16 directions it gives 0.92 to 1.44 of the barrier, with and without cohesion (``python benchmarks/stability.py push``).
 
-Below associative flow a body near yield can have critical energies of zero although it is admissible: once it flows, its
-pressure is the reaction, which can be less than that of the equilibrium, so that its friction no longer stops it. An
+Below associative flow a body near yield can have critical energies of zero although it is admissible: once it flows,
+its pressure is the reaction, which can be less than that of the equilibrium, so that friction no longer stops it. An
 example is 1 : 1 : 0.6 with ``omega^2/(pi G rho)`` = 0.8 and 28.2 deg, of which it requires 27.9: any perturbation grows
 at first. It need not leave the model: that takes 0.12 of the binding energy (Mohr-Coulomb, dilatancy 0).
 
