@@ -80,6 +80,14 @@ def test_a_covariance_of_equinoctial_elements_is_that_of_keplerian_ones():
     assert np.std(axis) / AU == pytest.approx(5.66778e-4, rel=0.04)  # RMS line of the file
 
 
+@pytest.mark.slow
+def test_impact_probability_of_2018_vp1():
+    """JPL Sentry had 0.0041 for 2020-11-02; the linear map is good to a factor of two that far behind a passage."""
+    (a,) = catalogue(FILES / "2018VP1.eq0")
+    found = fs.encounter_distribution(a.orbit, "earth", Time("2020-11-02", scale="tdb"), n=20, seed=1)
+    assert 0.002 < found.linear.impact_probability < 0.009
+
+
 # 13: the MPC's own orbits
 
 

@@ -3,10 +3,11 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from flybystab.catalogues import readers
-from flybystab.catalogues.catalogue import catalogue
+from flybystab.catalogues.catalogue import Asteroid, catalogue
 from flybystab.catalogues.readers import READERS, reader_names
 from flybystab.catalogues.readers.native import read_native
 from flybystab.catalogues.readers.parameters import MODELLED, NOT_MODELLED
@@ -51,6 +52,17 @@ OPENORB = (
     "# OpenOrb\n#\n#\n#-0001-|-0002-|-0003-|-0004-|-0005-|-0006-|-0007-|-0008-\n"
     "2020 AB          1.6E+00 0.4E+00 4.8E+00 2.8E+02 1.5E+02 7.5E+01 2020  5 31.00000\n"
 )
+NEOWS = {
+    "name": "433 Eros (A898 PA)", "absolute_magnitude_h": 10.31, "is_potentially_hazardous_asteroid": False,
+    "orbital_data": {
+        "orbit_id": "659", "orbit_uncertainty": "0", "epoch_osculation": "2461000.5", "equinox": "J2000",
+        "eccentricity": ".2228359407071628", "semi_major_axis": "1.458120998474684",
+        "inclination": "10.82846651399785", "ascending_node_longitude": "304.2701025753316",
+        "perihelion_argument": "178.9297536744151", "mean_anomaly": "310.5543277370992",
+        "perihelion_distance": "1.133199", "perihelion_time": "2461088.83",
+        "orbit_class": {"orbit_class_type": "AMO"},
+    },
+}  # fmt: skip
 HORIZONS = (
     "Comet non-gravitational force model (AMRAT=m^2/kg;A1-A3=au/d^2;DT=days;R0=au):\n"
     "   AMRAT=  0.       DT=  0.\n   A1= 4.8E-10  A2= 0.  XYZ= 3.\n*****\n"
@@ -84,6 +96,7 @@ UNKNOWN = {
     "JPL elements": "\n".join([ELEMENTS[0] + "          XYZ", ELEMENTS[1] + " ---", ELEMENTS[2] + "      3.0"]),
     "JPL Horizons": HORIZONS + text("ceres_elements.txt"),
     "Sorcha, layup, OpenOrb": text("sorcha_kep.csv").replace("\n", ",XYZ\n", 1).rstrip("\n") + ",3\n",
+    "NASA NeoWs": json.dumps(NEOWS | {"orbital_data": NEOWS["orbital_data"] | {"XYZ": "3"}}),
     "OpenOrb orbits": OPENORB.replace("# OpenOrb", "# OpenOrb XYZ = 3.0"),
     "Find_Orb elements": with_item("find_orb_total.json", ["objects", "Test_1001", "elements"], {"XYZ": 3.0}),
     "Find_Orb covariance": json.dumps(
@@ -124,7 +137,7 @@ def test_the_same_file_without_it_is_read(tmp_path, name):
         "MPC web service (JSON)": json.dumps([SERVICE]), "MPC CometEls": text("CometEls.txt"),
         "MPC comets (JSON)": json.dumps([COMET]), "JPL elements": text("ELEMENTS.COMET"),
         "JPL Horizons": text("ceres_elements.txt"), "Sorcha, layup, OpenOrb": text("sorcha_kep.csv"),
-        "OpenOrb orbits": OPENORB,
+        "OpenOrb orbits": OPENORB, "NASA NeoWs": json.dumps(NEOWS),
         "Find_Orb elements": text("find_orb_total.json"), "Find_Orb covariance": text("find_orb_covar.json"),
         "ECSV table": text("ceres_elements.ecsv"), "MPC table": MPC.replace(",XYZ", "").replace(",5,6", ",5"),
     }  # fmt: skip
@@ -167,3 +180,17 @@ def test_yarkovsky_of_find_orb(tmp_path):
     assert a.orbit.nongrav.law == "asteroid"
     assert a.orbit.nongrav.a[1] < 0.0
     assert a.orbit.covariance.names[-1] == "A2"
+
+
+def test_lists_of_neows(tmp_path):
+    """A browse page, and a feed by date; Eros against the embedded catalogue, another epoch and solution."""
+    path = tmp_path / "x.json"
+    for document in (
+        {"near_earth_objects": [NEOWS, NEOWS]},
+        {"near_earth_objects": {"2026-01-01": [NEOWS, NEOWS]}},
+    ):
+        path.write_text(json.dumps(document))
+        assert [a.number for a in catalogue(path)] == [433, 433]
+    a, b = catalogue(path)[0].orbit, Asteroid.from_catalogue("Eros").orbit
+    difference = a.position - b.at(a.epoch)[0]
+    assert float(np.linalg.norm(difference.to_value("km"))) < 100.0

@@ -1,0 +1,74 @@
+"""From the orbit file of an agency to the verdict and the page, by the commands."""
+
+from pathlib import Path
+
+import pytest
+
+from flybystab.catalogues.catalogue import Asteroid
+from flybystab.cli.main import main
+
+FILES = Path(__file__).parent / "files"
+APOPHIS = Asteroid.from_catalogue("Apophis").row
+_E = [APOPHIS[c] for c in ("e", "a_au", "i_deg", "node_deg", "peri_deg", "M_deg", "epoch_jd_tdb")]
+E, A, I, NODE, PERI, M, EPOCH = _E
+
+HORIZONS = f"""Target body name: 99942 Apophis (2004 MN4)      {{source: JPL#220}}
+Center body name: Sun (10)                        {{source: DE441}}
+Output units    : AU-D, deg, Julian Day Number (Tp)
+Reference frame : Ecliptic of J2000.0
+$$SOE
+{EPOCH}00000000 = A.D. 2025-Nov-21 00:00:00.0000 TDB
+ EC= {E} QR= {float(A) * (1 - float(E))} IN= {I}
+ OM= {NODE} W = {PERI} Tp= 2461042.931950
+ N = 1.1126 MA= {M} TA= 0.0
+ A = {A} AD= 1.0 PR= 323.0
+$$EOE
+"""
+FIND_ORB = f"""{{"num": 1, "ids": ["99942"], "objects": {{"99942": {{"object": "99942", "elements": {{
+"central body": "Sun", "frame": "J2000 ecliptic", "epoch": {EPOCH}, "M": {float(M)!r}, "M sigma": 1e-6, "n": 1.1126,
+"a": {float(A)!r},
+"a sigma": 1e-9, "e": {float(E)!r}, "e sigma": 1e-8, "q": 0.746, "i": {I}, "i sigma": 1e-6, "arg_per": {PERI},
+"arg_per sigma": 1e-6, "asc_node": {NODE}, "asc_node sigma": 1e-6, "Tp": 2461042.93, "H": 19.1}}}}}}}}"""
+NEOCC = f"""format  = 'OEF2.0'       ! file format
+rectype = 'ML'           ! record type (1L/ML)
+refsys  = ECLM J2000     ! default reference system
+END_OF_HEADER
+99942
+ KEP   {A} {E} {I} {NODE} {PERI} {M}
+ MJD   {float(EPOCH) - 2400000.5:.9f} TDT
+ MAG  18.937  0.150
+ LSP   0  0    6
+"""
+
+
+@pytest.mark.parametrize("agency", ["JPL", "MPC", "NEOCC", "Find_Orb", "Horizons"])
+def test_an_orbit_file_gives_a_verdict_and_a_page(tmp_path, capsys, agency):
+    """Apophis in 2029 from five publishers; its body is known by its number."""
+    content = {
+        "JPL": (FILES / "sbdb_covariance_same_epoch.json").read_text(),
+        "MPC": (FILES / "apophis_2010.dat").read_text(),
+        "NEOCC": NEOCC,
+        "Find_Orb": FIND_ORB,
+        "Horizons": HORIZONS,
+    }[agency]
+    file, page = tmp_path / "orbit", tmp_path / "page.html"
+    file.write_text(content)
+    date = ["--date", "2029-04-13"]
+    assert main(["flyby", str(file), *date, "--attitudes", "4"]) == 0
+    shown = capsys.readouterr().out
+    assert "Apophis" in shown
+    assert "2029-04-13" in shown
+    assert "INTACT" in shown
+    assert (
+        main(["report", str(file), *date, "--attitudes", "4", "--samples", "1", "--output", str(page)]) == 0
+    )
+    html = page.read_text()
+    assert "Apophis" in html
+    assert "2029-04-13" in html
+
+
+def test_a_file_of_several_orbits_asks_for_a_name(tmp_path, capsys):
+    assert main(["flyby", str(FILES / "CometEls.txt")]) != 0
+    error = capsys.readouterr().err
+    assert "C/2020 F3 (NEOWISE)" in error
+    assert "--catalogue" in error
