@@ -7,6 +7,7 @@ probabilities), ``stress`` (elastic stress of Apophis against Poisson's ratio), 
 
 import sys
 import time
+from functools import partial
 
 import astropy.units as u
 import numpy as np
@@ -142,11 +143,11 @@ def timing():
         shape = fs.Shape.perturbed([225.0, 165.0, 155.0] * u.m, amplitude=0.06, seed=2, facets=facets)
         body = fs.Body.from_shape(shape, density=RHO * u.kg / u.m**3, spin_period=30.5 * u.h)
         for name, call in {
-            "surface_history, 200 rows": lambda: fs.surface_history(body, encounter, shape=shape),
-            "lobe_history": lambda: lobe_history(body, encounter, shape=shape),
-            "shape_spin without octupole": lambda: fs.shape_spin(body, encounter, shape=shape, error=1e-4),
-            "shape_spin with octupole": lambda: fs.shape_spin(body, encounter, shape=shape, error=1e-8),
-            "elastic_change": lambda: elastic_change(body, encounter),
+            "surface_history, 200 rows": partial(fs.surface_history, body, encounter, shape=shape),
+            "lobe_history": partial(lobe_history, body, encounter, shape=shape),
+            "shape_spin without octupole": partial(fs.shape_spin, body, encounter, shape=shape, error=1e-4),
+            "shape_spin with octupole": partial(fs.shape_spin, body, encounter, shape=shape, error=1e-8),
+            "elastic_change": partial(elastic_change, body, encounter),
         }.items():
             call()
             start = time.perf_counter()
