@@ -123,6 +123,18 @@ def test_an_asteroid_with_a_shape_is_screened_by_its_equivalent_ellipsoid():
         plain.with_shape(None)
 
 
+def test_screening_of_a_shape_in_the_shell(capsys, model, tmp_path):
+    span = ("--from", "2029-04-01", "--to", "2029-05-01", "--json")
+    table = tmp_path / "shape.ecsv"
+    status, out, err = run(capsys, "screen", "Apophis", *span, "--shape", model, "--output", table)
+    assert status == 0, err
+    shaped = fs.Asteroid.from_catalogue("Apophis").with_shape(SHAPE)
+    expected = fs.screen([shaped], "2029-04-01", "2029-05-01")["margin"][0].to_value(u.deg)
+    assert json.loads(out)["rows"][0]["margin_deg"] == pytest.approx(expected, abs=1e-3)
+    words = ("screen", "Apophis", "Bennu", "--shape", model, "--output", tmp_path / "two.ecsv")
+    assert "one asteroid" in run(capsys, *words)[2]
+
+
 def test_units_of_shapes_are_lengths(model):
     with pytest.raises(UnitMismatch, match="unit of length"):
         fs.Shape.read(model, unit=u.s)

@@ -296,6 +296,13 @@ class Shape:
             factor * hessian / u.s**2,
         )
 
+    @cached_property
+    def facet_gravity(self) -> tuple[Array, Array]:
+        """Potential (f,) and acceleration (f, 3) at the centroids of the facets over the density, SI; computed once."""
+        one = 1.0 * u.kg / u.m**3
+        potential, acceleration, _ = self.gravity(self.centroids, one)
+        return potential.value, acceleration.value
+
     def write(self, path: str | Path, fields: Mapping[str, Quantity] | None = None) -> None:
         """Write the mesh and quantities by facet as a legacy VTK file, which ParaView and pyvista read.
 

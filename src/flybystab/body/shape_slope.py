@@ -72,7 +72,7 @@ def shape_slope_change(shape: Shape, body: Body, spin: Quantity, tide: Quantity)
 
 def gravity_at_facets(shape: Shape, body: Body) -> Array:
     """Gravity of the polyhedron at the centroids of its facets, (f, 3), m/s2."""
-    return np.asarray(shape.gravity(shape.centroids, body.density)[1].value)
+    return np.asarray(body.rho * shape.facet_gravity[1])
 
 
 def field_matrix(body: Body, omega: Array, tide: Array) -> Array:

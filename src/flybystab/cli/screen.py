@@ -15,6 +15,8 @@ from flybystab.cli.common import (
     span_arguments,
     tdb,
 )
+from flybystab.cli.shape_options import shape_arguments, shaped
+from flybystab.errors import WrongUsage
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -51,6 +53,7 @@ def study_arguments(sub: argparse.ArgumentParser) -> None:
     )
     span_arguments(sub, "2026-01-01", "2036-01-01")
     material_arguments(sub)
+    shape_arguments(sub)
     sub.add_argument(
         "--samples",
         type=int,
@@ -112,8 +115,13 @@ def run_study(
     from flybystab.screening.settings import settings
 
     names = [Path(a) if _is_file(a) else a for a in options.asteroids]
+    asteroids = listed(names or None)
+    if options.shape:
+        if len(asteroids) != 1:
+            raise WrongUsage(f"--shape: expected one asteroid with it, not {len(asteroids)}")
+        asteroids = (shaped(asteroids[0], options),)
     screening = Screening(
-        listed(names or None),
+        asteroids,
         settings(
             tdb(options.start, "--from"),
             tdb(options.stop, "--to"),
