@@ -60,8 +60,8 @@ def inside(values: np.ndarray, others: np.ndarray, slack: float) -> bool:
     )
 
 
-def flybys(seeds: int, grains: int) -> None:
-    """Every flyby of the reference data."""
+def flybys(seeds: int, grains: int, first: int = 0) -> None:
+    """Every flyby of the reference data, from the case number `first` on."""
     known: dict[Case, list[tuple[float, float, float]]] = defaultdict(list)
     with REFERENCE.open() as file:
         for r in csv.DictReader(file):
@@ -74,7 +74,7 @@ def flybys(seeds: int, grains: int) -> None:
     )
     print("beta     q v_inf    P phase   largest clump                          classes       stretch")
     counts = np.zeros(5, int)
-    for case in sorted(known, key=lambda c: (c.beta, c.v_inf, -c.period, c.phase, c.q)):
+    for case in sorted(known, key=lambda c: (c.beta, c.v_inf, -c.period, c.phase, c.q))[first:]:
         runs = [run_of(case, seed, grains) for seed in range(seeds)]
         clump = np.array([r.largest_fraction for r in runs])
         stretch = np.array([r.stretch for r in runs])
@@ -229,9 +229,11 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("what", choices=commands)
     parser.add_argument("--seeds", type=int)
     parser.add_argument("--grains", type=int)
+    parser.add_argument("--first", type=int, default=0, help="first case of the flybys (0)")
     options = parser.parse_args(arguments)
     command, seeds, grains = commands[options.what]
-    command(options.seeds or seeds, options.grains or grains)
+    more = {"first": options.first} if options.what == "flybys" else {}
+    command(options.seeds or seeds, options.grains or grains, **more)
 
 
 if __name__ == "__main__":

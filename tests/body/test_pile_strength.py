@@ -7,7 +7,7 @@ from scipy.optimize import brentq
 
 from flybystab.bench.grains_cohesion import GUESS, STRENGTH, cohesive_sphere, ratio
 from flybystab.body.body import Body, Material
-from flybystab.body.grain_calibration import cohesion_table
+from flybystab.body.grain_calibration import cohesion_table, friction_table
 from flybystab.body.pile import _first, _pressure_unit, make_pile
 from flybystab.body.pile_strength import loaded, mobilised, required_cohesion, spin_up
 from flybystab.core.ellipsoid.rigid_stress import rigid_stress
@@ -39,25 +39,29 @@ def test_the_angle_mobilised_by_a_spinning_sphere_is_that_of_the_closed_form():
         assert axes[0] / axes[2] < 1.05
 
 
-@pytest.mark.parametrize("load", ["pull", "shear"])
-def test_pulling_and_shearing_give_the_calibrated_cohesion(load):
-    middle = next(c for c in cohesion_table() if c.beta == 0.3)
-    assert ratio(0.3, load, 7, grains=200) == pytest.approx(middle.ratio, rel=0.25)
+@pytest.mark.parametrize(("load", "row"), [("pull", 1), ("pull", 5), ("shear", 5)])
+def test_pulling_and_shearing_give_the_calibrated_cohesion(load, row):
+    friction = friction_table()[row]
+    middle = cohesion_table()[row]
+    assert middle.angle == friction.angle
+    assert ratio(friction, load, 7, grains=200) == pytest.approx(middle.ratio, rel=0.25)
 
 
 def test_a_slower_loading_gives_the_same_strength():
     # within the scatter of a brittle failure, 10 % in the table
-    slow, fast = (ratio(0.3, "pull", 7, grains=200, slow=factor) for factor in (2.0, 1.0))
+    slow, fast = (ratio(friction_table()[5], "pull", 7, grains=200, slow=factor) for factor in (2.0, 1.0))
     assert slow == pytest.approx(fast, rel=0.15)
 
 
 def test_the_stress_of_a_load_is_its_mean_over_the_volume():
     # a pull K_xx on a body at rest is balanced by the mean stress rho K_xx a^2/5, and the others vanish
-    sim = cohesive_sphere(0.3, 7, 200)
+    friction = friction_table()[5]
+    assert (friction.mu_s, friction.beta) == (0.6, 0.3)
+    sim = cohesive_sphere(friction, 7, 200)
     stress, axes = loaded(sim, np.array([1.0, 0.0, 0.0]), STRENGTH)
     assert stress[0] > 0.0
     assert np.abs(stress[1:]).max() == 0.0
-    phi = np.deg2rad(36.46)
+    phi = np.deg2rad(friction.angle)
     expected = stress[0] * (1 + np.sin(phi)) / (2 * np.cos(phi))
     assert required_cohesion(stress, phi) == pytest.approx(expected, rel=1e-6)
     assert 0.2 < expected * GUESS / STRENGTH / 0.11 < 5.0

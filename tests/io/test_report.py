@@ -110,3 +110,27 @@ def test_in_a_browser(page, tmp_path):
 def test_the_place_is_checked_first(capsys):
     assert main(["report", "Apophis", "--output", "report.doc"]) == 2
     assert "ends in .html" in capsys.readouterr().err
+
+
+def test_grains_have_a_section(tmp_path, monkeypatch):
+    from astropy.time import Time
+
+    from flybystab.catalogues.asteroid import Asteroid
+    from flybystab.encounter.encounter import Encounter
+    from flybystab.flybys.flyby import flyby
+    from flybystab.flybys.spin_sample import spin_sample
+    from flybystab.io.report import report
+
+    monkeypatch.setenv("FLYBYSTAB_CACHE", str(tmp_path))
+    apophis = Asteroid.from_catalogue("Apophis")
+    encounter = Encounter.from_orbit(apophis.orbit, "earth", Time("2029-04-13", scale="tdb"))
+    result = flyby(apophis.body, encounter, grains=100, seeds=1, model="grains")
+    sample = spin_sample(apophis, encounter, n=2)
+    said = {}
+    for name, r in (("with", result), ("without", flyby(apophis.body, encounter))):
+        parsed = Page(report(apophis, r, sample, tmp_path / f"{name}.html").read_text())
+        assert parsed.open == []
+        said[name] = " ".join(parsed.words), len(parsed.images)
+    assert "1 pile: INTACT 100%" in said["with"][0]
+    assert "Grains" not in said["without"][0]
+    assert said["with"][1] == said["without"][1] + 2

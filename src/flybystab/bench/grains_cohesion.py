@@ -15,15 +15,13 @@ from pathlib import Path
 
 import numpy as np
 
-from flybystab.body.grain_calibration import friction_table
-from flybystab.body.packing import simulation_of
+from flybystab.body.grain_calibration import PATCH, Friction, friction_table
+from flybystab.body.packing import settled_pile, simulation_of
 from flybystab.body.pile_cache import stored_pile
 from flybystab.body.pile_strength import loaded, required_cohesion
 from flybystab.core.grains.simulation import Simulation
 from flybystab.core.numerics.threads import in_order
 
-#: Sizes of the contact patch in the table.
-PATCHES = (0.15, 0.3, 0.45, 0.7)
 #: Diagonals of the tide.
 LOADS = {"pull": (1.0, 0.0, 0.0), "shear": (1.0, -1.0, 0.0)}
 #: First guess of ``Y/(c beta^2)``: packing 0.6, five contacts a grain.
@@ -32,35 +30,38 @@ GUESS = 0.24
 STRENGTH = 1.0
 
 
-def cohesive_sphere(beta: float, seed: int, grains: int = 528) -> Simulation:
+def cohesive_sphere(friction: Friction, seed: int, grains: int = 528) -> Simulation:
     """A settled sphere, cohesive and at rest without gravity."""
-    from flybystab.body.packing import settled_pile
-
-    inputs = {"shape": np.ones(3), "grains": grains, "seed": seed, "mu_s": 0.6, "beta": beta}
-    arrays = stored_pile(inputs, lambda: settled_pile(np.ones(3), grains, seed, 0.6, beta))
-    cohesion = STRENGTH / (GUESS * beta**2)
-    sim = simulation_of(arrays, 0.6, beta, cohesion=cohesion, strength=STRENGTH)
+    mu_s, beta = friction.mu_s, max(friction.beta, PATCH)
+    inputs = {"shape": np.ones(3), "grains": grains, "seed": seed, "mu_s": mu_s, "beta": beta}
+    arrays = stored_pile(inputs, lambda: settled_pile(np.ones(3), grains, seed, mu_s, beta))
+    sim = simulation_of(arrays, mu_s, beta, cohesion=STRENGTH / (GUESS * beta**2), strength=STRENGTH)
     sim.advance(1.0, gravity=False, drag=3.0)
     sim.centre()
     return sim
 
 
-def ratio(beta: float, load: str, seed: int, grains: int = 528, slow: float = 1.0) -> float:
+def ratio(friction: Friction, load: str, seed: int, grains: int = 528, slow: float = 1.0) -> float:
     """``Y/(c beta^2)`` of one sphere under one load."""
-    angle = next(f.angle for f in friction_table() if f.mu_s == 0.6 and abs(f.beta - beta) < 1e-9)
-    sim = cohesive_sphere(beta, seed, grains)
+    sim = cohesive_sphere(friction, seed, grains)
     stress, _ = loaded(sim, np.array(LOADS[load]), STRENGTH, slow)
-    return required_cohesion(stress, float(np.deg2rad(angle))) * GUESS / STRENGTH
+    return required_cohesion(stress, float(np.deg2rad(friction.angle))) * GUESS / STRENGTH
 
 
 def table(seeds: int = 3) -> list[tuple[float, ...]]:
-    """Rows of beta, ``Y/(c beta^2)`` (mean of both loads), half of its range, median by pulling, and by shearing."""
-    jobs = [(beta, load, seed) for beta in PATCHES for load in LOADS for seed in range(seeds)]
+    """Rows of the calibrated friction with ``Y/(c beta^2)``.
+
+    Columns: mu_s, beta, friction angle, mean of the medians of both loads, half the range, median by pulling, and by
+    shearing.
+    """
+    points = friction_table()
+    jobs = [(friction, load, seed) for friction in points for load in LOADS for seed in range(seeds)]
     found = np.array(list(in_order(lambda j: ratio(*j), jobs, os.cpu_count() or 1)))
     out: list[tuple[float, ...]] = []
-    for beta, values in zip(PATCHES, found.reshape(len(PATCHES), len(LOADS), seeds), strict=True):
+    for f, values in zip(points, found.reshape(len(points), len(LOADS), seeds), strict=True):
         pull, shear = (float(np.median(v)) for v in values)
-        out.append((beta, 0.5 * (pull + shear), float(0.5 * np.ptp(values)), pull, shear))
+        middle, half = 0.5 * (pull + shear), float(0.5 * np.ptp(values))
+        out.append((f.mu_s, max(f.beta, PATCH), f.angle, middle, half, pull, shear))
     return out
 
 
@@ -68,8 +69,8 @@ def text(rows: list[tuple[float, ...]]) -> str:
     """The table as a file."""
     head = (
         "# Bulk cohesion of piles over c beta^2, c the attraction per area (2 beta R)^2 of a contact: spheres pulled\n"
-        "# and sheared without gravity (python -m flybystab.bench.grains_cohesion); mu_s 0.6, Mohr-Coulomb.\n"
-        "beta,ratio,scatter,pull,shear\n"
+        "# and sheared without gravity (python -m flybystab.bench.grains_cohesion); Mohr-Coulomb.\n"
+        "mu_s,beta,friction_angle_deg,ratio,scatter,pull,shear\n"
     )
     return head + "".join(",".join(f"{x:.4g}" for x in row) + "\n" for row in rows)
 

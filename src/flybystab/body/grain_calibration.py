@@ -7,7 +7,7 @@ The tables are ``data/grains_friction.csv`` (spin-up of spheres, ``python -m fly
 from __future__ import annotations
 
 import csv
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
 
@@ -18,6 +18,9 @@ from flybystab.errors import InvalidInput
 
 #: Largest bulk cohesion over the central pressure ``2/3 pi G rho^2 R^2``. The time step falls as the root of their sum.
 STRONGEST = 1000.0
+#: Least size of the contact patch of cohesive grains, which carries the attraction; its rolling resistance is
+#: negligible.
+PATCH = 0.01
 
 
 @dataclass(frozen=True)
@@ -31,9 +34,9 @@ class Friction:
 
 @dataclass(frozen=True)
 class CohesionRatio:
-    """Bulk cohesion over ``c beta^2``, ``c`` the attraction per area of a contact, for a size of the contact patch."""
+    """Bulk cohesion over ``c beta^2``, ``c`` the attraction per area of a contact, at a friction angle."""
 
-    beta: float
+    angle: float  #: deg
     ratio: float
     scatter: float  #: half the range over piles, and over pulling and shearing
 
@@ -53,10 +56,12 @@ def friction_table() -> tuple[Friction, ...]:
 
 @cache
 def cohesion_table() -> tuple[CohesionRatio, ...]:
-    """Calibrated cohesion, by the size of the contact patch."""
+    """Calibrated cohesion, by the friction angle."""
     rows = _rows("grains_cohesion.csv")
-    found = [CohesionRatio(float(r["beta"]), float(r["ratio"]), float(r["scatter"])) for r in rows]
-    return tuple(sorted(found, key=lambda c: c.beta))
+    found = [
+        CohesionRatio(float(r["friction_angle_deg"]), float(r["ratio"]), float(r["scatter"])) for r in rows
+    ]
+    return tuple(sorted(found, key=lambda c: c.angle))
 
 
 def contact_friction(angle: float) -> Friction:
@@ -80,37 +85,25 @@ def contact_friction(angle: float) -> Friction:
     return Friction(mu_s, beta, degrees)
 
 
-def contact_cohesion(cohesion: float, friction: Friction, pressure: float) -> float:
-    """Attraction per area of a contact, Pa, of a pile with a bulk cohesion (Pa).
+def contact_cohesion(cohesion: float, friction: Friction, pressure: float) -> tuple[float, Friction]:
+    """Attraction per area of a contact, Pa, of a pile with a bulk cohesion (Pa), and its contact friction.
 
     Parameters
     ----------
     cohesion : float
         Pa.
     friction : Friction
-        Its contact patch carries the attraction.
+        With a patch of at least :data:`PATCH` in the answer, which carries the attraction.
     pressure : float
         Central pressure of the body, Pa.
 
     Raises
     ------
     InvalidInput
-        A friction angle at which contacts have no patch or one smaller than the calibrated ones, or a cohesion beyond
-        :data:`STRONGEST` times the pressure.
+        A cohesion beyond :data:`STRONGEST` times the pressure.
     """
     if cohesion == 0.0:
-        return 0.0
-    table = cohesion_table()
-    if not table[0].beta - 1e-9 <= friction.beta <= table[-1].beta + 1e-9:
-        angles = [
-            f.angle for f in friction_table() if table[0].beta - 1e-9 <= f.beta <= table[-1].beta + 1e-9
-        ]
-        raise InvalidInput(
-            "cohesion",
-            f"{cohesion:g} Pa at a friction angle of {friction.angle:.1f} deg",
-            f"no cohesion, or a friction angle of {min(angles):.1f} to {max(angles):.1f} deg: at others the contact "
-            "patch that carries it is not calibrated",
-        )
+        return 0.0, friction
     if cohesion > STRONGEST * pressure:
         raise InvalidInput(
             "cohesion",
@@ -118,5 +111,7 @@ def contact_cohesion(cohesion: float, friction: Friction, pressure: float) -> fl
             f"at most {STRONGEST * pressure:.3g} Pa, {STRONGEST:g} times the central pressure of this body: a stronger "
             "one needs time steps that are too short",
         )
-    ratio = np.interp(friction.beta, [c.beta for c in table], [c.ratio for c in table])
-    return float(cohesion / (ratio * friction.beta**2))
+    table = cohesion_table()
+    ratio = np.interp(friction.angle, [c.angle for c in table], [c.ratio for c in table])
+    friction = replace(friction, beta=max(friction.beta, PATCH))
+    return float(cohesion / (ratio * friction.beta**2)), friction

@@ -20,7 +20,7 @@ from flybystab.body.body import Body, Material, check_settled
 from flybystab.body.grain_calibration import Friction, contact_cohesion, contact_friction
 from flybystab.body.grain_sizes import GrainSizes, grain_sizes
 from flybystab.body.packing import settled_pile, simulation_of
-from flybystab.body.pile_cache import stored_pile
+from flybystab.body.pile_cache import arrays_of, stored_pile
 from flybystab.body.pile_strength import spin_up
 from flybystab.body.shape import Shape
 from flybystab.constants import G
@@ -79,6 +79,7 @@ def make_pile(
     *,
     shape: Shape | None = None,
     sizes: GrainSizes | None = None,
+    keep: bool = True,
     **options: Any,
 ) -> PileState:
     """A pile with the shape, density, spin, friction angle and cohesion of a body.
@@ -96,6 +97,8 @@ def make_pile(
         Carved out instead of the ellipsoid; the body is the one that stands for it.
     sizes : GrainSizes, optional
         Of the grains.
+    keep : bool
+        Whether to use the cache.
     **options
         Of :class:`flybystab.core.grains.simulation.Simulation`, for tests of the numerics; and `overlap`, the mean
         overlap that sets the stiffness. Not for piles from the cache.
@@ -103,12 +106,12 @@ def make_pile(
     Raises
     ------
     InvalidInput
-        A friction angle beyond the calibrated range, cohesion that is not calibrated, or a number of grains out of
-        range.
+        A friction angle beyond the calibrated range, too strong a cohesion, or a number of grains out of range.
     """
     if friction is None:
         check_grains(body, grains)
     friction = friction or contact_friction(body.material.phi)
+    cohesion, friction = contact_cohesion(body.material.c_pa, friction, _central_pressure(body))
     axes = body.axes / np.cbrt(np.prod(body.axes))
     inputs: dict[str, Any] = {
         "shape": axes, "grains": grains, "seed": seed, "mu_s": friction.mu_s, "beta": friction.beta,
@@ -118,14 +121,14 @@ def make_pile(
     if shape is not None:
         points = shape.vertices.value / shape.mean_radius.value
         inputs |= {"facets": shape.facets.ravel(), "vertices": points.ravel()}
-    settled = stored_pile(
-        inputs, lambda: settled_pile(axes, grains, seed, friction.mu_s, friction.beta, sizes, shape)
-    )
+
+    def settled() -> Simulation:
+        return settled_pile(axes, grains, seed, friction.mu_s, friction.beta, sizes, shape)
+
+    arrays = stored_pile(inputs, settled) if keep else arrays_of(settled())
     strength = body.material.c_pa / _pressure_unit(body)
-    cohesion = contact_cohesion(body.material.c_pa, friction, _central_pressure(body)) / _pressure_unit(body)
-    sim = simulation_of(
-        settled, friction.mu_s, friction.beta, cohesion=cohesion, strength=strength, **options
-    )
+    cohesion /= _pressure_unit(body)
+    sim = simulation_of(arrays, friction.mu_s, friction.beta, cohesion=cohesion, strength=strength, **options)
     if cohesion > 0.0:
         sim.advance(_COHERED, drag=_DRAG)
         sim.centre()
@@ -147,8 +150,8 @@ def _central_pressure(body: Body) -> float:
     return float(2.0 / 3.0 * np.pi * G * body.rho**2 * np.prod(body.axes) ** (2.0 / 3.0))
 
 
-def check_grains(body: Body, grains: int) -> None:
-    """Refuse a number of grains, or a body, for which no pile is made."""
+def checked_number(grains: int) -> int:
+    """Refuse a number of grains of which no pile is made."""
     if not isinstance(grains, int | np.integer) or isinstance(grains, bool) or not grains >= LEAST:
         raise InvalidInput("grains", grains, f"a whole number of grains, {LEAST} or more")
     most = min(MOST, int(_memory() / _BYTES))
@@ -156,6 +159,12 @@ def check_grains(body: Body, grains: int) -> None:
         raise InvalidInput(
             "grains", grains, f"at most {most} grains, for the memory and the time that they take"
         )
+    return int(grains)
+
+
+def check_grains(body: Body, grains: int) -> None:
+    """Refuse a number of grains, or a body, for which no pile is made."""
+    checked_number(grains)
     friction = contact_friction(body.material.phi)
     contact_cohesion(body.material.c_pa, friction, _central_pressure(body))
     if body.material.brittle and body.material.c_pa > 0.0:

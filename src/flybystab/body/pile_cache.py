@@ -53,7 +53,7 @@ def stored_pile(inputs: dict[str, Any], make: Callable[[], Simulation]) -> dict[
             return found
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile):
         pass
-    arrays = _arrays(make())
+    arrays = arrays_of(make())
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
         with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".part", delete=False) as file:
@@ -64,7 +64,8 @@ def stored_pile(inputs: dict[str, Any], make: Callable[[], Simulation]) -> dict[
     return arrays
 
 
-def _arrays(sim: Simulation) -> dict[str, Array]:
+def arrays_of(sim: Simulation) -> dict[str, Array]:
+    """Grains and contacts of a simulation as they are stored."""
     p, last = sim.pairs, sim.pairs.first[-1]
     return {
         **sim.grains._asdict(),

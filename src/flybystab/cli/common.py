@@ -52,6 +52,11 @@ def figure_argument(sub: argparse.ArgumentParser, films: bool = False) -> None:
     sub.add_argument("--output", metavar="FILE", help=f"write a figure ({', '.join(FIGURES)}){film}")
 
 
+def movie_argument(sub: argparse.ArgumentParser) -> None:
+    """Add the option --movie."""
+    sub.add_argument("--movie", metavar="FILE", help=f"also write an animation ({', '.join(FILMS)})")
+
+
 def show(options: argparse.Namespace, document: Callable[[], Any], lines: Callable[[], list[str]]) -> None:
     """Print a result: one JSON document with ``--json``, else text."""
     if options.json:
@@ -150,7 +155,7 @@ def asteroid_of(options: argparse.Namespace) -> Any:
     return shaped(asteroid_named(options), options).with_material(material_of(options))
 
 
-def check_picture(path: str | None, endings: tuple[str, ...] = FIGURES) -> None:
+def check_picture(path: str | None, endings: tuple[str, ...] = FIGURES, option: str = "--output") -> None:
     """Check before a computation that its figure or page can be written."""
     if path is None:
         return
@@ -158,9 +163,9 @@ def check_picture(path: str | None, endings: tuple[str, ...] = FIGURES) -> None:
 
     target = Path(path)
     if target.suffix.lower() not in endings:
-        raise WrongUsage(f"--output = {path}: expected a file that ends in {' or '.join(endings)}")
+        raise WrongUsage(f"{option} = {path}: expected a file that ends in {' or '.join(endings)}")
     if not target.parent.is_dir() or not os.access(target.parent, os.W_OK):
-        raise InvalidInput("--output", path, "a folder that exists and can be written")
+        raise InvalidInput(option, path, "a folder that exists and can be written")
 
 
 def check_table(path: str | None) -> None:

@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import argparse
 
-from flybystab.cli.common import check_picture, figure_argument, grains_arguments, show, write_picture
+from flybystab.cli.common import (
+    check_picture,
+    figure_argument,
+    grains_arguments,
+    movie_argument,
+    show,
+    write_picture,
+)
 from flybystab.cli.flown import attitude_words, flown, passage_arguments
 from flybystab.cli.shape_options import check_map, map_argument, surface_of, write_map
 from flybystab.plots.formats import FIGURES, FILMS
@@ -18,6 +25,7 @@ def arguments(sub: argparse.ArgumentParser) -> None:
     passage_arguments(sub)
     grains_arguments(sub)
     figure_argument(sub, films=True)
+    movie_argument(sub)
     map_argument(sub)
 
 
@@ -29,13 +37,14 @@ def run(options: argparse.Namespace) -> None:
     from flybystab.io.surface_text import extra, surface_lines
 
     check_picture(options.output, FIGURES + FILMS)
+    check_picture(options.movie, FILMS, "--movie")
     check_map(options)
     asteroid, result, sample = flown(options)
     surface = surface_of(options, result)
     write_map(options, surface)
     encounter = result.encounter
-    if options.output:
-        write_picture(result, f"{asteroid.label}, {encounter.time.tdb.iso[:10]}", options.output)
+    for target in filter(None, (options.output, options.movie)):
+        write_picture(result, f"{asteroid.label}, {encounter.time.tdb.iso[:10]}", target)
     show(
         options,
         lambda: document.flyby_document(
@@ -62,6 +71,7 @@ def run(options: argparse.Namespace) -> None:
             *([] if surface is None else surface_lines(surface)),
             *text.model_lines(result, asteroid.assumptions),
             *([f"figure     {options.output}"] if options.output else []),
+            *([f"movie      {options.movie}"] if options.movie else []),
             *([f"map        {options.map}"] if options.map else []),
         ],
     )

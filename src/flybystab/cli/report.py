@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from flybystab.cli.common import check_picture, show
+from flybystab.cli.common import check_picture, grains_arguments, show
 from flybystab.cli.flown import flown, passage_arguments
 from flybystab.cli.shape_options import surface_of
 
@@ -15,6 +15,7 @@ EXAMPLE = "flybystab report Apophis --output apophis.html"
 def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     passage_arguments(sub)
+    grains_arguments(sub)
     sub.add_argument(
         "--samples",
         type=int,

@@ -8,6 +8,7 @@ from flybystab.cli.common import (
     SURFACES,
     check_picture,
     figure_argument,
+    movie_argument,
     show,
     write_picture,
 )
@@ -21,6 +22,7 @@ def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     sub.add_argument("file", help="scenario file")
     figure_argument(sub, films=True)
+    movie_argument(sub)
 
 
 def run(options: argparse.Namespace) -> None:
@@ -34,6 +36,7 @@ def run(options: argparse.Namespace) -> None:
     from flybystab.io.surface_text import extra, surface_lines
 
     check_picture(options.output, FIGURES + FILMS)
+    check_picture(options.movie, FILMS, "--movie")
     script = scenario(options.file)
     figure = options.output or script.figure
     check_picture(figure, FIGURES + FILMS)
@@ -50,6 +53,8 @@ def run(options: argparse.Namespace) -> None:
         surface = surface_history(script.body, script.encounter, script.attitude, shape=script.shape)
     if figure:
         write_picture(result, script.title, figure)
+    if options.movie:
+        write_picture(result, script.title, options.movie)
     show(
         options,
         lambda: document.flyby_document(result, title=script.title, figure=figure, **extra(surface)),
@@ -61,5 +66,6 @@ def run(options: argparse.Namespace) -> None:
             *([] if surface is None else surface_lines(surface)),
             *text.model_lines(result),
             *([f"figure     {figure}"] if figure else []),
+            *([f"movie      {options.movie}"] if options.movie else []),
         ],
     )

@@ -67,6 +67,12 @@ def study_arguments(sub: argparse.ArgumentParser) -> None:
         metavar="FILE",
         help="priors of the uncertain inputs, TOML; omitted ones keep their defaults",
     )
+    sub.add_argument(
+        "--grains",
+        type=int,
+        metavar="N",
+        help="carry on by piles of N grains the samples where the ellipsoid ends",
+    )
     sub.add_argument("--jobs", type=int, default=1, metavar="N", help="number of processes (1)")
     sub.add_argument("--dask", metavar="ADDRESS", help="dask scheduler to use instead of processes")
 
@@ -132,6 +138,7 @@ def run_study(
             material=material_of(options),
             population=Population.from_file(options.population) if options.population else None,
             keep_samples=samples_output is not None,
+            grains=getattr(options, "grains", None),
         ),
     )
     bar = ProgressBar()

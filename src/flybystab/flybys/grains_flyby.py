@@ -240,6 +240,16 @@ class GrainsOutcome:
         )
 
 
+def warn_of_few(grains: int) -> None:
+    """Warn of a number of grains that resolves little."""
+    if grains < FEW:
+        warnings.warn(
+            f"{grains} grains tell whether a body comes apart, not the mass of its fragments nor how far it stretches; "
+            f"use {FEW} or more",
+            stacklevel=4,
+        )
+
+
 def grains_flyby(
     body: Body,
     encounter: Encounter,
@@ -249,6 +259,7 @@ def grains_flyby(
     seeds: int | Sequence[int] = SEEDS,
     threads: int | None = None,
     pile: Pile | None = None,
+    keep: bool = True,
 ) -> GrainsOutcome:
     """Carry piles of grains through an encounter.
 
@@ -268,6 +279,8 @@ def grains_flyby(
         At a time; all cores by default. Results do not depend on it.
     pile : Pile, optional
         Of this body: gives the shape and the sizes of the grains.
+    keep : bool
+        Whether piles are kept in the cache.
 
     Raises
     ------
@@ -280,18 +293,17 @@ def grains_flyby(
         raise InvalidInput(
             "encounter", encounter, "one whose path clears the planet: nothing is left for grains"
         )
-    if grains < FEW:
-        warnings.warn(
-            f"{grains} grains tell whether a body comes apart, not the mass of its fragments nor how far it stretches; "
-            f"use {FEW} or more",
-            stacklevel=3,
-        )
+    warn_of_few(grains)
     begun = clock.perf_counter()
     cores = os.cpu_count() or 1
     runs = tuple(
         in_order(
             lambda seed: one_pile(
-                pile.state(seed) if pile else make_pile(body, grains, seed), body, encounter, rotation, seed
+                pile.state(seed) if pile else make_pile(body, grains, seed, keep=keep),
+                body,
+                encounter,
+                rotation,
+                seed,
             ),
             chosen,
             threads or cores,

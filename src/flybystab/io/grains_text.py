@@ -14,7 +14,7 @@ def grains_lines(r: FlybyResult, most: int = 6) -> list[str]:
         return []
     low, high = r.grains.largest_range
     out = [
-        f"grains     {len(r.grains.runs)} piles: "
+        f"grains     {len(r.grains.runs)} pile{'s' if len(r.grains.runs) > 1 else ''}: "
         + ", ".join(f"{v} {p:.0%} ({a:.0%} to {b:.0%})" for v, (p, a, b) in r.grains.probabilities().items()),
         f"           largest clump {r.largest_fraction:.1%} of the mass ({low:.1%} to {high:.1%}); "
         f"computed in {r.grains.wall_time.to_value(u.s):.1f} s",

@@ -22,10 +22,12 @@ from flybystab.body.surface_history import SurfaceHistory
 from flybystab.catalogues.asteroid import Asteroid
 from flybystab.flybys.result import FlybyResult
 from flybystab.flybys.spin_sample import SpinSample
+from flybystab.io.grains_text import grains_lines
 from flybystab.io.surface_text import REPOSE, surface_rows
 from flybystab.io.text import MEANING, angle, contact, known, left_out, modelled
 from flybystab.orbit.ephemeris import ephemeris
 from flybystab.plots.flyby import BLUE, flyby_panels
+from flybystab.plots.grains import grains_figure, grains_scene_plot
 from flybystab.plots.scene import scene_plot
 from flybystab.plots.shape_map import surface_history_figure
 
@@ -76,6 +78,7 @@ def report(
         sample_text=_sample_text(sample),
         probabilities=None if screened is None else _probability_rows(screened),
         surface=None if surface is None else surface_rows(surface),
+        grains=grains_lines(result, most=12),
         body=_body_rows(asteroid),
         assumed={_INPUTS[column] for column in asteroid.assumed if column in _INPUTS},
         model=_model_rows(result),
@@ -85,6 +88,8 @@ def report(
             "sample": _sample_picture(sample),
             "scene": _scene_picture(result),
             "surface": None if surface is None else _surface_picture(surface),
+            "grains": None if result.grains is None else _bitmap(grains_figure(result)),
+            "grains_scene": None if result.grains is None else _grains_scene(result),
         },
     )
     target = Path(path)
@@ -302,6 +307,19 @@ def _history_picture(r: FlybyResult) -> str:
     figure = _blank(7.2, 8.0)
     flyby_panels(figure.subplots(4, 1, sharex=True), r)
     return _embedded(figure)
+
+
+def _bitmap(figure: Any) -> str:
+    """A figure of many small parts, for which a bitmap is smaller than vectors."""
+    stream = io.BytesIO()
+    figure.savefig(stream, format="png", dpi=120)
+    return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
+
+
+def _grains_scene(r: FlybyResult) -> str:
+    figure = _blank(7.2, 4.2)
+    grains_scene_plot(figure.subplots(), r)
+    return _bitmap(figure)
 
 
 def _surface_picture(surface: SurfaceHistory) -> str:

@@ -15,6 +15,7 @@ from matplotlib.collections import EllipseCollection
 
 from flybystab.encounter.attitude import periapsis_axes
 from flybystab.errors import InvalidInput
+from flybystab.flybys.batch import span_of
 from flybystab.flybys.grains_flyby import GrainsOutcome, GrainsRun
 from flybystab.flybys.result import FlybyResult
 from flybystab.plots.flyby import BLACK
@@ -60,6 +61,68 @@ def grains_plot(
         reach = 1.1 * float(np.abs(place[inside] if inside.any() else place).max() + r.max())
     axes.set(aspect="equal", xlim=(-reach, reach), ylim=(-reach, reach), xlabel="x (km)")
     axes.locator_params(nbins=5)
+    return axes
+
+
+def grains_scene_plot(
+    axes: Any, result: FlybyResult, magnification: float | None = None, places: int = 7
+) -> Any:
+    """Planet, path and the pile with the median outcome at several times, in the plane of the orbit, 1000 km.
+
+    The direction of motion at periapsis points to the right, periapsis lies above the planet.
+
+    Parameters
+    ----------
+    axes : matplotlib Axes
+    result : FlybyResult
+        Of grains.
+    magnification : float, optional
+        Of the pile; by default such that neighbours do not touch.
+    places : int
+        Number of times, evenly along the nearest part of the path.
+    """
+    from matplotlib.patches import Circle
+
+    run, encounter = _outcome(result).median, result.encounter
+    turn = periapsis_axes(encounter)
+    t = run.course.time.to_value(u.s)
+    q, radius = encounter.distance.to_value(u.m), encounter.planet.radius
+    t = t[t <= span_of(encounter)[1]]
+    near = t[encounter.distances(t) < 4.5 * max(q, radius)]
+    low, high = (near[0], near[-1]) if len(near) > 1 else (t[0], t[-1])
+    fine = np.linspace(low, high, 2001)
+    path = encounter.positions(fine) @ turn.T / 1e6
+    way = np.concatenate([[0.0], np.linalg.norm(np.diff(path, axis=0), axis=1).cumsum()])
+    rows = np.unique(
+        [int(np.abs(t - x).argmin()) for x in np.interp(np.linspace(0.0, way[-1], places), way, fine)]
+    )
+    centres = encounter.positions(t[rows]) @ turn.T / 1e6
+    clouds = [run.course.positions[row].to_value(u.m) @ turn.T / 1e6 for row in rows]
+    if magnification is None:
+        gap = np.linalg.norm(np.diff(centres, axis=0), axis=1).min() if len(centres) > 1 else q / 1e6
+        longest = max(np.nanpercentile(np.linalg.norm(c, axis=1), 95) for c in clouds)
+        magnification = float(f"{min(0.5 * gap, radius / 1e6) / longest:.1g}")
+    axes.add_patch(Circle((0.0, 0.0), radius / 1e6, color="0.8", zorder=1))
+    axes.plot(path[:, 1], path[:, 0], color=BLACK, lw=0.7, zorder=2)
+    size = 2.0 * magnification * run.radius.to_value(u.m) / 1e6
+    colours = np.array([COLOURS[k % len(COLOURS)] if k >= 0 else LOOSE for k in run.label])
+    for centre, cloud in zip(centres, clouds, strict=True):
+        held = np.isfinite(cloud).all(axis=1)
+        order = np.flatnonzero(held)[np.argsort(-cloud[held, 2])]
+        axes.add_collection(
+            EllipseCollection(
+                size[order], size[order], np.zeros(len(order)), units="xy",
+                offsets=(centre + magnification * cloud[order])[:, [1, 0]], offset_transform=axes.transData,
+                facecolors=colours[order], edgecolors="none", zorder=3,
+            )
+        )  # fmt: skip
+    axes.set(aspect="equal", xlabel="y (1000 km)", ylabel="x (1000 km)")
+    axes.margins(0.08)
+    axes.set_title(
+        f"{encounter.planet.name.capitalize()} to scale, pile {magnification:,.0f} times larger; "
+        "colours: clumps at the end",
+        fontsize=9,
+    )
     return axes
 
 

@@ -33,7 +33,7 @@ COLUMNS: dict[str, Column] = {
     "margin": Column(
         float, u.deg, "friction angle minus the largest one mobilised; a lower limit if decided by bound"
     ),
-    "decided_by": Column(str, None, "bound or dynamics"),
+    "decided_by": Column(str, None, "bound, dynamics or grains"),
     "friction_angle": Column(float, u.deg, "of the catalogue body"),
     "cohesion": Column(float, u.Pa, "of the catalogue body"),
     "yield_surface": Column(str, None, "yield surface, of the samples also"),
@@ -48,6 +48,7 @@ COLUMNS: dict[str, Column] = {
     "friction_rise": Column(float, u.deg, "increase during the passage; an upper limit if decided by bound"),
     "samples": Column(int, None, "samples drawn"),
     "samples_dynamic": Column(int, None, "samples that needed the dynamics"),
+    "samples_grains": Column(int, None, "samples carried on by grains"),
     **{share_of(v): Column(float, None, f"fraction of the samples with verdict {v}") for v in VERDICTS},
     "p_yield": Column(float, None, "fraction of the samples in equilibrium that yield or hit the planet"),
     "p_yield_low": Column(float, None, "95 % interval (Wilson) of that probability"),
@@ -95,6 +96,7 @@ SAMPLE_COLUMNS: dict[str, Column] = {
     "margin": Column(
         float, u.deg, "friction angle minus the largest one mobilised; a lower limit if decided by bound"
     ),
-    "decided_by": Column(str, None, "bound or dynamics"),
+    "decided_by": Column(str, None, "bound, dynamics or grains"),
+    "largest_fraction": Column(float, None, "largest clump of grains over the mass; nan without grains"),
     "error": Column(str, None, "reason why the sample could not be computed"),
 }

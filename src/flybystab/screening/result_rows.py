@@ -44,8 +44,8 @@ def body_row(passage: Passage, settings: Settings) -> Row:
         "v_inf": passage.v_inf / 1000.0,
     }
     try:
-        known = nominal(asteroid, material, settings.population)
-        attitude = Attitudes.at(asteroid, known, settings.seed, "nominal", *passage.key)
+        attitude = catalogue_body(passage, settings)
+        known = attitude.draws
         main = sample_verdicts(
             passage, known, attitude, material, tolerance=settings.tolerance, sharp=SHARP, measure=True
         )
@@ -70,7 +70,15 @@ def body_row(passage: Passage, settings: Settings) -> Row:
         "spin_period": float(known.period[0]) / 3600.0,
         "samples": 0,
         "samples_dynamic": 0,
+        "samples_grains": 0,
     }
+
+
+def catalogue_body(passage: Passage, settings: Settings) -> Attitudes:
+    """Attitude of the catalogue body, with the body."""
+    asteroid = passage.asteroid
+    known = nominal(asteroid, settings.material, settings.population)
+    return Attitudes.at(asteroid, known, settings.seed, "nominal", *passage.key)
 
 
 def sampled_row(row: Row, orbits: OrbitSampling, draw: Draws, result: SampleVerdicts) -> Row:
@@ -86,6 +94,7 @@ def sampled_row(row: Row, orbits: OrbitSampling, draw: Draws, result: SampleVerd
     row = row | {
         "samples": judged,
         "samples_dynamic": int(result.dynamic.sum()),
+        "samples_grains": int(result.grains.sum()),
         **{share_of(v): counts[v] / judged if judged else np.nan for v in VERDICTS},
         "p_yield": yielded / stands if stands else np.nan,
         "p_yield_low": low,
@@ -127,7 +136,8 @@ def sample_rows(passage: Passage, attitudes: Attitudes, result: SampleVerdicts) 
             "phase": float(draw.phase[i]),
             "verdict": str(result.verdict[i]),
             "margin": float(np.rad2deg(result.margin[i])),
-            "decided_by": "dynamics" if result.dynamic[i] else "bound",
+            "decided_by": "grains" if result.grains[i] else "dynamics" if result.dynamic[i] else "bound",
+            "largest_fraction": float(result.largest[i]),
             "error": result.error[i],
         }
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 import astropy.units as u
@@ -58,6 +58,10 @@ class SampleVerdicts:
         Of the passage, m.
     numerical : float
         Numerical error of the first mobilised angle, deg, where it was measured.
+    grains : ndarray of bool
+        Carried on by grains.
+    largest : ndarray
+        Largest clump of grains over the mass; nan without grains.
     """
 
     verdict: list[str]
@@ -67,6 +71,13 @@ class SampleVerdicts:
     error: list[str]
     distance: Array
     numerical: float = np.nan
+    grains: NDArray[np.bool_] = field(default_factory=lambda: np.zeros(0, dtype=bool))
+    largest: Array = field(default_factory=lambda: np.zeros(0))
+
+    def __post_init__(self) -> None:
+        if len(self.grains) == 0:
+            self.grains = np.zeros(len(self.verdict), dtype=bool)
+            self.largest = np.full(len(self.verdict), np.nan)
 
     @classmethod
     def joined(cls, parts: Sequence[SampleVerdicts]) -> SampleVerdicts:
@@ -78,6 +89,8 @@ class SampleVerdicts:
             np.concatenate([p.dynamic for p in parts]),
             [e for p in parts for e in p.error],
             np.concatenate([p.distance for p in parts]),
+            grains=np.concatenate([p.grains for p in parts]),
+            largest=np.concatenate([p.largest for p in parts]),
         )
 
     @classmethod
@@ -89,6 +102,8 @@ class SampleVerdicts:
     def stored(self) -> dict[str, Any]:
         """As JSON-compatible data, without loss of digits."""
         arrays = {name: getattr(self, name).tolist() for name in ("margin", "rest", "dynamic", "distance")}
+        if self.grains.any():
+            arrays |= {"grains": self.grains.tolist(), "largest": self.largest.tolist()}
         return {"verdict": [str(v) for v in self.verdict], "error": self.error, **arrays}
 
     @classmethod
@@ -96,7 +111,11 @@ class SampleVerdicts:
         """Inverse of `stored`."""
         margin, rest, distance = (np.array(stored[n], dtype=float) for n in ("margin", "rest", "distance"))
         dynamic = np.array(stored["dynamic"], dtype=bool)
-        return cls(list(stored["verdict"]), margin, rest, dynamic, list(stored["error"]), distance)
+        return cls(
+            list(stored["verdict"]), margin, rest, dynamic, list(stored["error"]), distance,
+            grains=np.array(stored.get("grains", ()), dtype=bool),
+            largest=np.array(stored.get("largest", ()), dtype=float),
+        )  # fmt: skip
 
 
 def sample_verdicts(

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple, Protocol
 from flybystab.catalogues.catalogue import Asteroid
 from flybystab.errors import WorkersLost
 from flybystab.screening.encounters import Finder
+from flybystab.screening.grain_samples import GrainSample
 from flybystab.screening.sample_verdicts import SampleVerdicts
 from flybystab.screening.settings import Settings
 from flybystab.screening.tasks import OpenPassage, Part, Rows, begin, joined
@@ -24,7 +25,7 @@ def _begin(
     return [begin(a, settings, finder, block) for a in asteroids]
 
 
-def _judge(part: Part, settings: Settings) -> SampleVerdicts:
+def _judge(part: Part | GrainSample, settings: Settings) -> SampleVerdicts:
     return part.judged(settings)
 
 
@@ -109,7 +110,7 @@ def scheduled(
         Names the asteroids in progress.
     """
     positions = iter(todo)
-    waiting: deque[Iterator[tuple[_Piece, Part]]] = deque()
+    waiting: deque[Iterator[tuple[_Piece, Part | GrainSample]]] = deque()
     calls: dict[Future[Any], list[int] | _Piece] = {}
     begun: dict[int, float] = {}
 
@@ -151,6 +152,9 @@ def scheduled(
                     if parts is not None:
                         parts.add(asteroid.position, call.number, call.first, answer)
                     asteroid.open -= not call.passage.left
+                    if not call.passage.unjudged and call.passage.needed and not call.passage.sent:
+                        asteroid.samples += len(call.passage.needed)
+                        waiting.appendleft(_grain_pieces(asteroid, call.number, call.passage))
                     asteroid.done += len(answer.verdict)
                     begun[asteroid.position] = asteroid.done / asteroid.samples
                     if not asteroid.open:
@@ -175,10 +179,20 @@ def scheduled(
             future.cancel()
 
 
-def _pieces(asteroid: _Asteroid, left: Sequence[tuple[int, OpenPassage]]) -> Iterator[tuple[_Piece, Part]]:
+def _pieces(
+    asteroid: _Asteroid, left: Sequence[tuple[int, OpenPassage]]
+) -> Iterator[tuple[_Piece, Part | GrainSample]]:
     for number, passage in left:
         for first, part in list(passage.parts()):
             yield _Piece(asteroid, number, passage, first), part
+        yield from _grain_pieces(asteroid, number, passage)
+
+
+def _grain_pieces(
+    asteroid: _Asteroid, number: int, passage: OpenPassage
+) -> Iterator[tuple[_Piece, Part | GrainSample]]:
+    for k, sample in passage.grain_samples():
+        yield _Piece(asteroid, number, passage, k), sample
 
 
 def _lost(error: Exception) -> bool:

@@ -293,6 +293,7 @@ def screen(
     population: Population | None = None,
     *,
     tolerance: float = 1e-7,
+    grains: int | None = None,
     progress: Callable[[Progress], None] | None = None,
     finder: Finder = passages,
 ) -> QTable:
@@ -321,6 +322,8 @@ def screen(
         Distributions of unmeasured quantities.
     tolerance : float
         Step tolerance of the dynamics.
+    grains : int, optional
+        Grains of the piles that carry on the samples where the ellipsoid ends, one pile a sample.
     progress : callable, optional
         Called with a :class:`Progress` after every asteroid.
     finder : callable
@@ -336,7 +339,9 @@ def screen(
     For long runs use :meth:`Screening.run`, which writes to a file and can be resumed.
     """
     chosen = listed(asteroids)
-    wanted = settings(start, stop, planets, within, samples, seed, material, population, tolerance=tolerance)
+    wanted = settings(
+        start, stop, planets, within, samples, seed, material, population, tolerance=tolerance, grains=grains
+    )
     run = Screening(chosen, wanted, finder)
     began = clock.monotonic()
     found: dict[int, list[dict[str, Any]]] = {}

@@ -14,8 +14,10 @@ from astropy.units import Quantity
 
 from flybystab._version import __version__
 from flybystab.body.body import Material, refuse_cut_off
+from flybystab.body.pile import checked_number
 from flybystab.constants import AU
 from flybystab.errors import InvalidInput
+from flybystab.flybys.grains_flyby import warn_of_few
 from flybystab.orbit.ephemeris import ephemeris
 from flybystab.orbit.planets import planet
 from flybystab.screening.priors import Population
@@ -46,6 +48,8 @@ class Settings:
         Also return the samples.
     time_limit : float
         Longest time to find the encounters of one asteroid and begin with its samples, s.
+    grains : int
+        Grains of the piles that carry on the samples where the ellipsoid ends; 0 for none.
     """
 
     start: float
@@ -59,6 +63,7 @@ class Settings:
     tolerance: float = 1e-7
     keep_samples: bool = False
     time_limit: float = TIME_LIMIT
+    grains: int = 0
 
     def stated(self) -> dict[str, Any]:
         """All settings that determine the rows, as plain data."""
@@ -78,6 +83,7 @@ class Settings:
             "population": self.population.stated(),
             "tolerance": self.tolerance,
             "flybystab": __version__,
+            **({"grains": self.grains} if self.grains else {}),
         }
 
 
@@ -94,6 +100,7 @@ def settings(
     tolerance: float = 1e-7,
     keep_samples: bool = False,
     time_limit: float = TIME_LIMIT,
+    grains: int | None = None,
 ) -> Settings:
     """Checked settings of a screening (arguments of :func:`flybystab.screen`, attributes of :class:`Settings`)."""
     for name, value, most in (("tolerance", tolerance, 0.1), ("time_limit", time_limit, np.inf)):
@@ -115,6 +122,9 @@ def settings(
     for name, number, least in (("samples", samples, 1), ("seed", seed, 0)):
         if whole(number, name, least) >= 2**62:
             raise InvalidInput(name, number, "a whole number below 2^62")
+    count = 0 if grains is None else checked_number(grains)
+    if count:
+        warn_of_few(count)
     ephemeris().check(*(Time(d, format="jd", scale="tdb") for d in dates))
     if not isinstance(material, Material | None):
         raise InvalidInput("material", material, "a Material, or None")
@@ -139,4 +149,5 @@ def settings(
         tolerance=tolerance,
         keep_samples=keep_samples,
         time_limit=float(time_limit),
+        grains=count,
     )

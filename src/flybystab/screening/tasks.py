@@ -13,12 +13,22 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
+import numpy as np
+
 from flybystab.catalogues.catalogue import Asteroid
 from flybystab.errors import FlybystabError
 from flybystab.screening.clones import Clones, OrbitSampling, orbit_sampling
 from flybystab.screening.draws import Attitudes, draws
 from flybystab.screening.encounters import Finder, Passage
-from flybystab.screening.result_rows import Row, body_row, failed_row, sample_rows, sampled_row
+from flybystab.screening.grain_samples import CATALOGUE_BODY, GrainSample, needing_grains
+from flybystab.screening.result_rows import (
+    Row,
+    body_row,
+    catalogue_body,
+    failed_row,
+    sample_rows,
+    sampled_row,
+)
 from flybystab.screening.sample_verdicts import SampleVerdicts, sample_verdicts, verdicts_each
 from flybystab.screening.settings import Settings
 from flybystab.screening.time_limits import time_limit
@@ -98,7 +108,11 @@ class OpenPassage:
         Samples of a part.
     judged : dict of int to SampleVerdicts
         Finished parts, by their first sample.
-    left : int
+    needed : dict of int to str or None
+        Numbers and verdicts of the samples that grains have yet to carry on; None without grains.
+    carried : dict of int to SampleVerdicts
+        Those that grains have carried on.
+    unjudged : int
         Samples without a verdict.
     """
 
@@ -106,18 +120,48 @@ class OpenPassage:
     row: Row
     orbits: OrbitSampling
     attitudes: Attitudes
+    nominal: Attitudes | None = None
     size: int = 0
     judged: dict[int, SampleVerdicts] = field(default_factory=dict)
-    left: int = field(init=False)
+    needed: dict[int, str] = field(default_factory=dict)
+    carried: dict[int, SampleVerdicts] = field(default_factory=dict)
+    unjudged: int = field(init=False)
+    sent: bool = False
 
     def __post_init__(self) -> None:
-        self.left = len(self.attitudes.uniform)
+        self.unjudged = len(self.attitudes.uniform)
+        if self.nominal is not None:
+            self._need(CATALOGUE_BODY, [str(self.row["verdict"])])
+
+    @property
+    def left(self) -> int:
+        """Samples without a verdict, or that grains have yet to carry on."""
+        return self.unjudged + len(self.needed)
 
     def take(self, first: int, judged: SampleVerdicts) -> SampleVerdicts:
-        """Store the verdicts of a part."""
+        """Store the verdicts of a part, or of a sample by grains."""
+        if judged.grains.any():
+            self.carried[first] = judged
+            self.needed.pop(first, None)
+            return judged
         self.judged[first] = judged
-        self.left -= len(judged.verdict)
+        self.unjudged -= len(judged.verdict)
+        if self.nominal is not None:
+            self._need(first, judged.verdict)
         return judged
+
+    def _need(self, first: int, verdicts: Sequence[str]) -> None:
+        """Note the samples where the ellipsoid ends."""
+        self.needed |= {k: v for k, v in needing_grains(first, verdicts).items() if k not in self.carried}
+
+    def grain_samples(self) -> Iterator[tuple[int, GrainSample]]:
+        """The samples for grains with their numbers, once, when all samples have a verdict of the ellipsoid."""
+        if self.unjudged or self.sent or self.nominal is None:
+            return
+        self.sent = True
+        for k, verdict in sorted(self.needed.items()):
+            one = self.nominal if k == CATALOGUE_BODY else self.attitudes.part(k, k + 1)
+            yield k, GrainSample(self.passage, self.orbits.clones, k, one, verdict)
 
     def part(self, first: int, last: int) -> Part:
         """Samples `first` to ``last - 1``."""
@@ -127,21 +171,35 @@ class OpenPassage:
         """Parts without verdicts, with the numbers of their first samples."""
         ends = [*sorted(self.judged), len(self.attitudes.uniform)]
         for begin, end in zip([0, *(k + len(self.judged[k].verdict) for k in ends[:-1])], ends, strict=True):
-            for k in range(begin, end, self.size):
+            for k in range(begin, end, max(1, self.size)):
                 yield k, self.part(k, min(k + self.size, end))
 
     def take_stored(self, stored: Sequence[Mapping[str, Any]]) -> None:
         """Store verdicts of an earlier run, from :meth:`flybystab.screening.journal.Journal.parts`."""
         for part in stored:
             first, judged = int(part["first"]), SampleVerdicts.restored(part)
+            if judged.grains.any():
+                if self.nominal is not None:
+                    self.take(first, judged)
+                continue
             last = first + len(judged.verdict)
             if all(last <= k or first >= k + len(j.verdict) for k, j in self.judged.items()):
                 self.take(first, judged)
 
     def rows(self, settings: Settings) -> Rows:
         """The rows, once all samples have a verdict."""
+        row = self.row
+        if (main := self.carried.get(CATALOGUE_BODY)) is not None:
+            row = row | {"verdict": main.verdict[0], "error": row["error"] or main.error[0]}
+            row["decided_by"] = row["decided_by"] if main.error[0] else "grains"
+        if not self.judged:
+            return {"rows": [row], "samples": []}
         result = SampleVerdicts.joined([self.judged[first] for first in sorted(self.judged)])
-        row = sampled_row(self.row, self.orbits, self.attitudes.draws, result)
+        for k, one in self.carried.items():
+            if k != CATALOGUE_BODY:
+                result.verdict[k], result.largest[k] = one.verdict[0], one.largest[0]
+                result.grains[k], result.error[k] = not one.error[0], one.error[0]
+        row = sampled_row(row, self.orbits, self.attitudes.draws, result)
         kept = sample_rows(self.passage, self.attitudes, result) if settings.keep_samples else ()
         return {"rows": [row], "samples": list(kept)}
 
@@ -158,21 +216,27 @@ def opened(passage: Passage, settings: Settings, block: int) -> Rows | OpenPassa
     """
     row = body_row(passage, settings)
     n = settings.samples
-    if n <= 1 or "verdict" not in row:
+    if "verdict" not in row or (n <= 1 and not settings.grains):
         return {"rows": [row], "samples": []}
+    nominal = catalogue_body(passage, settings) if settings.grains else None
+    if n <= 1 and nominal is not None:
+        alone = OpenPassage(
+            passage, row, OrbitSampling(None, np.nan, ""), nominal.part(0, 0), nominal, size=1
+        )
+        return alone if alone.left else alone.rows(settings)
     draw = draws(passage.asteroid, n, settings.seed, settings.population)
     attitudes = Attitudes.at(passage.asteroid, draw, settings.seed, *passage.key)
-    work = OpenPassage(passage, row, orbit_sampling(passage, n, settings.seed), attitudes)
+    work = OpenPassage(passage, row, orbit_sampling(passage, n, settings.seed), attitudes, nominal)
     probe = min(n, block, _PROBE)
     first = work.take(0, work.part(0, probe).judged(settings))
-    if work.left:
+    if work.unjudged:
         # integrating the orbit of a clone costs more than the dynamics of the body
         least = _BOUND if work.orbits.clones is None else 1.0
         work.size = max(1, int(block / max(first.dynamic.mean(), least)))
-        if work.left > work.size:
+        if work.unjudged > work.size:
             return work
         work.take(probe, work.part(probe, n).judged(settings))
-    return work.rows(settings)
+    return work if work.left else work.rows(settings)
 
 
 def begin(asteroid: Asteroid, settings: Settings, finder: Finder, block: int) -> list[Rows | OpenPassage]:

@@ -1,0 +1,83 @@
+"""Samples of a screening that grains carry on where the ellipsoid ends.
+
+Each such sample is one pile with its own seed, the number of the sample, and one unit of work and of the journal. A
+sample is a draw of all inputs already: the scatter of piles is part of the distribution over the samples.
+"""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from flybystab.encounter.attitude import periapsis_axes
+from flybystab.errors import FlybystabError
+from flybystab.flybys.grains_flyby import HANDED_ON, grains_flyby
+from flybystab.screening.clones import Clones
+from flybystab.screening.draws import Attitudes
+from flybystab.screening.encounters import Passage
+from flybystab.screening.sample_verdicts import SampleVerdicts
+from flybystab.screening.settings import Settings
+
+#: Number of the catalogue body among the samples.
+CATALOGUE_BODY = -1
+
+
+@dataclass(frozen=True)
+class GrainSample:
+    """A sample that needs grains.
+
+    Attributes
+    ----------
+    passage : Passage
+    clones : Clones or None
+        Set where each sample has its own orbit.
+    number : int
+        Of the sample; :data:`CATALOGUE_BODY` for that body.
+    attitudes : Attitudes
+        Of this sample, with its body.
+    verdict : str
+        Of the ellipsoid; it stays where grains cannot answer.
+    """
+
+    passage: Passage
+    clones: Clones | None
+    number: int
+    attitudes: Attitudes
+    verdict: str
+
+    def judged(self, settings: Settings) -> SampleVerdicts:
+        """Verdict of one pile of grains; with the reason where there is none."""
+        passage = self.passage
+        error, verdict, largest = "", self.verdict, np.nan
+        try:
+            if self.clones is not None and self.number != CATALOGUE_BODY:
+                (passage,) = self.clones.passages(self.number, self.number + 1)
+            encounter = passage.meet()
+            turn = periapsis_axes(encounter) @ self.attitudes.matrix(0)
+            with warnings.catch_warnings():  # few grains have warned when the settings were made
+                warnings.simplefilter("ignore", UserWarning)
+                outcome = grains_flyby(
+                    self.attitudes.draws.body(0, settings.material),
+                    encounter,
+                    encounter.periapsis_axes.T @ turn,
+                    grains=settings.grains,
+                    seeds=[self.number - CATALOGUE_BODY],
+                    threads=1,
+                    keep=False,
+                )
+            verdict, largest = str(outcome.verdict), outcome.largest_fraction
+        except FlybystabError as problem:
+            error = f"no grains: {type(problem).__name__}: {problem}"
+        nan = np.full(1, np.nan)
+        return SampleVerdicts(
+            [verdict], nan, nan.copy(), np.ones(1, dtype=bool), [error], nan.copy(),
+            grains=np.ones(1, dtype=bool), largest=np.full(1, largest),
+        )  # fmt: skip
+
+
+def needing_grains(first: int, verdicts: Sequence[str]) -> dict[int, str]:
+    """Numbers and verdicts of the samples from `first` on where the ellipsoid ends."""
+    return {first + k: str(v) for k, v in enumerate(verdicts) if v in HANDED_ON}
