@@ -30,12 +30,13 @@ from flybystab.core.ellipsoid.rigid_stress import demand, invariants, load_inter
 from flybystab.core.ellipsoid.tide import components, tensor
 from flybystab.core.material.yield_surface import lode_angle
 from flybystab.errors import InvalidInput
+from flybystab.tabular import Record
 from flybystab.typing import Array
 from flybystab.units import brief, to_si
 
 
 @dataclass(frozen=True)
-class Equilibrium:
+class Equilibrium(Record):
     """The state of stress of a rigidly turning body and what it demands of the material.
 
     Attributes

@@ -47,6 +47,7 @@ from flybystab.core.energy.perturbation import loss_at, loss_rate, pile, powers,
 from flybystab.core.energy.potential import MASS
 from flybystab.core.energy.stability_row import classify
 from flybystab.errors import InvalidInput
+from flybystab.tabular import Record
 from flybystab.typing import Array
 from flybystab.units import to_si
 
@@ -88,7 +89,7 @@ def body_units(body: Body) -> BodyUnits:
 
 
 @dataclass(frozen=True)
-class Stability:
+class Stability(Record):
     """Result of the energy criterion.
 
     Attributes

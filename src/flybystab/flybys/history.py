@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import astropy.units as u
 import numpy as np
@@ -56,6 +57,8 @@ class History(Tabular):
     pressure: Quantity
     shape: Quantity
     velocity_gradient: Quantity
+
+    _dimensions: ClassVar[tuple[str, ...]] = ("time",)
 
     def __len__(self) -> int:
         return len(self.time)

@@ -9,7 +9,7 @@ this is wrong, and on which side.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import astropy.units as u
 import numpy as np
@@ -25,6 +25,7 @@ from flybystab.core.energy.potential import MASS
 from flybystab.core.energy.stability_row import first_to_flow
 from flybystab.encounter.encounter import Encounter
 from flybystab.flybys.rigid_course import Course, rigid_course
+from flybystab.tabular import Record
 from flybystab.typing import Array
 from flybystab.units import brief, to_si
 
@@ -33,7 +34,7 @@ HOLDS, RECOVERS, RUNS_AWAY = "holds", "recovers", "runs away"
 
 
 @dataclass(frozen=True, eq=False)
-class FlybyMargin:
+class FlybyMargin(Record):
     """Energy given by an encounter, and the energy barrier of the body.
 
     Attributes
@@ -83,6 +84,8 @@ class FlybyMargin:
     stands_after: bool
     required_friction_angle: Quantity
     course: Course
+
+    _left_out: ClassVar[tuple[str, ...]] = ("course",)
 
     def __repr__(self) -> str:
         return (

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, ClassVar
 
 import astropy.units as u
 import numpy as np
@@ -18,12 +18,13 @@ from flybystab.flybys.flyby_many import flyby_many
 from flybystab.flybys.verdict import SEVERITY, Verdict
 from flybystab.orbit.planets import Planet, planet
 from flybystab.orbit.target_plane import capture_radius
+from flybystab.tabular import Tabular
 from flybystab.typing import Array
-from flybystab.units import to_si
+from flybystab.units import counted, to_si
 
 
 @dataclass(frozen=True, eq=False)
-class OutcomeMap:
+class OutcomeMap(Tabular):
     """Verdicts over (periapsis, v_inf) for one body at several phases of its spin.
 
     Attributes
@@ -44,6 +45,27 @@ class OutcomeMap:
     v_inf: Quantity
     verdict: NDArray[np.str_]
     axis_growth: Array
+
+    _dimensions: ClassVar[tuple[str, ...]] = ("periapsis", "v_inf", "phase")
+
+    def __len__(self) -> int:
+        return self.verdict.size
+
+    def _grid(self) -> tuple[int, ...]:
+        return self.verdict.shape
+
+    def _columns(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        columns, meta = super()._columns()
+        n, m, k = self._grid()
+        phase = np.tile(180.0 * np.arange(k) / k, n * m) * u.deg
+        return {**dict(list(columns.items())[:2]), "phase": phase, **columns}, meta
+
+    def __repr__(self) -> str:
+        n, m, k = self._grid()
+        where = self.planet.name.capitalize()
+        return (
+            f"<OutcomeMap {where}, {n} periapses x {m} v_inf x {k} phases: {counted(self.verdict.ravel())}>"
+        )
 
     @property
     def worst(self) -> NDArray[np.str_]:
@@ -112,7 +134,7 @@ def outcome_map(
 
 
 @dataclass(frozen=True, eq=False)
-class TargetMap:
+class TargetMap(Tabular):
     """Verdicts over the target plane of one direction of arrival.
 
     Attributes
@@ -131,6 +153,19 @@ class TargetMap:
     b_r: Quantity
     verdict: NDArray[np.str_]
     max_required_friction_angle: Quantity
+
+    _dimensions: ClassVar[tuple[str, ...]] = ("impact_parameter", "direction")
+
+    def __len__(self) -> int:
+        return self.verdict.size
+
+    def _grid(self) -> tuple[int, ...]:
+        return self.verdict.shape
+
+    def __repr__(self) -> str:
+        n, m = self._grid()
+        where = self.planet.name.capitalize()
+        return f"<TargetMap {where}, {n} impact parameters x {m} directions: {counted(self.verdict.ravel())}>"
 
     @property
     def capture_radius(self) -> Quantity:

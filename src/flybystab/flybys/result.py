@@ -25,18 +25,42 @@ from flybystab.flybys.robustness import Robustness, surface_verdicts
 from flybystab.flybys.surface_change import slopes_on_the_way
 from flybystab.flybys.verdict import Verdict, letter_of, settled
 from flybystab.flybys.verdict_margins import VerdictMargins, verdict_margins
+from flybystab.saving import encoded
+from flybystab.tabular import Record
 from flybystab.typing import Array
 from flybystab.units import brief
 
 if TYPE_CHECKING:
     from flybystab.flybys.grains_flyby import GrainsOutcome
 
+#: Columns of a result as a table of one row; those that are None are left out.
+_COLUMNS = (
+    "verdict",
+    "verdict_class",
+    "rung",
+    "margin",
+    "max_required_friction_angle",
+    "bound_fraction",
+    "semi_axes",
+    "spin",
+    "spin_ratio",
+    "pole_change",
+    "spin_vector",
+    "attitude",
+    "required_cohesion",
+    "lode_angle",
+    "onset_time",
+    "arrest_time",
+    "end_time",
+    "contact",
+    "robust",
+)
 #: Kept, because composing the unit takes ten times as long.
 RAD_S = u.rad / u.s
 
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
-class FlybyResult:
+class FlybyResult(Record):
     """Outcome of an encounter. Quantities, history, body and margins are computed when they are first asked for.
 
     Attributes
@@ -280,6 +304,18 @@ class FlybyResult:
         if self.verdict != Verdict.IMPACT:
             return None
         return "path" if self.encounter.impact else "body"
+
+    def _columns(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        values = {name: getattr(self, name) for name in _COLUMNS}
+        row = {
+            name: value[None] if isinstance(value, Quantity) else np.asarray(value)[None]
+            for name, value in ((k, str(v) if isinstance(v, str) else v) for k, v in values.items())
+            if value is not None
+        }
+        encounter = self.encounter
+        about = {"planet": encounter.planet, "time": encounter.time, "body": self.inputs.body}
+        about |= {"distance": encounter.distance, "v_inf": encounter.v_inf}
+        return row, {**self._about(), **{k: encoded(v) for k, v in about.items()}}
 
     def to_dict(self) -> dict[str, Any]:
         """JSON document of the result (schema ``flyby/1``): units in the keys, numbers or None."""

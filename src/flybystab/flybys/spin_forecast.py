@@ -17,12 +17,13 @@ from flybystab.errors import InvalidInput
 from flybystab.flybys.rigid_course import rigid_course
 from flybystab.flybys.shape_spin import RotationState, free_rotation
 from flybystab.flybys.spin_sample import SpinStates, spin_states
+from flybystab.tabular import Tabular
 from flybystab.typing import Array
 from flybystab.units import to_si
 
 
 @dataclass(frozen=True, eq=False)
-class SpinForecast:
+class SpinForecast(Tabular):
     """Rotation after an encounter at ``n`` rotation phases.
 
     Attributes

@@ -48,6 +48,8 @@ class SpinSample(Tabular):
     max_required_friction_angle : Quantity (n,)
         Largest friction angle mobilised.
     verdict : ndarray of str (n,)
+    attitude : ndarray (n, 3, 3)
+        Rotations at the start, body axes -> periapsis frame (:func:`flybystab.periapsis_axes`).
     pole_known : bool
         Whether the pole was the catalogue's; else poles are isotropic.
     seed : int
@@ -57,6 +59,7 @@ class SpinSample(Tabular):
     pole_change: Quantity
     max_required_friction_angle: Quantity
     verdict: NDArray[np.str_]
+    attitude: Array
     pole_known: bool
     seed: int
 
@@ -118,6 +121,7 @@ def spin_sample(
         pole_change=table.pole_change,
         max_required_friction_angle=table.max_required_friction_angle,
         verdict=table.verdict,
+        attitude=np.array(attitudes),
         pole_known=known,
         seed=seed,
     )

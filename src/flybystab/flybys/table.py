@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 from astropy.units import Quantity
@@ -31,6 +32,18 @@ class FlybyTable(Tabular):
     pole_change: Quantity
     contact: NDArray[np.str_]
     failure: NDArray[np.str_]
+
+    _shown: ClassVar[tuple[str, ...]] = (
+        "verdict",
+        "margin",
+        "max_required_friction_angle",
+        "bound_fraction",
+        "semi_axes",
+        "spin",
+        "spin_ratio",
+        "pole_change",
+        "failure",
+    )
 
     def __len__(self) -> int:
         return len(self.verdict)

@@ -9,7 +9,7 @@ from typing import Any
 from flybystab.errors import UnknownName
 
 #: Kinds of document.
-NAMES = ("flyby", "table", "stability")
+NAMES = ("flyby", "table", "stability", "result")
 
 
 def schema(name: str) -> dict[str, Any]:

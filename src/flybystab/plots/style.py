@@ -10,6 +10,19 @@ from typing import Any
 STYLE = resources.files("flybystab.plots").joinpath("style.mplstyle")
 
 
+def new_axes(rows: int = 1) -> Any:
+    """Axes of a new pyplot figure, which notebooks show: one, or a column with a common horizontal axis.
+
+    Without a window system or notebook pyplot draws into memory.
+    """
+    import matplotlib.pyplot as plt
+
+    size = (5.5, 4.0) if rows == 1 else (7.2, 2.1 * rows)
+    with resources.as_file(STYLE) as file, plt.rc_context(fname=file):
+        _, axes = plt.subplots(rows, 1, sharex=True, figsize=size, layout="constrained")
+    return axes
+
+
 def save(figure: Any, path: str | Path) -> Path:
     """Write a figure with the settings of the style file; returns the path.
 

@@ -15,6 +15,7 @@ from astropy.table.meta import get_header_from_yaml
 
 from flybystab.errors import FlybystabError, InvalidInput, MissingExtra
 from flybystab.files import read_bytes
+from flybystab.saving import pyarrow
 
 FORMATS = (".ecsv", ".parquet")
 #: Largest ECSV file that is read, bytes: the reader needs several times as much memory.
@@ -27,21 +28,6 @@ class Column(NamedTuple):
     kind: type
     unit: u.UnitBase | None
     text: str
-
-
-def pyarrow() -> Any:
-    """The package pyarrow with its Parquet part.
-
-    Raises
-    ------
-    MissingExtra
-    """
-    try:
-        import pyarrow
-        import pyarrow.parquet
-    except ImportError:
-        raise MissingExtra("pyarrow", "parquet", "a Parquet file") from None
-    return pyarrow
 
 
 def empty_table(columns: Mapping[str, Column], meta: Mapping[str, Any]) -> QTable:

@@ -1,0 +1,123 @@
+"""The figure of each kind of result, for ``result.plot()``."""
+
+from __future__ import annotations
+
+from functools import singledispatch
+from typing import Any
+
+import astropy.units as u
+import numpy as np
+
+from flybystab.errors import InvalidInput
+from flybystab.flybys.critical import CriticalValues
+from flybystab.flybys.history import History
+from flybystab.flybys.outcome_map import OutcomeMap, TargetMap
+from flybystab.flybys.result import FlybyResult
+from flybystab.flybys.spin_sample import SpinSample
+from flybystab.flybys.survival import Survival
+from flybystab.flybys.table import FlybyTable
+from flybystab.plots.flyby import BLUE, axes_plot, flyby_panels, friction_plot, spin_plot
+from flybystab.plots.outcome_map import outcome_plot, target_plot
+from flybystab.plots.style import new_axes
+
+
+def plot_result(result: Any, axes: Any = None, **options: Any) -> Any:
+    """Plot a result into axes, new ones by default.
+
+    Parameters
+    ----------
+    result
+        A result of an encounter, of many, or of a map.
+    axes : matplotlib Axes, or four of them for a :class:`FlybyResult`
+    options
+        Of the figure: `what` for a history ("semi-axes", "spin" or "friction angle" with `limit`).
+
+    Returns
+    -------
+    Axes, or an array of them
+
+    Raises
+    ------
+    InvalidInput
+        There is no figure of this kind of result.
+    """
+    if axes is None:
+        axes = new_axes(4 if isinstance(result, FlybyResult) else 1)
+    return _plot(result, axes, **options)
+
+
+@singledispatch
+def _plot(result: Any, axes: Any) -> Any:
+    known = ", ".join(kind.__name__ for kind in _plot.registry if kind is not object)
+    raise InvalidInput("result", result, f"a result that has a figure: {known}")
+
+
+@_plot.register
+def _(result: FlybyResult, axes: Any) -> Any:
+    flyby_panels(axes, result)
+    planet = result.encounter.planet.name.capitalize()
+    axes[0].set_title(f"{result.verdict} past {planet}")
+    return axes
+
+
+@_plot.register
+def _(result: History, axes: Any, what: str = "semi-axes", limit: u.Quantity | None = None) -> Any:
+    if what == "friction angle":
+        if limit is None:
+            raise InvalidInput("limit", limit, "the friction angle of the material")
+        friction_plot(axes, result, limit)
+    elif what in _HISTORY:
+        _HISTORY[what](axes, result)
+    else:
+        raise InvalidInput("what", what, f"one of {', '.join(_HISTORY)}, friction angle")
+    axes.set_xlabel("time from closest approach (h)")
+    return axes
+
+
+#: Quantities of a history that can be plotted without further arguments.
+_HISTORY = {"semi-axes": axes_plot, "spin": spin_plot}
+
+
+@_plot.register
+def _(result: OutcomeMap, axes: Any) -> Any:
+    return outcome_plot(axes, result)
+
+
+@_plot.register
+def _(result: TargetMap, axes: Any) -> Any:
+    return target_plot(axes, result)
+
+
+@_plot.register
+def _(result: SpinSample, axes: Any) -> Any:
+    axes.scatter(result.pole_change.to_value(u.deg), result.spin_ratio, s=14, color=BLUE)
+    axes.set(xlabel="rotation of the spin axis (deg)", ylabel="spin rate after / before")
+    return axes
+
+
+@_plot.register
+def _(result: CriticalValues, axes: Any) -> Any:
+    unit = "radii of the planet" if result.quantity == "periapsis" else str(result.value.unit)
+    axes.plot(result.phase.to_value(u.deg), result.value.value, "o-", color=BLUE)
+    axes.set_xlabel("spin phase at closest approach (deg)")
+    axes.set_ylabel(f"least {result.quantity.replace('_', ' ')} ({unit})\nfor {result.outcome}")
+    return axes
+
+
+@_plot.register
+def _(result: FlybyTable, axes: Any) -> Any:
+    return _counts(axes, result.verdict)
+
+
+@_plot.register
+def _(result: Survival, axes: Any) -> Any:
+    return _counts(axes, result.verdict)
+
+
+def _counts(axes: Any, verdict: Any) -> Any:
+    """Bars with the number of rows of each verdict."""
+    names, counts = np.unique(np.asarray(verdict, dtype=str), return_counts=True)
+    bars = axes.barh(names, counts, color=BLUE)
+    axes.bar_label(bars, padding=2)
+    axes.set_xlabel("number of rows")
+    return axes

@@ -1,0 +1,387 @@
+"""Columns with units and metadata as files: ECSV, Parquet, JSON, netCDF to save and read, CSV to save.
+
+The content is a dictionary of arrays (:class:`~astropy.units.Quantity` or numpy, same first dimension) and metadata
+of plain types (:func:`encoded`). Every format but CSV restores both exactly, infinite and undefined numbers included.
+"""
+
+from __future__ import annotations
+
+import io
+import json
+import math
+import os
+import tempfile
+from collections.abc import Callable, Mapping
+from dataclasses import fields, is_dataclass
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from astropy.time import Time
+from astropy.units import Quantity, Unit, UnitBase
+
+from flybystab.errors import FlybystabError, InvalidInput, MissingExtra
+from flybystab.files import parse_json, read_bytes, read_text
+
+#: Columns by name.
+Columns = dict[str, Any]
+#: Dataclasses that metadata may hold, with their modules.
+KNOWN = {
+    "Body": "flybystab.body.body",
+    "Material": "flybystab.body.body",
+    "Planet": "flybystab.orbit.planets",
+}
+#: Text that starts with one of these is quoted: spreadsheets read it as a formula, ECSV readers as a comment (#).
+QUOTED_START = ("=", "+", "-", "@", "#", " ", "\t")
+#: Largest file that is read, bytes.
+SAVED_LIMIT = 4 * 2**30
+
+
+def with_unit(name: str, unit: UnitBase) -> str:
+    """Name of a column followed by its unit, such as ``v_inf_km_s`` or ``density_kg_m3``."""
+    text = unit.to_string().replace(" / ", "_").replace(" ", "").replace("%", "percent")
+    return f"{name}_{text}" if text else name
+
+
+def pyarrow() -> Any:
+    """The package pyarrow with its Parquet part.
+
+    Raises
+    ------
+    MissingExtra
+    """
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError:
+        raise MissingExtra("pyarrow", "parquet", "a Parquet file") from None
+    return pyarrow
+
+
+def xarray() -> Any:
+    """The package xarray.
+
+    Raises
+    ------
+    MissingExtra
+    """
+    try:
+        import h5netcdf  # noqa: F401
+        import xarray
+    except ImportError:
+        raise MissingExtra("xarray", "xarray", "an xarray data set or a netCDF file") from None
+    return xarray
+
+
+def encoded(value: Any) -> Any:
+    """Metadata in plain types: numbers, text, lists and dictionaries; what is none of these carries its type."""
+    if value is None or isinstance(value, bool | int) or type(value) is str:
+        return value
+    if isinstance(value, str):
+        return str(value)
+    if isinstance(value, np.generic) and not isinstance(value, Quantity):
+        return encoded(value.item())
+    if isinstance(value, float):
+        return value if math.isfinite(value) else {"number": str(value)}
+    if isinstance(value, Quantity):
+        return {"value": encoded(value.value.tolist()), "unit": value.unit.to_string()}
+    if isinstance(value, np.ndarray):
+        return {"array": encoded(value.tolist())}
+    if isinstance(value, Time):
+        return {"jd1": float(value.jd1), "jd2": float(value.jd2), "scale": value.scale}
+    if isinstance(value, tuple):
+        return {"tuple": [encoded(x) for x in value]}
+    if isinstance(value, list):
+        return [encoded(x) for x in value]
+    if isinstance(value, Mapping):
+        return {"mapping": [[encoded(k), encoded(v)] for k, v in value.items()]}
+    name = type(value).__name__
+    if is_dataclass(value) and name in KNOWN:
+        return {"class": name, **{f.name: encoded(getattr(value, f.name)) for f in fields(value) if f.init}}
+    raise TypeError(f"metadata cannot hold a {name}")
+
+
+def decoded(value: Any) -> Any:
+    """The value that :func:`encoded` made."""
+    if isinstance(value, list):
+        return [decoded(x) for x in value]
+    if not isinstance(value, dict):
+        return value
+    if "number" in value:
+        return float(value["number"])
+    if "unit" in value:
+        number = decoded(value["value"])
+        return (np.array(number) if isinstance(number, list) else number) * Unit(value["unit"])
+    if "array" in value:
+        return np.array(decoded(value["array"]))
+    if "scale" in value:
+        return Time(value["jd1"], value["jd2"], format="jd", scale=value["scale"])
+    if "tuple" in value:
+        return tuple(decoded(x) for x in value["tuple"])
+    if "mapping" in value:
+        return {decoded(k): decoded(v) for k, v in value["mapping"]}
+    made = getattr(import_module(KNOWN[value["class"]]), value["class"])
+    return made(**{k: decoded(v) for k, v in value.items() if k != "class"})
+
+
+def flat(columns: Mapping[str, Any]) -> Columns:
+    """Columns of scalars without units, by a name with the unit; a component is a column, such as ``semi_axes_1_m``."""
+    out: Columns = {}
+    for name, column in columns.items():
+        for index in np.ndindex(column.shape[1:]):
+            part = column[(slice(None), *index)]
+            label = name + ("_" + "".join(str(i + 1) for i in index) if index else "")
+            if isinstance(part, Quantity):
+                out[with_unit(label, part.unit)] = part.value
+            else:
+                out[label] = part
+    return out
+
+
+def listed(columns: Mapping[str, Any]) -> dict[str, list[Any]]:
+    """Lists by column, with the unit in the name; infinite and undefined numbers are None."""
+    out = {}
+    for name, column in columns.items():
+        bare = column.value if isinstance(column, Quantity) else column
+        label = with_unit(name, column.unit) if isinstance(column, Quantity) else name
+        if bare.dtype.kind == "f":
+            bare = np.where(np.isfinite(bare), bare.astype(object), None)
+        out[label] = bare.tolist()
+    return out
+
+
+def csv_cell(value: Any) -> str:
+    """A cell of a CSV or ECSV file; text that a spreadsheet would take for a formula is quoted."""
+    if not isinstance(value, str):
+        return str(value)
+    if value.startswith(QUOTED_START) or any(c in value for c in ',"\r\n'):
+        return '"' + value.replace('"', '""') + '"'
+    return value
+
+
+def save_columns(
+    path: str | Path, columns: Mapping[str, Any], meta: Mapping[str, Any], overwrite: bool
+) -> Path:
+    """Write columns and metadata in the format of the suffix; returns the path.
+
+    Raises
+    ------
+    InvalidInput
+        Another suffix, a file that exists (without `overwrite`), or one that cannot be written.
+    MissingExtra
+        A Parquet file without pyarrow.
+    """
+    return written(path, _WRITERS, overwrite, columns, meta)
+
+
+def written(
+    path: str | Path, writers: Mapping[str, Callable[..., bytes]], overwrite: bool, *content: Any
+) -> Path:
+    """Write the bytes of the writer of the suffix through a temporary file."""
+    out = Path(path)
+    if out.suffix not in writers:
+        raise InvalidInput("path", str(path), f"a file name that ends in {', '.join(writers)}")
+    if out.exists() and not overwrite:
+        raise InvalidInput("path", str(path), "a file that does not exist, or overwrite=True")
+    data = writers[out.suffix](*content)
+    try:
+        number, part = tempfile.mkstemp(dir=out.parent, prefix=f".{out.name}.", suffix=".part")
+        try:
+            with os.fdopen(number, "wb") as stream:
+                stream.write(data)
+            os.chmod(part, 0o644)
+            os.replace(part, out)
+        except BaseException:
+            os.unlink(part)
+            raise
+    except OSError as error:
+        raise InvalidInput("path", str(path), f"a file that can be written ({error.strerror})") from None
+    return out
+
+
+def read_columns(path: str | Path) -> tuple[Columns, dict[str, Any]]:
+    """Columns and metadata of a file that :func:`save_columns` wrote.
+
+    Raises
+    ------
+    InvalidInput
+        Another suffix, or not such a file.
+    """
+    file = Path(path)
+    if file.suffix not in _READERS:
+        raise InvalidInput("path", str(path), f"a file name that ends in {', '.join(_READERS)}")
+    try:
+        return _READERS[file.suffix](file)
+    except FlybystabError:
+        raise
+    except Exception as error:
+        reason = str(error).splitlines()[0] if str(error) else type(error).__name__
+        raise InvalidInput("path", str(path), f"a file written by save() ({reason})") from None
+
+
+def _ecsv(columns: Mapping[str, Any], meta: Mapping[str, Any]) -> bytes:
+    from astropy.table import Table
+
+    text = io.StringIO()
+    about = {**meta, "rows": _length(columns), "layout": _described(columns)}
+    # not a QTable, whose ECSV writer fails at a quantity in a column named "value"
+    Table(dict(columns), meta=about).write(text, format="ascii.ecsv")
+    return text.getvalue().encode()
+
+
+def _read_ecsv(path: Path) -> tuple[Columns, dict[str, Any]]:
+    from astropy.table import MaskedColumn, QTable
+
+    table = QTable.read(read_bytes(path, "path", SAVED_LIMIT).decode(), format="ascii.ecsv")
+    if table.meta.pop("rows") != len(table):
+        raise ValueError("rows are missing: the file was cut off")
+    out: Columns = {}
+    for name in table.colnames:
+        column = table[name]
+        if isinstance(column, MaskedColumn):  # an empty text counts as missing in ECSV
+            column = column.filled("")
+        out[name] = np.asarray(column.value if isinstance(column, Quantity) else column)
+    for name, _, unit in table.meta.pop("layout"):  # a column without dimension has no unit in ECSV
+        out[name] = out[name] if unit is None else out[name] * Unit(unit)
+    return out, dict(table.meta)
+
+
+def _parquet(columns: Mapping[str, Any], meta: Mapping[str, Any]) -> bytes:
+    pa = pyarrow()
+    about = json.dumps({"columns": _described(columns), "meta": dict(meta)}, allow_nan=False)
+    units = [
+        column.unit.to_string("vounit") if isinstance(column, Quantity) else ""
+        for column in columns.values()
+        for _ in np.ndindex(column.shape[1:])
+    ]
+    parts = {k: np.ascontiguousarray(v) for k, v in flat(columns).items()}
+    arrays = [pa.array(v.tolist() if v.dtype.kind in "UO" else v) for v in parts.values()]
+    arrays = [a if a.type != pa.null() else a.cast(pa.string()) for a in arrays]
+    schema = pa.schema(
+        [
+            pa.field(name, a.type, metadata={"unit": unit})
+            for name, a, unit in zip(parts, arrays, units, strict=True)
+        ],
+        metadata={"flybystab": about},
+    )
+    stream = io.BytesIO()
+    pa.parquet.write_table(pa.table(arrays, schema=schema), stream, compression="zstd")
+    return stream.getvalue()
+
+
+def _read_parquet(path: Path) -> tuple[Columns, dict[str, Any]]:
+    data = pyarrow().parquet.read_table(path)
+    about = json.loads(data.schema.metadata[b"flybystab"])
+    names = iter(data.column_names)
+    out: Columns = {}
+    for name, shape, unit in about["columns"]:
+        parts = []
+        for _ in np.ndindex(*shape):
+            part = data[next(names)].to_numpy()
+            parts.append(part.astype(str) if part.dtype == object else part)
+        values = np.stack(parts, axis=-1).reshape(-1, *shape)
+        out[name] = values if unit is None else values * Unit(unit)
+    return out, dict(about["meta"])
+
+
+def _json(columns: Mapping[str, Any], meta: Mapping[str, Any]) -> bytes:
+    infinite: dict[str, dict[str, list[int]]] = {}
+    for name, column in columns.items():
+        bare = np.asarray(column)
+        if bare.dtype.kind == "f" and np.isinf(bare).any():
+            ends = (("inf", np.inf), ("-inf", -np.inf))
+            infinite[name] = {text: np.flatnonzero(bare == end).tolist() for text, end in ends}
+    document = {
+        "schema": "result/1",
+        "meta": dict(meta),
+        "layout": _described(columns),
+        "infinite": infinite,
+        "columns": listed(columns),
+    }
+    return (json.dumps(document, allow_nan=False, indent=1) + "\n").encode()
+
+
+def _read_json(path: Path) -> tuple[Columns, dict[str, Any]]:
+    document = parse_json(read_text(path, "path"), "path", path)
+    if document["schema"] != "result/1":
+        raise ValueError(f"schema {document['schema']}")
+    out: Columns = {}
+    for (name, shape, unit), values in zip(document["layout"], document["columns"].values(), strict=True):
+        array = np.array(values)
+        if array.dtype == object:  # with None
+            array = array.astype(float)
+        array = array.reshape(-1, *shape)
+        for text, places in document["infinite"].get(name, {}).items():
+            array.reshape(-1)[places] = float(text)
+        out[name] = array if unit is None else array * Unit(unit)
+    return out, dict(document["meta"])
+
+
+def _csv(columns: Mapping[str, Any], meta: Mapping[str, Any]) -> bytes:
+    parts = flat(columns)
+    lines = [",".join(map(csv_cell, parts))]
+    lines += [",".join(map(csv_cell, row)) for row in zip(*(v.tolist() for v in parts.values()), strict=True)]
+    return ("\n".join(lines) + "\n").encode()
+
+
+def _netcdf(columns: Mapping[str, Any], meta: Mapping[str, Any]) -> bytes:
+    data = dataset(
+        {k: (["row", *(f"{k}_{i}" for i in range(1, v.ndim))], v) for k, v in columns.items()}, meta
+    )
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "x.nc")
+        data.to_netcdf(file, engine="h5netcdf")
+        return file.read_bytes()
+
+
+def _read_netcdf(path: Path) -> tuple[Columns, dict[str, Any]]:
+    with xarray().open_dataset(path, engine="h5netcdf", decode_times=False, decode_timedelta=False) as data:
+        out: Columns = {}
+        about = json.loads(data.attrs["flybystab"])
+        for name, _, unit in about["columns"]:
+            values = data[name].values
+            values = values.astype(str) if values.dtype == object else values
+            out[name] = values if unit is None else values * Unit(unit)
+    return out, dict(about["meta"])
+
+
+def dataset(variables: Mapping[str, tuple[list[str], Any]], meta: Mapping[str, Any]) -> Any:
+    """An xarray data set of named arrays with their dimensions; units and metadata are attributes."""
+    xr = xarray()
+    data = xr.Dataset()
+    for name, (dimensions, values) in variables.items():
+        bare = np.asarray(values.value if isinstance(values, Quantity) else values)
+        data[name] = (dimensions, bare.astype(object) if bare.dtype.kind == "U" else bare)
+        if isinstance(values, Quantity):
+            data[name].attrs["units"] = values.unit.to_string()
+    about = {"columns": _described({k: v for k, (_, v) in variables.items()}), "meta": dict(meta)}
+    data.attrs["flybystab"] = json.dumps(about, allow_nan=False)
+    return data
+
+
+def _length(columns: Mapping[str, Any]) -> int:
+    return len(next(iter(columns.values())))
+
+
+def _described(columns: Mapping[str, Any]) -> list[list[Any]]:
+    """Name, shape of a row and unit of each column."""
+    return [
+        [name, list(c.shape[1:]), c.unit.to_string() if isinstance(c, Quantity) else None]
+        for name, c in columns.items()
+    ]
+
+
+_WRITERS: dict[str, Callable[[Mapping[str, Any], Mapping[str, Any]], bytes]] = {
+    ".ecsv": _ecsv,
+    ".parquet": _parquet,
+    ".json": _json,
+    ".nc": _netcdf,
+    ".csv": _csv,
+}
+_READERS: dict[str, Callable[[Path], tuple[Columns, dict[str, Any]]]] = {
+    ".ecsv": _read_ecsv,
+    ".parquet": _read_parquet,
+    ".json": _read_json,
+    ".nc": _read_netcdf,
+}
