@@ -13,6 +13,7 @@ import astropy.units as u
 import numpy as np
 from astropy.table import QTable
 
+from flybystab.body.body import Material
 from flybystab.catalogues.asteroid import CATALOGUE_DATE, Asteroid
 from flybystab.catalogues.designations import name_columns
 from flybystab.catalogues.objects import asteroids_of
@@ -46,11 +47,12 @@ def find(asteroids: Sequence[Asteroid], name: str | int, where: str) -> Asteroid
 def _read(text: str, file: str, name: str) -> tuple[Asteroid, ...]:
     """Asteroids of a text, by the reader of its format."""
     found = reader_of(text)
+    material = Material()  # one for all: checking it costs more than reading a row
     if found is None:
-        return tuple(Asteroid(row, file=file) for row, _ in read_native(text, file))
+        return tuple(Asteroid(row, material, file) for row, _ in read_native(text, file))
     source = {"frame": FRAME, "orbit_source": f"{found.name} ({name})"}
     return tuple(
-        Asteroid(source | row, file=file, covariance=covariance) for row, covariance in found.read(text, name)
+        Asteroid(source | row, material, file, covariance) for row, covariance in found.read(text, name)
     )
 
 

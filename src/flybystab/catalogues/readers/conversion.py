@@ -233,6 +233,7 @@ def _symmetric(matrix: Array) -> Array:
     return np.asarray(0.5 * (matrix + matrix.T))
 
 
+@lru_cache(maxsize=4096)
 def _time(jd: float) -> Time:
     from astropy.time import Time
 
@@ -248,6 +249,11 @@ _UNITS: Mapping[str, str] = (
     | dict.fromkeys(("A1", "A2", "A3"), "au/d2")
     | {"tp": "d"}
 )
+
+#: SI units of these.
+_SI: Mapping[str, float] = {
+    "au": AU, "au/d": AU / DAY, "deg": DEGREE, "": 1.0, "au/d2": AU / DAY**2, "d": DAY,
+}  # fmt: skip
 
 
 def covariance_of(
@@ -269,23 +275,19 @@ def covariance_of(
     InvalidInput
         The matrix is not a covariance.
     """
-    import astropy.units as u
-
     from flybystab.orbit.covariance import Covariance
 
     matrix = np.asarray(matrix, dtype=float)
-    scale = np.sqrt(np.outer(np.diag(matrix), np.diag(matrix)))
+    scale = np.sqrt(np.abs(np.outer(np.diag(matrix), np.diag(matrix))))
     if matrix.shape != (len(names),) * 2 or np.any(np.abs(matrix - matrix.T) > 1e-6 * scale):
         raise InvalidInput("covariance", matrix.shape, f"a symmetric matrix of {', '.join(names)} in {file}")
     matrix = _symmetric(matrix)  # printed digits of the two halves may differ
     if "x" in names:
         return cartesian_covariance(jd, names, values, matrix, source, correlated=correlated)
-    unit = {
-        "au": u.au, "au/d": u.au / u.d, "deg": u.deg, "": u.dimensionless_unscaled,
-        "au/d2": u.au / u.d**2, "d": u.d,
-    }  # fmt: skip
-    units = [unit[_UNITS[n]] for n in names]
-    return Covariance.in_units(_time(jd), names, values, matrix, units, source, correlated)
+    unit = np.array([_SI[_UNITS[n]] for n in names])
+    return Covariance(
+        _time(jd), tuple(names), np.array(values) * unit, matrix * np.outer(unit, unit), source, correlated
+    )
 
 
 def printed_covariance(
@@ -307,11 +309,29 @@ def printed_covariance(
     """
     values = [float(t) - (offset if n == "tp" else 0.0) for n, t in zip(names, texts, strict=True)]
     sigma = printed_sigmas(names, texts)
-    found = cartesian_covariance(
-        jd, names, values, np.diag(sigma**2), f"digits of {source}",
-        gm=gm, correlated=False, caveat="by the digits of its elements",
-    )  # fmt: skip
-    return found if float(np.linalg.norm(found.sigma[:3])) > _NEGLIGIBLE else None
+    if _displacement(names, values, sigma) < _NEGLIGIBLE:
+        return None
+    what, caveat = f"digits of {source}", "by the digits of its elements"
+    if gm is not None or "x" in names:
+        matrix = np.diag(sigma**2)
+        return cartesian_covariance(jd, names, values, matrix, what, gm=gm, correlated=False, caveat=caveat)
+    from flybystab.orbit.covariance import Covariance
+
+    scale = np.array([_SI[_UNITS[n]] for n in names])
+    return Covariance(
+        _time(jd), tuple(names), np.array(values) * scale, np.diag((sigma * scale) ** 2), what, False, caveat
+    )
+
+
+def _displacement(names: Sequence[str], values: Sequence[float], sigma: Array) -> float:
+    """Size of the displacement, m, that errors of elements make anywhere on the orbit."""
+    at = dict(zip(names, sigma, strict=True))
+    if "x" in at:
+        return float(np.linalg.norm([at[c] for c in "xyz"])) * AU
+    size = abs(dict(zip(names, values, strict=True)).get("a", 1.0)) * AU
+    lengths = [at[c] * AU for c in ("a", "q") if c in at] + [at[c] * size for c in "ehkPQ" if c in at]
+    angles = [at[c] * DEGREE * size for c in ("i", "node", "peri", "M", "L") if c in at]
+    return float(np.linalg.norm([*lengths, *angles, at.get("tp", 0.0) * DAY * 3e4]))
 
 
 def printed_sigmas(names: Sequence[str], texts: Sequence[str]) -> Array:

@@ -146,9 +146,6 @@ def _entry(row: Mapping[str, str], file: str) -> Entry:
     out = name_columns(cell("id")[1]) | {"orbit_source": source}
     if row.get("H"):
         out["H_mag"] = row["H"]
-    state = state_of(names, values, gm)
-    if axes == "equator":
-        state = _equator(state)
     if centre == "sun" and names is _KEP:
         out |= epoch_row(jd) | dict(
             zip(("a_au", "e", "i_deg", "node_deg", "peri_deg", "M_deg"), texts, strict=True)
@@ -156,6 +153,9 @@ def _entry(row: Mapping[str, str], file: str) -> Entry:
     elif centre == "sun" and names is _COM:
         out |= perihelion_row(jd, values[:5], -values[5])
     else:
+        state = state_of(names, values, gm)
+        if axes == "equator":
+            state = _equator(state)
         out |= state_row(jd, heliocentric_state(jd, state, centre))
     matrix = _matrix(row, kind, names is _CAR, axes, file)
     if matrix is not None:
