@@ -8,6 +8,7 @@ import flybystab as fs
 from flybystab.constants import GM_EARTH, G
 from flybystab.errors import InvalidInput
 from flybystab.flybys.refresh_distance import refresh_distance
+from flybystab.orbit.planets import planet
 
 BALL = fs.Shape.from_ellipsoid([500.0, 500.0, 500.0] * u.m, facets=300)
 
@@ -37,6 +38,23 @@ def test_it_goes_as_the_cube_root_of_the_density():
     """On a parabola all that matters is the mean density of the planet over that of the body."""
     light, heavy = (found(rho, area=0.1, rise=1 * u.deg).distance.value for rho in (800.0, 2700.0))
     assert light / heavy == pytest.approx(np.cbrt(2700.0 / 800.0), rel=0.02)
+
+
+def test_other_planets():
+    """Distances in radii go as the cube root of the mean density; Venus' atmosphere ends above 1.02 radii."""
+    radii = {
+        name: refresh_distance(
+            ball(1000.0), BALL, name, v_inf=0 * u.km / u.s, attitudes=1, rise=1 * u.deg
+        ).radii
+        for name in ("earth", "venus", "mars")
+    }
+    density = {}
+    for name in radii:
+        home = planet(name)
+        density[name] = home.gm / home.radius**3
+    for name in ("venus", "mars"):
+        expected = np.cbrt(density[name] / density["earth"])
+        assert radii[name] / radii["earth"] == pytest.approx(expected, rel=0.02)
 
 
 def test_no_distance_is_enough_for_a_rise_that_no_encounter_makes():

@@ -11,7 +11,6 @@ from astropy.units import Quantity
 from flybystab.body.body import Body, check_settled
 from flybystab.body.shape import Shape
 from flybystab.encounter.encounter import Encounter
-from flybystab.errors import InvalidInput
 from flybystab.flybys.spin_sample import spin_states
 from flybystab.flybys.surface_change import check_shape
 from flybystab.flybys.surface_history import surface_history
@@ -19,8 +18,8 @@ from flybystab.orbit.planets import Planet, planet
 from flybystab.typing import Array
 from flybystab.units import brief, to_si, whole
 
-#: Periapsis distances searched, in radii of the planet.
-RADII = (1.02, 60.0)
+#: Periapsis distances searched: the least over that of an impact, the largest in radii of the planet.
+LEAST, MOST = 1.001, 60.0
 #: Bisections of the logarithm of that interval: the distance is found to 0.1 %.
 BISECTIONS = 12
 #: Instants of each encounter.
@@ -112,8 +111,6 @@ def refresh_distance(
 
     def shares(radii: float) -> Array:
         encounter = Encounter.hyperbolic(home, radii * home.radius * u.m, v_inf)
-        if encounter.impact:
-            raise InvalidInput("planet", home.name, f"no atmosphere above {RADII[0]:g} radii")
         return np.array(
             [
                 surface_history(body, encounter, a, shape=shape, instants=INSTANTS).share_refreshed(
@@ -127,7 +124,7 @@ def refresh_distance(
 
     def root(statistic: str) -> float:
         """Largest distance, in radii, at which a statistic of the shares reaches the share asked for."""
-        low, high = RADII
+        low, high = LEAST * home.impact_distance / home.radius, MOST
         for step in range(BISECTIONS + 1):
             radii = low if step == 0 else float(np.sqrt(low * high))
             if radii not in found:
