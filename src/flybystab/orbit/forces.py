@@ -51,13 +51,15 @@ _PN, _J2, _NON = N_ALL, N_ALL + 1, N_ALL + 1 + N_BODIES
 #   [0] length  [1] Earth/Moon ratio  [2..5] switches: 1PN, any J2, non-gravitational, unused
 #   [6..8] A1 A2 A3 (m/s2)  [9..13] law: ALN, r0 (m), m, n, k  [14] address, [15] rows and [16] count of a log
 #   then, with the rows of BODIES before those of BELT where both are in: head (N_ALL x 5), gm (N_ALL), radius of the
-#   core (N_BODIES), J2: c, pole (N_BODIES x 4), GM in use (N_ALL; zero: left out), coefficients
+#   core (N_BODIES), J2: c, pole, rate of the pole (1/s) (N_BODIES x 7), GM in use (N_ALL; zero: left out), coefficients
 LOG_ADDRESS, LOG_ROWS, LOG_COUNT = 14, 15, 16
 _HEAD = 20
+#: Numbers per body of J2: strength, pole, rate of the pole.
+FLAT_WIDTH = 7
 _GM = _HEAD + 5 * N_ALL
 _INNER = _GM + N_ALL
 _FLAT = _INNER + N_BODIES
-_USED = _FLAT + 4 * N_BODIES
+_USED = _FLAT + FLAT_WIDTH * N_BODIES
 _DATA = _USED + N_ALL
 INNER = 0.9
 
@@ -115,7 +117,9 @@ def model(window: Window, forces: Iterable[str], nongrav: NonGravitational | Non
         if f"{name} J2" in chosen:
             out[3] = 1.0
             strength = 1.5 * body.j2 * window.gm[i] * body.radius**2
-            out[_FLAT + 4 * i : _FLAT + 4 * i + 4] = strength, *body.pole_at(window.epoch)
+            row = _FLAT + FLAT_WIDTH * i
+            pole, pole_rate = body.pole_motion(window.epoch)
+            out[row : row + FLAT_WIDTH] = strength, *pole, *pole_rate
     out[2] = float("1PN" in chosen)
     for i, name in enumerate(BELT, N_BODIES):
         if f"{name} point mass" in chosen:
@@ -157,15 +161,20 @@ def bodies(model: Array, t: float, out: Array, rates: Array) -> None:
 
 
 @kernel
-def oblateness(strength: float, pole: Array, r: Array, out: Array) -> None:
-    """Add the J2 acceleration (m/s2) at ``r`` (m) to ``out[3]``; ``strength = 3/2 J2 GM a^2``."""
+def oblateness(strength: float, pole: Array, t: float, r: Array, out: Array) -> None:
+    """Add the J2 acceleration (m/s2) at ``r`` (m) to ``out[3]``; ``strength = 3/2 J2 GM a^2``.
+
+    ``pole[:3]`` is the pole at ``t = 0`` and ``pole[3:6]`` its rate, 1/s.
+    """
     r2 = r[0] * r[0] + r[1] * r[1] + r[2] * r[2]
-    s = r[0] * pole[0] + r[1] * pole[1] + r[2] * pole[2]
+    px, py, pz = pole[0] + t * pole[3], pole[1] + t * pole[4], pole[2] + t * pole[5]
+    s = r[0] * px + r[1] * py + r[2] * pz
     c = strength / (r2 * r2 * np.sqrt(r2))
     a = c * (5.0 * s * s / r2 - 1.0)
     b = -2.0 * c * s
-    for j in range(3):
-        out[j] += a * r[j] + b * pole[j]
+    out[0] += a * r[0] + b * px
+    out[1] += a * r[1] + b * py
+    out[2] += a * r[2] + b * pz
 
 
 @kernel
@@ -215,8 +224,10 @@ def fade(s: float) -> float:
 
 
 @kernel
-def acceleration_among(model: Array, places: Array, rates: Array, x: Array, v: Array, out: Array) -> None:
-    """Write into ``out[3]`` the acceleration (m/s2) at ``x`` (m), ``v`` (m/s); bodies at ``places`` (m)."""
+def acceleration_among(
+    model: Array, t: float, places: Array, rates: Array, x: Array, v: Array, out: Array
+) -> None:
+    """Write into ``out[3]`` the acceleration (m/s2) at ``t`` (s), ``x`` (m), ``v`` (m/s); bodies at ``places`` (m)."""
     ax = ay = az = potential = 0.0
     g = np.zeros(3)
     for i in range(N_ALL):
@@ -243,13 +254,14 @@ def acceleration_among(model: Array, places: Array, rates: Array, x: Array, v: A
     if model[3] != 0.0:
         d = np.empty(3)
         for i in range(N_BODIES):
-            p = _FLAT + 4 * i
+            p = _FLAT + FLAT_WIDTH * i
             if model[p] != 0.0:
                 r2 = 0.0
                 for j in range(3):
                     d[j] = x[j] - places[i, j]
                     r2 += d[j] * d[j]
-                oblateness(model[p] * fade(r2 / model[_INNER + i] ** 2), model[p + 1 : p + 4], d, out)
+                strength = model[p] * fade(r2 / model[_INNER + i] ** 2)
+                oblateness(strength, model[p + 1 : p + FLAT_WIDTH], t, d, out)
     if model[2] != 0.0:
         gms, used, inners = model[_GM : _GM + N_BODIES], model[_USED : _USED + N_BODIES], model[_INNER:_FLAT]
         one_pn(gms, used, inners, places, rates, g, potential, x, v, out)
@@ -268,7 +280,7 @@ def acceleration(model: Array, t: float, x: Array, v: Array, out: Array) -> None
     places = np.empty((N_ALL, 3))
     rates = np.zeros((N_BODIES, 3))
     bodies(model, t, places, rates)
-    acceleration_among(model, places, rates, x, v, out)
+    acceleration_among(model, t, places, rates, x, v, out)
 
 
 def shares(window: Window, t: Array, states: Array, nongrav: NonGravitational | None) -> dict[str, float]:
@@ -313,7 +325,8 @@ def _sizes(model: Array, t: Array, states: Array, out: Array) -> None:
             if i >= N_BODIES:
                 continue
             a[:] = 0.0
-            oblateness(model[_FLAT + 4 * i], model[_FLAT + 4 * i + 1 : _FLAT + 4 * i + 4], d, a)
+            p = _FLAT + FLAT_WIDTH * i
+            oblateness(model[p], model[p + 1 : p + FLAT_WIDTH], t[n], d, a)
             out[n, _J2 + i] = np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2)
         r = states[n, :3] - places[SUN]
         w = states[n, 3:] - rates[SUN]

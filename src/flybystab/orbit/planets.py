@@ -28,7 +28,7 @@ import numpy as np
 from astropy.time import Time
 from astropy.units import Quantity
 
-from flybystab.constants import AU, GM_EARTH, R_EARTH
+from flybystab.constants import AU, GM_EARTH, R_EARTH, YEAR
 from flybystab.errors import InvalidInput, UnknownName
 
 
@@ -98,6 +98,12 @@ class Planet:
             np.radians(-22.4072747 * t * t / 3600.0),
         )
         return float(x), float(y), float(np.sqrt(1.0 - x * x - y * y))
+
+    def pole_motion(self, time: Time) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
+        """The pole at `time` (:meth:`pole_at`) and its rate, 1/s, by a difference over a year."""
+        before, after = (self.pole_at(time + sign * 0.5 * u.yr) for sign in (-1.0, 1.0))
+        x, y, z = ((b - a) / YEAR for a, b in zip(before, after, strict=True))
+        return self.pole_at(time), (x, y, z)
 
     def __repr__(self) -> str:
         return f"<Planet {self.name}, radius {self.radius / 1e3:.0f} km>"

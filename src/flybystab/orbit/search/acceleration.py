@@ -50,9 +50,9 @@ class Field(NamedTuple):
         GM (m3/s2) in use per slot; zero: left out.
     inner_fast, inner_slow : ndarray
         Square of the radius of the smooth core per slot, m2; ``nothing`` is zeros, for the asteroids.
-    flat : ndarray, shape (n, 7)
-        Bodies with J2: grid (0 fast, 1 slow), slot, strength ``3/2 J2 GM a^2`` (m5/s2), pole, square of the
-        radius of the core (m2).
+    flat : ndarray, shape (n, 10)
+        Bodies with J2: grid (0 fast, 1 slow), slot, strength ``3/2 J2 GM a^2`` (m5/s2), pole at t = 0, rate of the
+        pole (1/s), square of the radius of the core (m2).
     gm_pn : float
         GM of the Sun if there is relativity, else zero.
     heavy : ndarray, shape (2, N_HEAVY)
@@ -94,9 +94,9 @@ def field(window: Window, forces: Iterable[str]) -> Field:
     belt = used[len(BODIES) :]
     rows = []
     for b in range(len(BODIES)):
-        at = table._FLAT + 4 * b
+        at = table._FLAT + table.FLAT_WIDTH * b
         if flat_model[at] != 0.0:
-            rows.append([float(GRID[b]), float(SLOT[b]), *flat_model[at : at + 4], inner[b]])
+            rows.append([float(GRID[b]), float(SLOT[b]), *flat_model[at : at + table.FLAT_WIDTH], inner[b]])
     return Field(
         almanac(window, bool(belt.any())),
         grids[0],
@@ -105,7 +105,7 @@ def field(window: Window, forces: Iterable[str]) -> Field:
         inners[0],
         inners[1],
         np.zeros(N_BELT),
-        np.array(rows).reshape(-1, 7),
+        np.array(rows).reshape(-1, 10),
         float(window.gm[SUN]) if flat_model[2] != 0.0 else 0.0,
         np.array([used[: len(BODIES)], inner])[:, [BODIES.index(name) for name in HEAVY]],
         window.head,
@@ -220,13 +220,14 @@ def rate(field: Field, law: Array, t: float, y: Array, places: Places, out: Arra
         dy = py - p[slots + s]
         dz = pz - p[slots + slots + s]
         r2 = dx * dx + dy * dy + dz * dz
-        z = dx * row[3] + dy * row[4] + dz * row[5]
-        c = row[2] / (r2 * r2 * np.sqrt(r2)) * (1.0 if r2 > row[6] else fade(r2 / row[6]))
+        polar_x, polar_y, polar_z = row[3] + t * row[6], row[4] + t * row[7], row[5] + t * row[8]
+        z = dx * polar_x + dy * polar_y + dz * polar_z
+        c = row[2] / (r2 * r2 * np.sqrt(r2)) * (1.0 if r2 > row[9] else fade(r2 / row[9]))
         a = c * (5.0 * z * z / r2 - 1.0)
         b = -2.0 * c * z
-        ax += a * dx + b * row[3]
-        ay += a * dy + b * row[4]
-        az += a * dz + b * row[5]
+        ax += a * dx + b * polar_x
+        ay += a * dy + b * polar_y
+        az += a * dz + b * polar_z
     if field.gm_pn != 0.0:
         find_heavy(field.book, t, places)
         q = places.heavy
