@@ -25,10 +25,10 @@ from flybystab.encounter.encounter import Encounter
 from flybystab.orbit.ephemeris import Window, ephemeris
 from flybystab.orbit.forces import FORCES
 from flybystab.orbit.orbit import Orbit, later, seconds
-from flybystab.orbit.predictability import neighbour
+from flybystab.orbit.predictability import deviations_of
 from flybystab.orbit.search.acceleration import field
 from flybystab.orbit.search.dop853 import empty_room
-from flybystab.orbit.search.neighbours import carry
+from flybystab.orbit.search.neighbours import carry, spread
 from flybystab.screening.draws import identity
 
 DATA = Path(os.environ.get("FLYBYSTAB_SHARED", Path(__file__).resolve().parents[1] / "../shared")) / "data"
@@ -76,6 +76,14 @@ def places(orbits: Sequence[Orbit], time: Time, window: Window) -> NDArray[np.fl
             out[i],
         )
     return out[:, 0, :3]
+
+
+def displacement(orbit: Orbit, time: Time, window: Window) -> float:
+    """One sigma of an orbit in the direction least known at a time, m."""
+    forces = field(window, [n for n in FORCES if n.endswith("point mass") or n == "1PN"])
+    law = np.array([*orbit.nongrav.a, *orbit.nongrav.constants])
+    times = np.array([seconds(time, window.epoch)])
+    return float(spread(deviations_of(orbit), forces, law, window, times, 1e-13).displacement[0])
 
 
 def runoff() -> list[str]:
@@ -134,8 +142,7 @@ def digits() -> list[str]:
         time = later(MEETING, years * YEAR + 1.0)
         ours = places([mpc[k].orbit for k in keys], time, window)
         gap = np.linalg.norm(places([new[k].orbit for k in keys], time, window) - ours, axis=1)
-        beside = [neighbour(mpc[k].orbit, time, "de440").orbit for k in keys]
-        sigma = np.linalg.norm(places(beside, time, window) - ours, axis=1)
+        sigma = np.array([displacement(mpc[k].orbit, time, window) for k in keys])
         for label, some in (("0", [0]), ("1-2", [1, 2]), ("3-5", [3, 4, 5]), ("6-9", [6, 7, 8, 9])):
             here = np.isin(code, some) & np.isfinite(gap) & np.isfinite(sigma)
             r = gap[here] / sigma[here]

@@ -1,4 +1,4 @@
-"""Neighbours of an orbit: the direction least known, its growth by two integrators, and what it says."""
+"""Sigma points of an orbit, the growth of errors by two integrators, and the classes of predictability."""
 
 from dataclasses import replace
 
@@ -14,7 +14,13 @@ from flybystab.orbit.elements import GM_SUN
 from flybystab.orbit.forces import FORCES
 from flybystab.orbit.kepler import two_body
 from flybystab.orbit.orbit import heliocentric, seconds
-from flybystab.orbit.predictability import Predictability, neighbour, predictability
+from flybystab.orbit.predictability import (
+    MODEL_ERROR,
+    Predictability,
+    deviations_of,
+    predictability,
+    undisturbed_error,
+)
 
 DAY = Time("2029-04-13", scale="tdb")
 
@@ -34,18 +40,29 @@ def test_judgement():
     assert predictability(100.0, 1.0, 10.0) is Predictability.UNCERTAIN
     assert predictability(100.0, 100.0) is Predictability.ONE_OF_MANY
     assert predictability(100.0, 0.0, np.inf) is Predictability.ONE_OF_MANY
+    assert predictability(100.0, 1.0, known=False) is Predictability.UNKNOWN
+    assert predictability(100.0, 20.0, known=False) is Predictability.UNCERTAIN
 
 
-@pytest.mark.parametrize("day", ["2024-01-01", "2029-04-10"])
-def test_neighbour_goes_where_the_orbit_is_least_known(known, day):
-    """Its displacement is the longest axis of the covariance of the position, mapped with all forces."""
-    time = Time(day, scale="tdb")
+def test_the_displacement_is_the_longest_axis_of_the_mapped_covariance(known):
+    """By the other integrator, from the public sigma points."""
+    span = Time("2029-04-01", scale="tdb"), Time("2029-05-01", scale="tdb")
+    row = fs.find_encounters(known, *span, within=0.01 * u.au, growth=True)[0]
+    time = row["time"]
     ways = [0.5 * (a.at(time)[0] - b.at(time)[0]).to_value(u.m) for a, b in known.sigma_points()]
     longest = np.linalg.svd(np.array(ways))[1][0]
-    beside = neighbour(known, time)
-    gap = np.linalg.norm((beside.orbit.at(time)[0] - known.at(time)[0]).to_value(u.m))
-    assert gap == pytest.approx(longest, rel=0.1)
-    assert "one sigma" in beside.label
+    assert row["displacement"].to_value(u.m) == pytest.approx(longest, rel=0.01)
+    assert "one sigma" in deviations_of(known).label
+
+
+def test_the_error_of_the_model_without_passages(known):
+    """It begins with that of an epoch near by and grows with time; only passages add more."""
+    orbit = fs.Asteroid.from_catalogue("Eros").orbit
+    span = Time("2026-01-01", scale="tdb"), Time("2046-01-01", scale="tdb")
+    table = fs.find_encounters(orbit, *span, within=0.5 * u.au, growth=True)
+    years = np.abs((table["time"] - deviations_of(orbit).orbit.epoch).to_value(u.s))
+    assert table["model_error"].to_value(u.m) == pytest.approx(undisturbed_error(years))
+    assert undisturbed_error(np.zeros(1))[0] == MODEL_ERROR
 
 
 def test_growth_of_a_quiet_orbit_is_that_of_two_bodies():
@@ -53,23 +70,23 @@ def test_growth_of_a_quiet_orbit_is_that_of_two_bodies():
     orbit = replace(fs.Asteroid.from_catalogue("Eros").orbit, covariance=None)
     start, stop = Time("2040-01-01", scale="tdb"), Time("2046-01-01", scale="tdb")
     row = fs.find_encounters(orbit, start, stop, within=1 * u.au, growth=True)[0]
-    beside = neighbour(orbit, row["time"])
     t = seconds(row["time"], orbit.epoch)
-    here, there = (two_body(GM_SUN, heliocentric(o), t) for o in (orbit, beside.orbit))
-    assert beside.shift == pytest.approx(1.0, rel=1e-4)
-    assert row["growth"] == pytest.approx(np.linalg.norm(here - there), rel=0.05)
+    state = heliocentric(orbit)
+    out = np.concatenate([state[:3] / np.linalg.norm(state[:3]), np.zeros(3)])
+    gap = two_body(GM_SUN, state + out, t) - two_body(GM_SUN, state, t)
+    assert row["growth"] == pytest.approx(np.linalg.norm(gap[:3]), rel=0.05)
     assert row["displacement"].to_value(u.m) == pytest.approx(row["growth"])
-    assert row["predictability"] == "determined"
+    # No error of this orbit is known: a shift of a metre does not make it determined.
+    assert row["predictability"] == "unknown"
 
 
 def test_two_integrators_agree_on_the_growth(exact, known):
-    # The neighbours by a covariance are chosen for slightly different times: they are not quite the same.
-    for orbit, margin in ((exact, 0.002), (known, 0.1)):
+    for orbit, grade in ((exact, "unknown"), (known, "determined")):
         span = Time("2029-04-01", scale="tdb"), Time("2029-05-01", scale="tdb")
         row = fs.find_encounters(orbit, *span, within=0.01 * u.au, growth=True)[0]
         encounter = fs.Encounter.from_orbit(orbit, "earth", DAY)
-        assert encounter.predictability == row["predictability"] == "determined"
-        assert encounter.growth == pytest.approx(row["growth"], rel=margin)
+        assert encounter.predictability == row["predictability"] == grade
+        assert encounter.growth == pytest.approx(row["growth"], rel=0.002)
     assert encounter.displacement.to_value(u.km) == pytest.approx(1.1, abs=0.2)  # JPL: 3.3 km at 3 sigma
     assert encounter.neighbour == "one sigma in the direction least known"
 
@@ -147,11 +164,11 @@ def test_a_distant_passage_centuries_away_converges():
 
 
 def test_impacts_are_judged_too(exact):
-    """A body on its way to the Earth: the neighbour hits as well."""
+    """A body on its way to the Earth: displaced orbits hit as well, but no error of the orbit is known."""
     epoch = Time("2027-03-01", scale="tdb")
     orbit = fs.Orbit.from_state(epoch, [-1.3e6, 4e3, 3e3] * u.km, [15, 0, 0] * u.km / u.s, centre="earth")
     table = fs.find_encounters(orbit, epoch, Time("2027-03-03", scale="tdb"), growth=True)
     assert table["impact"][0]
-    assert table["predictability"][0] == "determined"
+    assert table["predictability"][0] == "unknown"
     encounter = fs.Encounter.from_orbit(orbit, "earth", table["time"][0])
-    assert encounter.predictability is Predictability.DETERMINED
+    assert encounter.predictability is Predictability.UNKNOWN

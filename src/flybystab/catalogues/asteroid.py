@@ -36,26 +36,97 @@ def _day(jd: float) -> Time:
     return Time(whole, jd - whole, format="jd", scale="tdb")
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, init=False)
 class Asteroid(Record):
-    """One asteroid: a row of a catalogue, with its body and its orbit built on request.
+    """One asteroid: a row of a catalogue, or an orbit and a body of the user.
 
-    Attributes
+    Parameters
     ----------
-    row : mapping of str to str
-        The row as it stands in the file.
-    material : Material
-        What the body is made of: a choice, not catalogue data. 35 degrees of friction by default.
+    row : mapping of str to str, optional
+        A row of a catalogue.
+    material : Material, optional
+        Of the body: a choice, not catalogue data. By default that of `body`, else 35 degrees of friction.
     file : str
         Where the row comes from.
-    covariance : Covariance or None
-        How well the orbit is known, where a file says so; else see :attr:`orbit`.
+    covariance : Covariance, optional
+        Of the orbit, where a file gives one; else see :attr:`orbit`.
+    orbit : Orbit, optional
+        Instead of the elements of the row; with its own covariance.
+    body : Body, optional
+        Semi-axes, density, period and material instead of those of the row. It spins about its short axis.
+    pole : Quantity (2,), optional
+        Ecliptic longitude and latitude (J2000) of the spin pole.
+    sigmas : mapping, optional
+        1-sigma errors of the body: ``axes`` (one length or three), ``density``, ``period``. A screening samples them.
+    sources : mapping, optional
+        Sources by name: ``axes``, ``diameter``, ``density``, ``period``, ``pole``, ``orbit``.
+    name : str, optional
+        That of the orbit by default.
+
+    Raises
+    ------
+    InvalidInput, UnitMismatch, UnknownName
+        For anything that is not such a value.
+
+    Examples
+    --------
+    >>> import astropy.units as u
+    >>> import flybystab as fs
+    >>> orbit = fs.Asteroid.from_catalogue("Apophis").orbit
+    >>> body = fs.Body(semi_axes=[200, 170, 150] * u.m, density=2000 * u.kg / u.m**3, spin_period=5 * u.h)
+    >>> mine = fs.Asteroid(orbit=orbit, body=body, sigmas={"density": 300 * u.kg / u.m**3}, name="mine")
+    >>> mine.body.density
+    <Quantity 2000. kg / m3>
     """
 
     row: Mapping[str, str]
     material: Material = field(default_factory=Material)
     file: str = f"embedded catalogue {CATALOGUE_DATE}"
     covariance: Covariance | None = field(default=None, repr=False)
+    own_orbit: Orbit | None = field(default=None, repr=False)
+
+    def __init__(
+        self,
+        row: Mapping[str, str] | None = None,
+        material: Material | None = None,
+        file: str | None = None,
+        covariance: Covariance | None = None,
+        own_orbit: Orbit | None = None,
+        *,
+        orbit: Orbit | None = None,
+        body: Body | None = None,
+        pole: Quantity | None = None,
+        sigmas: Mapping[str, Any] | None = None,
+        sources: Mapping[str, str] | None = None,
+        name: str = "",
+    ) -> None:
+        given = dict(row or {})
+        if orbit is not None or body is not None:
+            from flybystab.catalogues import given as columns
+
+            if orbit is not None:
+                own_orbit = columns.checked_orbit(orbit)
+                given |= columns.orbit_columns(own_orbit, name)
+            elif name:
+                given["name"] = name
+            if body is not None:
+                given |= columns.body_columns(body)
+                material = material or body.material
+        if pole is not None or sigmas or sources:
+            from flybystab.catalogues import given as columns
+
+            given |= columns.pole_columns(pole) if pole is not None else {}
+            given |= columns.error_columns(sigmas or {}) | columns.source_columns(sources or {})
+        if file is None:
+            file = f"embedded catalogue {CATALOGUE_DATE}" if row is not None else "given values"
+        for key, value in (
+            ("row", given if row is None or given != row else row),
+            ("material", material or Material()),
+            ("file", file),
+            ("covariance", covariance),
+            ("own_orbit", own_orbit),
+        ):
+            object.__setattr__(self, key, value)
 
     @classmethod
     def from_catalogue(cls, name: str | int, material: Material | None = None) -> Asteroid:
@@ -151,7 +222,7 @@ class Asteroid(Record):
 
     def __reduce__(self) -> tuple[Any, ...]:
         # Without what was built from the row: it is rebuilt where it is needed.
-        return Asteroid, (dict(self.row), self.material, self.file, self.covariance)
+        return Asteroid, (dict(self.row), self.material, self.file, self.covariance, self.own_orbit)
 
     def __repr__(self) -> str:
         return f"<Asteroid {self.label}>"
@@ -185,6 +256,8 @@ class Asteroid(Record):
         from flybystab.orbit.forces import NonGravitational, au_per_day2
         from flybystab.orbit.orbit import Orbit
 
+        if self.own_orbit is not None:
+            return self.own_orbit
         epoch = self.epoch
         a1, a2, a3 = (
             au_per_day2(self._number(c)) if self.row.get(c) else 0.0
@@ -264,6 +337,16 @@ class Asteroid(Record):
             its short axis with its main lightcurve period: `assumptions` says so.
         """
         material = material or self.material
+        missing = [c for c in (*SHAPE, "density_kg_m3") if not self.row.get(c)]
+        if not self.tumbles and not self.row.get("spin_period_h"):
+            missing.append("spin_period_h")
+        if missing:
+            raise InvalidInput(
+                ", ".join(missing),
+                "(empty)",
+                f"values for {self.label} in {self.file}: give them (--axes, --density, --period; "
+                "Asteroid(body=...)), or let --assume or screen() draw them from a population",
+            )
         density = self.quantity("density_kg_m3")
         if not self.tumbles:
             period = self.quantity("spin_period_h")
@@ -324,9 +407,11 @@ class Asteroid(Record):
     def assumptions(self) -> tuple[str, ...]:
         """Description of the assumed values of the body."""
         out = []
-        if any(c in self.assumed for c in SHAPE):
+        if self.row.get("drawn"):
+            out.append("median of the population: " + self.row["drawn"].replace(";", ", "))
+        elif any(c in self.assumed for c in SHAPE):
             out.append("shape from size and lightcurve amplitude")
-        if "density_kg_m3" in self.assumed:
+        if "density_kg_m3" in self.assumed and not self.row.get("drawn"):
             out.append("density")
         if self.pole is None:
             out.append("pole unknown")

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
 
+from flybystab.cli.body_options import check_body_options
 from flybystab.cli.common import material_of, tdb
 from flybystab.errors import InvalidInput, UnknownName, WrongUsage
 
@@ -43,6 +44,7 @@ def check_arguments(options: argparse.Namespace) -> None:
             raise InvalidInput("--error", given["error"], "an error above 0, in km")
         if "friction" in given:
             material_of(options)
+            check_body_options(options)
         elif "surface" in given:
             _yield_surface(given["surface"])
         _dates(given)

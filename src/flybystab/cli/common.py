@@ -10,6 +10,7 @@ import unicodedata
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from flybystab.cli.body_options import cohesion, friction, with_body_options
 from flybystab.core.material.surfaces import DEFAULT, NAMES
 from flybystab.errors import InvalidInput, NothingComputed, WrongUsage
 from flybystab.plots.formats import FIGURES, FILMS
@@ -20,8 +21,12 @@ SURFACES = (DEFAULT, *(name for name in NAMES if name != DEFAULT))
 
 def material_arguments(sub: argparse.ArgumentParser) -> None:
     """Add the options of the material: friction angle, cohesion, yield surface."""
-    sub.add_argument("--friction", type=float, default=35.0, metavar="DEG", help="friction angle (35 deg)")
-    sub.add_argument("--cohesion", type=float, default=0.0, metavar="PA", help="cohesion (0 Pa)")
+    sub.add_argument(
+        "--friction", type=friction, default=35.0, metavar="DEG", help="friction angle (35 deg), e.g. 35+-5"
+    )
+    sub.add_argument(
+        "--cohesion", type=cohesion, default=0.0, metavar="PA", help="cohesion (0 Pa), e.g. '20+-10 Pa'"
+    )
     surface_argument(sub)
 
 
@@ -109,8 +114,8 @@ def material_of(options: argparse.Namespace) -> Any:
     from flybystab.body.body import Material
 
     return Material(
-        friction_angle=options.friction * u.deg,
-        cohesion=options.cohesion * u.Pa,
+        friction_angle=float(options.friction) * u.deg,
+        cohesion=float(options.cohesion) * u.Pa,
         yield_surface=options.surface,
     )
 
@@ -148,11 +153,16 @@ def asteroid_named(options: argparse.Namespace) -> Any:
     )
 
 
-def asteroid_of(options: argparse.Namespace) -> Any:
-    """The asteroid with the material of the options."""
+def asteroid_of(options: argparse.Namespace, *, assume: bool = True) -> Any:
+    """The asteroid with the body and the material of the options; `assume` allows --assume to complete it."""
     from flybystab.cli.shape_options import shaped
 
-    return shaped(asteroid_named(options), options).with_material(material_of(options))
+    asteroid = with_body_options(asteroid_named(options), options).with_material(material_of(options))
+    if assume and getattr(options, "assume", False):
+        from flybystab.screening.draws import completed
+
+        asteroid = completed(asteroid)
+    return shaped(asteroid, options)
 
 
 def check_picture(path: str | None, endings: tuple[str, ...] = FIGURES, option: str = "--output") -> None:

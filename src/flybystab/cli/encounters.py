@@ -135,7 +135,7 @@ def _lines(table: Any, many: bool) -> list[str]:
         table = table[np.sort(np.argsort(table["distance"])[:SHOWN])]
     head = f"{'planet':8s} {'time (TDB)':19s} {'distance (km)':>16s} {'(au)':>9s} {'v_inf (km/s)':>12s} "
     head += f"{'B.T (km)':>13s} {'B.R (km)':>13s}" + (
-        f" {'sigma (km)':>11s}  predictability" if known else ""
+        f" {'sigma (km)':>11s} {'model (km)':>11s}  predictability" if known else ""
     )
     if clones:
         head = head.replace(
@@ -146,24 +146,34 @@ def _lines(table: Any, many: bool) -> list[str]:
     for row in table:
         line = f"{row['asteroid'][:16]:16s} " if many else ""
         line += (
-            f"{row['planet']:8s} {row['time'].tdb.iso[:19]} {row['distance'].to_value(u.km):16,.1f} "
-            f"{row['distance'].to_value(u.au):9.6f} {row['v_inf'].to_value(u.km / u.s):12.4f} "
-            f"{row['b_t'].to_value(u.km):13,.0f} {row['b_r'].to_value(u.km):13,.0f}"
+            f"{row['planet']:8s} {_time(row)} {row['distance'].to_value(u.km):16,.1f} "
+            f"{row['distance'].to_value(u.au):9.6f} "
         )
+        v_inf = row["v_inf"].to_value(u.km / u.s)
+        if v_inf > 0.0:
+            line += f"{v_inf:12.4f} {row['b_t'].to_value(u.km):13,.0f} {row['b_r'].to_value(u.km):13,.0f}"
+        else:  # no asymptote and no target plane
+            line += f"{'bound':>12s} {'-':>13s} {'-':>13s}"
         if known:
-            line += f" {row['displacement'].to_value(u.km):11.4g}"
+            line += f" {row['displacement'].to_value(u.km):11.4g} {row['model_error'].to_value(u.km):11.4g}"
         if clones:
             odds = f"{row['p_impact']:.3g} ({row['p_impact_low']:.2g}-{row['p_impact_high']:.2g})"
             line += f" {row['distance_sigma'].to_value(u.km):11.4g} {odds:>24s} {row['p_impact_linear']:9.2g}"
         said = [grade(row["predictability"])] if known else []
-        said += ["impact"] if row["impact"] else []
+        if row["impact"]:
+            said.append("impact: time of entry" + _place(row))
         out.append(f"{line}  {', '.join(said)}".rstrip())
     if count > SHOWN:
         out.append(f"the closest {SHOWN} of {count}; --output FILE writes all")
     if not known:
         return out
     neighbours = "; ".join(table.meta["neighbours"])
-    out.append(f"sigma: displacement at the encounter of an orbit {neighbours}")
+    out.append(
+        f"sigma: displacement at the encounter of an orbit {neighbours}; "
+        "model: error by ephemeris, tolerance and forces left out"
+    )
+    if any(v == 0.0 for v in table["v_inf"].value):
+        out.append("bound: slower than the escape speed at closest approach, without an asymptote")
     if clones:
         lost = int((table["clones"] - table["clones_found"]).max())
         out.append(
@@ -172,3 +182,20 @@ def _lines(table: Any, many: bool) -> list[str]:
             + f"; covariance: {'; '.join(table.meta['covariances'])}"
         )
     return out
+
+
+def _time(row: Any) -> str:
+    """Time of closest approach, or of the entry of an impact."""
+    return str(row["entry_time"][:19].replace("T", " ") if row["impact"] else row["time"].tdb.iso[:19])
+
+
+def _place(row: Any) -> str:
+    """Where on the Earth an impact enters the atmosphere."""
+    import astropy.units as u
+    import numpy as np
+
+    latitude, longitude = (row[f"entry_{c}"].to_value(u.deg) for c in ("latitude", "longitude"))
+    if not np.isfinite(latitude):
+        return ""
+    north, east = "N" if latitude >= 0.0 else "S", "E" if longitude >= 0.0 else "W"
+    return f" at {abs(latitude):.2f} {north} {abs(longitude):.2f} {east}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from flybystab.cli.body_options import body_arguments
 from flybystab.cli.common import (
     SURFACES,
     asteroid_of,
@@ -31,6 +32,7 @@ def passage_arguments(sub: argparse.ArgumentParser) -> None:
     )
     sub.add_argument("--planet", default="earth", help="planet (earth)")
     material_arguments(sub)
+    body_arguments(sub)
     shape_arguments(sub)
     sub.add_argument(
         "--attitudes", type=int, default=64, metavar="N", help="number of sampled attitudes (64)"

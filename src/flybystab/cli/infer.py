@@ -5,14 +5,15 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
+from flybystab.cli.body_options import body_arguments
 from flybystab.cli.common import (
-    asteroid_named,
+    asteroid_of,
     catalogue_argument,
     check_picture,
     figure_argument,
+    material_arguments,
     show,
     span_arguments,
-    surface_argument,
     tdb,
 )
 
@@ -33,7 +34,8 @@ def arguments(sub: argparse.ArgumentParser) -> None:
         help="attitudes sampled per encounter (32)",
     )
     sub.add_argument("--seed", type=int, default=0, help="random seed of the attitudes (0)")
-    surface_argument(sub)
+    material_arguments(sub)
+    body_arguments(sub)
     figure_argument(sub)
 
 
@@ -46,7 +48,7 @@ def run(options: argparse.Namespace) -> None:
     from flybystab.screening.inference import infer, survived
 
     check_picture(options.output)
-    asteroid = asteroid_named(options)
+    asteroid = asteroid_of(options)
     passages = survived(
         asteroid,
         tdb(options.start, "--from"),

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from flybystab.cli.common import check_picture, grains_arguments, show
+from flybystab.cli.body_options import population_of
+from flybystab.cli.common import asteroid_of, check_picture, grains_arguments, show
 from flybystab.cli.flown import flown, passage_arguments
 from flybystab.cli.shape_options import surface_of
 
@@ -44,7 +45,7 @@ def run(options: argparse.Namespace) -> None:
     if options.samples > 1:
         day = 1.0 * u.d
         table = screen(
-            [asteroid],
+            [asteroid_of(options, assume=False)],
             e.time - day,
             e.time + day,
             planets=[options.planet],
@@ -52,6 +53,7 @@ def run(options: argparse.Namespace) -> None:
             samples=options.samples,
             seed=options.seed,
             material=asteroid.material,
+            population=population_of(options),
         )
         screened = table[0] if len(table) == 1 and not table["error"][0] else None
     command = "flybystab " + shlex.join(options.words)

@@ -7,6 +7,7 @@ from collections import Counter
 from typing import Any
 
 from flybystab._version import __version__
+from flybystab.cli.body_options import body_arguments
 from flybystab.cli.common import (
     asteroid_of,
     catalogue_argument,
@@ -33,6 +34,7 @@ def arguments(sub: argparse.ArgumentParser) -> None:
         help="classify the embedded catalogue or a file (own CSV or a format of docs/inputs.md)",
     )
     material_arguments(sub)
+    body_arguments(sub)
     shape_arguments(sub)
     sub.add_argument("--output", metavar="FILE", help="with --all: write the table (.ecsv, .parquet)")
 

@@ -18,7 +18,8 @@ from flybystab.core.ellipsoid.tide import TidePanels, tide_panels
 from flybystab.encounter.reach import SETTLE, far_enough
 from flybystab.errors import InvalidInput
 from flybystab.orbit.ephemeris import BODIES, Ephemeris
-from flybystab.orbit.orbit import Orbit
+from flybystab.orbit.observatories import geographic
+from flybystab.orbit.orbit import Orbit, later
 from flybystab.orbit.planets import Planet, planet
 from flybystab.orbit.predictability import Predictability
 from flybystab.orbit.target_plane import NORTH, checked, target_plane
@@ -86,20 +87,20 @@ class Encounter:
     distance_error, time_error : Quantity or None
         For a real orbit: change of distance and time of closest approach when the integration is made 100
         times tighter plus the change when every known force is on; infinite if the encounter vanishes then.
-        Behind an earlier encounter also 0.1 km, which ephemerides and masses leave, grown as a neighbour of the
-        orbit grew past it. The orbit's own uncertainty is not in it.
+        Beyond an earlier encounter also the error of the force model
+        (:attr:`flybystab.orbit.search.neighbours.Spread.model_error`). The orbit's own uncertainty is not in it.
     ephemeris : str or None
         Where the planets of a real orbit are from; None for a scripted encounter.
     displacement : Quantity or None
-        For a real orbit: how far a neighbour of the orbit is away at closest approach: one sigma of the
-        covariance in the direction least known by then, or 1 m at the epoch where there is no covariance.
+        For a real orbit: displacement at closest approach (at the entry of an impact) by one sigma of the covariance
+        in the direction least known by then, or by 1 m at the epoch where there is no covariance.
     growth : float or None
-        That over the distance between the two at the epoch.
+        That over the displacement at the epoch.
     neighbour : str
-        What the neighbour is.
+        Description of the displacement.
     predictability : Predictability or None
-        What displacement and errors say of the encounter: ``determined``, ``uncertain`` or ``one of many``
-        (:mod:`flybystab.orbit.predictability`).
+        What displacement and errors say of the encounter: ``determined``, ``uncertain``, ``one of many`` or
+        ``unknown`` (:mod:`flybystab.orbit.predictability`).
     """
 
     planet: Planet
@@ -168,6 +169,25 @@ class Encounter:
     def distances(self, t: Array) -> Array:
         """As :meth:`radius` on floats: m, shape (n,), at `t` s from closest approach, shape (n,)."""
         return np.sqrt(np.sum(self.positions(t) ** 2, axis=1))
+
+    @property
+    def bound(self) -> bool:
+        """Whether the two-body orbit at closest approach is an ellipse: there is no ``v_inf`` and no target plane."""
+        return self.v_inf.value == 0.0 and self.time is not None
+
+    @property
+    def entry_time(self) -> Time | None:
+        """First contact of an impact with the top of the atmosphere, or the surface without one (TDB)."""
+        return None if self.time is None or self.impact_time is None else later(self.time, self.impact_time)
+
+    @property
+    def entry_place(self) -> tuple[Quantity, Quantity] | None:
+        """East longitude and geodetic latitude of the entry into the atmosphere of the Earth; None elsewhere."""
+        if self.entry_time is None or self.impact_time is None or self.planet.name != "earth":
+            return None
+        point = self.positions(np.array([self.impact_time]))
+        longitude, latitude = geographic(point, self.entry_time)[0]
+        return longitude * u.deg, latitude * u.deg
 
     @property
     def height(self) -> float:

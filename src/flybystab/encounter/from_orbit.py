@@ -30,18 +30,21 @@ from flybystab.orbit.kepler import time_at_distance
 from flybystab.orbit.orbit import Orbit, _ephemeris, later, seconds, without_itself
 from flybystab.orbit.planets import Planet
 from flybystab.orbit.predictability import (
-    Neighbour,
+    Deviations,
     Predictability,
-    common_error,
-    neighbour,
-    neighbour_epoch,
+    deviation_epoch,
+    deviations_of,
     predictability,
 )
+from flybystab.orbit.search.acceleration import field
 from flybystab.orbit.search.encounter_finder import starts_inside
+from flybystab.orbit.search.neighbours import Spread, spread
 from flybystab.typing import Array
 
 #: Crossings of the surface within this time of a closest approach belong to it, s.
 _OWN = 2.0 * HOUR
+#: Tolerance of the orbits beside the nominal one.
+_TOLERANCE = 1e-14
 
 
 @dataclass(frozen=True)
@@ -122,7 +125,7 @@ def followed(
     """The encounter nearest to a time; arguments as checked by :meth:`Encounter.from_orbit`, in SI."""
     index = BODIES.index(body.name)
     epoch = seconds(orbit.epoch, near)
-    epochs = (epoch, seconds(neighbour_epoch(orbit), near))
+    epochs = (epoch, seconds(deviation_epoch(orbit), near))
     window = _ephemeris(ephemeris).window(
         near, min(*epochs, -reach), max(*epochs, reach + wait + TAIL + 10.0 * DAY)
     )
@@ -134,7 +137,7 @@ def followed(
     first = _passage(orbit, window, index, forces or everything, reach, EPSILON)
     if first is not None:
         _check_way(orbit, body, window, first, epoch)
-    beside = neighbour(orbit, near if first is None else later(near, first.t), ephemeris)
+    beside = deviations_of(orbit, ephemeris)
     if first is None or first.distance > largest:
         closest = (
             "no minimum of distance" if first is None else f"{first.distance / AU:.4f} au at the closest"
@@ -157,17 +160,41 @@ def followed(
         (abs(chosen.distance - other.distance), abs(chosen.t - other.t)) if other else (np.inf, np.inf)
         for other in (first, tight)
     ]
-    place = chosen.state[:3] + window.states(index, np.array([chosen.t]))[0, :3]
-    there = beside.orbit.flight(window, forces).to(chosen.t)[:3]
-    displacement = float(np.linalg.norm(there - place))
-    common = common_error(orbit, beside, window, forces, chosen.t, displacement, ephemeris)
+    contact = _contact(chosen, window, index, body)
+    when = chosen.t if contact is None else contact[0]
+    found = _spread(orbit, beside, window, forces, when)
+    model_error = float(found.model_error[0])
+    common = model_error if found.passed[0] else 0.0
     growth = _Growth(
         distance=gaps[0][0] + gaps[1][0] + common,
         time=gaps[0][1] + gaps[1][1] + common / float(np.linalg.norm(chosen.state[3:])),
-        displacement=displacement,
+        model=model_error,
+        displacement=float(found.displacement[0]),
+        growth=float(found.growth[0]),
         beside=beside,
     )
-    return _around(cls, orbit, body, window, chosen, accuracy, start, wait, reach, size, growth)
+    return _around(cls, orbit, body, window, chosen, contact, accuracy, start, wait, size, growth)
+
+
+def _spread(orbit: Orbit, beside: Deviations, window: Window, forces: tuple[str, ...], t: float) -> Spread:
+    """Errors of the orbit at `t` s from the epoch of the window."""
+    law = np.array([*orbit.nongrav.a, *orbit.nongrav.constants])
+    if "non-gravitational" not in forces:
+        law[:3] = 0.0
+    acting = field(window, [name for name in forces if name != "non-gravitational"])
+    return spread(beside, acting, law, window, np.array([t]), _TOLERANCE)
+
+
+def _contact(passage: _Passage, window: Window, index: int, body: Planet) -> tuple[float, Array] | None:
+    """Time (s) and relative state of the first contact with atmosphere or surface; None for a passage outside."""
+    if body.impact_level(passage.distance) is None:
+        return None
+    tables = (window.head, window.data, window.gm, index)
+    found, steps = crossings(passage.log, *tables, body.impact_distance, 8)
+    row = np.flatnonzero((found[:, 0] < passage.t) & (found[:, 2] < 0.0))[-1]
+    state = np.empty(6)
+    relative(passage.log, int(steps[row]), *tables, float(found[row, 0]), state)
+    return float(found[row, 0]), state
 
 
 def _check_way(orbit: Orbit, body: Planet, window: Window, passage: _Passage, epoch: float) -> None:
@@ -186,22 +213,27 @@ def _check_way(orbit: Orbit, body: Planet, window: Window, passage: _Passage, ep
 
 @dataclass(frozen=True)
 class _Growth:
-    """Closest approach in other runs: distance (m), time (s), displacement of the neighbour (m)."""
+    """Errors of a closest approach: numerical ones of distance (m) and time (s), of the model and of the orbit (m)."""
 
     distance: float
     time: float
+    model: float
     displacement: float
-    beside: Neighbour
+    growth: float
+    beside: Deviations
 
 
-def _horizon(orbit: Orbit, beside: Neighbour, window: Window, forces: tuple[str, ...], largest: float) -> str:
+def _horizon(
+    orbit: Orbit, beside: Deviations, window: Window, forces: tuple[str, ...], largest: float
+) -> str:
     """Addition to "no encounter" where the orbit cannot be integrated that far; empty otherwise."""
-    places = [o.flight(window, forces).to(0.0)[:3] for o in (orbit, beside.orbit)]
-    gap = float(np.linalg.norm(places[0] - places[1]))
+    found = _spread(orbit, beside, window, forces, 0.0)
+    gap = max(float(found.displacement[0]), float(found.model_error[0]))
     if predictability(largest, gap) is Predictability.DETERMINED:
         return ""
+    what = beside.label if found.displacement[0] == gap else "the error of the force model"
     return (
-        f"; the orbit cannot be predicted that far: {beside.label} at {beside.orbit.epoch.iso[:10]} is "
+        f"; the orbit cannot be predicted that far: {what} at {beside.orbit.epoch.iso[:10]} is "
         f"{gap / AU:.2g} au there, so that an encounter at this time is one of many possible"
     )
 
@@ -212,10 +244,10 @@ def _around(
     body: Planet,
     window: Window,
     passage: _Passage,
+    contact: tuple[float, Array] | None,
     accuracy: float,
     start: float | None,
     wait: float,
-    reach: float,
     size: dict[str, float],
     growth: _Growth,
 ) -> Encounter:
@@ -225,13 +257,9 @@ def _around(
     zero, q, state = passage.t, passage.distance, passage.state
     level = body.impact_level(q)
     entry = None
-    log, head, data = passage.log, window.head, window.data
-    if level is not None:
-        found, steps = crossings(log, head, data, window.gm, index, body.impact_distance, 8)
-        row = np.flatnonzero((found[:, 0] < zero) & (found[:, 2] < 0.0))[-1]
-        entry = float(found[row, 0])
-        state = np.empty(6)
-        relative(log, int(steps[row]), head, data, window.gm, index, entry, state)
+    log = passage.log
+    if contact is not None:
+        entry, state = contact
         q, ahead = _two_body_periapsis(gm, state)
         zero = entry + ahead
         level = body.impact_level(q)
@@ -289,13 +317,15 @@ def _around(
         distance_error=(growth.distance * u.m).to(u.km),
         time_error=growth.time * u.s,
         displacement=(growth.displacement * u.m).to(u.km),
-        growth=growth.displacement / growth.beside.shift,
+        growth=growth.growth,
         neighbour=growth.beside.label,
         predictability=predictability(
             max(q, body.impact_distance if level is not None else 0.0),
             growth.displacement,
+            growth.model,
             growth.distance,
             growth.time * v_p,
+            known=growth.beside.known,
         ),
         ephemeris=window.name,
     )

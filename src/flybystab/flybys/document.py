@@ -66,10 +66,15 @@ _INFINITE = {
 
 def encounter_document(encounter: Encounter) -> dict[str, Any]:
     """Document of an encounter."""
+    place = encounter.entry_place
     return {
         "planet": encounter.planet.name,
         "time_tdb": encounter.time,
         "distance_km": encounter.distance.to_value(u.km),
+        "entry_time_tdb": encounter.entry_time,
+        "entry_longitude_deg": None if place is None else place[0].to_value(u.deg),
+        "entry_latitude_deg": None if place is None else place[1].to_value(u.deg),
+        "bound": encounter.bound,
         "v_inf_km_s": encounter.v_inf.to_value(u.km / u.s),
         "v_periapsis_km_s": encounter.v_periapsis.to_value(u.km / u.s),
         "impact": encounter.impact_level if encounter.impact else None,

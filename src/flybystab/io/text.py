@@ -35,16 +35,31 @@ def encounter_lines(e: Encounter) -> list[str]:
     """Planet, time, distance, speed and predictability of an encounter."""
     when = f"{e.time.tdb.iso[:19]} TDB" if e.time is not None else "hyperbolic orbit without a date"
     radii = e.distance.to_value(u.m) / e.planet.radius
+    speed = f"v_inf {e.v_inf.to_value(u.km / u.s):.4f} km/s"
+    if e.bound:
+        speed = f"{e.v_periapsis.to_value(u.km / u.s):.4f} km/s, bound to the planet"
     out = [
         f"encounter  {e.planet.name.capitalize()}, {when}",
-        f"           {e.distance.to_value(u.km):,.1f} km from the centre ({radii:.3f} radii), "
-        f"v_inf {e.v_inf.to_value(u.km / u.s):.4f} km/s",
+        f"           {e.distance.to_value(u.km):,.1f} km from the centre ({radii:.3f} radii), {speed}",
     ]
     if e.impact:
-        out.append(f"           reaches the {e.impact_level}")
+        out.append(f"           reaches the {e.impact_level}{entry(e)}")
     if e.displacement is not None:
         out.append(f"orbit      {known(e)}")
     return out
+
+
+def entry(e: Encounter) -> str:
+    """Time and place of the entry of an impact on a real orbit."""
+    if e.entry_time is None:
+        return ""
+    top = "enters the atmosphere" if e.planet.atmosphere else "reaches the surface"
+    where = ""
+    if e.entry_place is not None:
+        longitude, latitude = (x.to_value(u.deg) for x in e.entry_place)
+        where = f" at {abs(latitude):.2f} {'N' if latitude >= 0 else 'S'} {abs(longitude):.2f} "
+        where += "E" if longitude >= 0 else "W"
+    return f"; {top} on {e.entry_time.tdb.iso[:19]} TDB{where}"
 
 
 def grade(predictability: str) -> str:

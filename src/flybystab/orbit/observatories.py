@@ -11,9 +11,11 @@ from typing import NamedTuple
 import astropy.units as u
 import numpy as np
 from astropy.coordinates import EarthLocation
+from astropy.time import Time
 
-from flybystab.constants import R_EARTH
+from flybystab.constants import AU, R_EARTH
 from flybystab.errors import InvalidInput, UnknownName
+from flybystab.typing import Array
 
 
 class Observer(NamedTuple):
@@ -93,3 +95,22 @@ def observer(text: str) -> Observer | None:
         raise InvalidInput("observer", text, expected)
     latitude, longitude, height = (*values, 0.0)[:3]
     return Observer(f"{latitude:g}, {longitude:g}, {height:g} m", latitude, longitude, height)
+
+
+def geographic(positions: Array, times: Time) -> Array:
+    """East longitude and geodetic latitude (deg, WGS 84), shape (n, 2), below points near the Earth.
+
+    Parameters
+    ----------
+    positions : ndarray, shape (n, 3)
+        From the centre of the Earth, ICRF axes, m.
+    times : Time, shape (n,)
+        Rotation of the Earth by skyfield, with its built-in Delta T.
+    """
+    from skyfield.api import load, wgs84
+    from skyfield.positionlib import Geocentric
+
+    tt = times.tt
+    moments = load.timescale(builtin=True).tt_jd(np.atleast_1d(tt.jd1), np.atleast_1d(tt.jd2))
+    latitude, longitude = wgs84.latlon_of(Geocentric(positions.T / AU, t=moments))
+    return np.column_stack([longitude.degrees, latitude.degrees])

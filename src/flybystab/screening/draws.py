@@ -8,7 +8,7 @@ bodies; the attitudes are drawn for each encounter.
 from __future__ import annotations
 
 import hashlib
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import NamedTuple
 
@@ -19,6 +19,7 @@ from flybystab.body.body import DENSITY_RANGE, Body, Material
 from flybystab.catalogues.asteroid import Asteroid, identity
 from flybystab.catalogues.catalogue import catalogue
 from flybystab.catalogues.lightcurves import periods_like
+from flybystab.catalogues.record import SHAPE
 from flybystab.catalogues.tumbling import attitude_matrix, free_spin, isotropic_direction
 from flybystab.errors import InvalidInput
 from flybystab.screening.distributions import truncated_normal
@@ -108,6 +109,30 @@ def nominal(asteroid: Asteroid, material: Material, population: Population | Non
     return draw._replace(phi=np.array([material.phi]), cohesion=np.array([material.c_pa]))
 
 
+def completed(asteroid: Asteroid, population: Population | None = None) -> Asteroid:
+    """The asteroid with the medians of the population for what its row lacks; its assumptions say so.
+
+    Raises
+    ------
+    InvalidInput
+        The row has neither a size nor an absolute magnitude.
+    """
+    found = nominal(asteroid, asteroid.material, population)
+    row = dict(asteroid.row)
+    values = dict(zip(SHAPE, found.axes[0].tolist(), strict=True)) | {"density_kg_m3": float(found.rho[0])}
+    if not asteroid.tumbles:
+        values["spin_period_h"] = float(found.period[0]) / 3600.0
+    missing = [c for c in values if not row.get(c)]
+    if not missing:
+        return asteroid
+    if set(missing) & set(SHAPE):
+        missing = [*SHAPE, *(c for c in missing if c not in SHAPE)]
+    row |= {c: repr(values[c]) for c in missing}
+    row["assumed"] = ";".join(dict.fromkeys([*asteroid.assumed, *missing]))
+    row["drawn"] = ";".join(found.drawn)
+    return replace(asteroid, row=row)
+
+
 def draws(asteroid: Asteroid, samples: int, seed: int, population: Population | None = None) -> Draws:
     """Samples of an asteroid (arguments as in :func:`nominal`)."""
     uniform = stream(seed, "body", identity(asteroid)).random((samples, _WIDTH))
@@ -143,7 +168,9 @@ def _draws(asteroid: Asteroid, x: Array, population: Population, *, keep: bool) 
         drawn.append("diameter (from H and albedo)")
     else:
         raise InvalidInput(
-            "diameter_m", "(empty)", f"a size or H_mag for {asteroid.label} in {asteroid.file}"
+            "diameter_m",
+            "(empty)",
+            f"a size (--axes, Asteroid(body=...)) or H_mag for {asteroid.label} in {asteroid.file}",
         )
 
     # Shape, then scaled to the size

@@ -131,8 +131,8 @@ def infer(
                 "passage": _label(e),
                 "tide_s-2": float(sizes[k][0]),
                 "followed": bool(followed[k]),
-                "adds_at_any_attitude_deg": _largest(needs[..., k, 0] - rest),
-                "adds_at_worst_attitude_deg": _largest(needs[..., k, 1] - rest),
+                "adds_at_any_attitude_deg": _largest(needs[..., k, 0], rest),
+                "adds_at_worst_attitude_deg": _largest(needs[..., k, 1], rest),
             }
             for k, e in enumerate(encounters)
         ],
@@ -153,9 +153,11 @@ def strongest_passage(table: QTable) -> dict[str, Any] | None:
     return max(table.meta.get("passages", []), key=lambda p: p["tide_s-2"], default=None)
 
 
-def _largest(rise: np.ndarray) -> float:
-    """Largest finite rise over the grid, deg."""
-    finite = rise[np.isfinite(rise)]
+def _largest(need: np.ndarray, rest: np.ndarray) -> float:
+    """Largest finite rise of `need` above `rest` (rad) over the grid, deg."""
+    need, rest = np.broadcast_arrays(need, rest)
+    usable = np.isfinite(need) & np.isfinite(rest)
+    finite = need[usable] - rest[usable]
     return float(np.rad2deg(finite.max())) if len(finite) else 0.0
 
 

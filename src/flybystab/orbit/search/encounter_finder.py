@@ -25,6 +25,7 @@ from flybystab.errors import Impact, InvalidInput, NotConverged
 from flybystab.orbit.almanac import GRID, N_FAST, N_SLOW, SLOT
 from flybystab.orbit.ephemeris import BELT, BODIES, N_BODIES, Ephemeris, Window
 from flybystab.orbit.forces import FORCES
+from flybystab.orbit.observatories import geographic
 from flybystab.orbit.orbit import (
     TWIN_DISTANCE,
     TWIN_SPEED,
@@ -36,10 +37,12 @@ from flybystab.orbit.orbit import (
     seconds,
 )
 from flybystab.orbit.planets import PLANETS, Planet, planet
-from flybystab.orbit.predictability import neighbour, neighbour_epoch
+from flybystab.orbit.predictability import deviation_epoch, deviations_of
 from flybystab.orbit.search.acceleration import Field, field
+from flybystab.orbit.search.entry import entry
 from flybystab.orbit.search.force_selection import N_SHARES, NAMES, reduced
 from flybystab.orbit.search.minima import WIDTH
+from flybystab.orbit.search.neighbours import add_growth
 from flybystab.orbit.search.track import EXHAUSTED, INSIDE, MAX_STEPS, STALLED, search
 from flybystab.orbit.target_plane import target_plane
 from flybystab.typing import Array
@@ -104,9 +107,10 @@ def find_encounters(
     forces : tuple of str, optional
         Exactly these forces, names as in ``flybystab.orbit.forces.FORCES``, instead of choosing by `error`.
     growth : bool
-        Follow a neighbour of each orbit as well, for the columns ``displacement`` (km, of the neighbour from
-        the asteroid at closest approach), ``growth`` (over that at the epoch) and ``predictability``
-        (:mod:`flybystab.orbit.predictability`). Up to twice the time.
+        Add the columns ``displacement`` (km, one sigma of the orbit in the direction least known at closest
+        approach), ``growth`` (over that at the epoch), ``model_error`` (km, by ephemeris, tolerance and forces left
+        out) and ``predictability`` (:mod:`flybystab.orbit.predictability`). All forces are kept, so that the result
+        does not depend on the span; about ten times the time.
     workers : int, optional
         Number of threads; one per processor by default.
     progress : callable, optional
@@ -120,9 +124,11 @@ def find_encounters(
         One row per encounter, sorted by asteroid and time: ``asteroid``, ``planet``, ``time`` (TDB),
         ``distance`` (km), ``v_rel`` and ``v_inf`` (km/s; 0 for a bound passage), ``b_t`` and ``b_r`` (km;
         target plane, north +z of ICRF, :mod:`flybystab.orbit.target_plane`; nan for a bound passage), ``impact``,
-        ``index`` (of the asteroid), ``position`` and ``velocity`` (ICRF, relative to the planet). On
-        an impact, distance and time are those of the two-body orbit without a surface, position and velocity
-        are from the step before, and the search ends for that asteroid. Metadata: ephemeris, forces and
+        ``index`` (of the asteroid), ``position`` and ``velocity`` (ICRF, relative to the planet). On an impact, time
+        and distance are those of the periapsis of the two-body orbit without a surface, position and velocity those at
+        the entry into the atmosphere (the surface of a body without one), and the search ends for that asteroid. If
+        there is an impact: ``entry_time`` (TDB, text; empty in other rows), ``entry_longitude`` (east) and
+        ``entry_latitude`` (geodetic, deg; nan elsewhere than on the Earth). Metadata: ephemeris, forces and
         the largest estimated share of each (``share_km``, point masses and 1PN), shares of the forces left out
         (``left_out_km``), frame, time scale, tolerance, and, of several asteroids, those that could not be
         followed (``failed``: ``asteroid`` and ``why``).
@@ -163,7 +169,7 @@ def find_encounters(
     middle = later(start, 0.5 * seconds(stop, start))
     t_start, t_stop = seconds(start, middle), seconds(stop, middle)
     epochs = _epochs(rows, middle)
-    known = [seconds(neighbour_epoch(orbit), middle) for _, orbit in rows] if growth else []
+    known = [seconds(deviation_epoch(orbit), middle) for _, orbit in rows] if growth else []
     first, last = ((jd - middle.tdb.jd1 - middle.tdb.jd2) * DAY for jd in (eph.start_jd, eph.stop_jd))
     begin, end = t_start - _MARGIN, t_stop + _MARGIN
     if first <= t_start and t_stop <= last:
@@ -178,7 +184,7 @@ def find_encounters(
     longest = np.maximum(np.abs(epochs - t_start), np.abs(epochs - t_stop))
     if tolerance is None:
         tolerances = np.clip(_AT_10_YEARS * accuracy * (10.0 * YEAR / longest) ** 2, *_TOLERANCES)
-        if growth:  # the displacement of a neighbour may be metres
+        if growth:  # passages amplify errors: those of the tolerance, too
             tolerances = np.minimum(tolerances, 1e-14)
     else:
         tolerances = np.full(len(rows), float(tolerance))
@@ -204,7 +210,7 @@ def find_encounters(
     }
     shares = np.zeros((len(rows), N_SHARES))
     # A tenth: several shares add up, and passages on the way enlarge them.
-    least = 0.1 * accuracy if forces is None else 0.0
+    least = 0.1 * accuracy if forces is None and not growth else 0.0
 
     failed: dict[int, dict[str, str]] = {}
 
@@ -282,21 +288,21 @@ def find_encounters(
         "time_scale": "TDB",
         "tolerance": float(tolerances.min(initial=1.0)),
     }
-    out = _table(rows, raw, middle, window, meta)
+
+    def field_of(i: int) -> Field:
+        return reduced(own.get(i, everything), shares[i], least, always)
+
+    contacts = raw[:, 1:8].copy()
+    for k in np.flatnonzero(raw[:, 10] > 0.0):
+        i, hit_body = int(raw[k, 11]), int(raw[k, 0])
+        sign = 1.0 if raw[k, 1] >= epochs[i] else -1.0
+        contacts[k, 0], contacts[k, 1:] = entry(
+            field_of(i), laws[i], window, hit_body, raw[k], float(floors[hit_body]), sign
+        )
+    out = _table(rows, raw, contacts, middle, window, meta)
     if growth:
-        from flybystab.orbit.search.neighbours import add_growth
-
-        # One neighbour for all encounters of an asteroid: the direction that matters is that of the farthest.
-        beside = {}
-        for i in np.unique(out["index"]).tolist():
-            times = raw[raw[:, 11] == i, 1]
-            farthest = float(times[np.argmax(np.abs(times - known[i]))])
-            beside[i] = neighbour(rows[i][1], later(middle, farthest), eph)
-
-        def field_of(i: int) -> Field:
-            return reduced(own.get(i, everything), shares[i], least, always)
-
-        add_growth(out, beside, laws, window, field_of, tolerances, workers)
+        beside = {i: deviations_of(rows[i][1], eph) for i in np.unique(out["index"]).tolist()}
+        add_growth(out, contacts[:, 0], beside, laws, window, field_of, tolerances, workers)
     return out
 
 
@@ -365,10 +371,17 @@ def _forces_used(
 
 
 def _table(
-    rows: list[tuple[str, Orbit]], raw: Array, origin: Time, window: Window, meta: dict[str, Any]
+    rows: list[tuple[str, Orbit]],
+    raw: Array,
+    contacts: Array,
+    origin: Time,
+    window: Window,
+    meta: dict[str, Any],
 ) -> QTable:
+    """The result; `contacts` holds times (s) and relative states: closest approaches, or entries of impacts."""
     index = raw[:, 11].astype(int)
     gm = window.gm[raw[:, 0].astype(int)]
+    hits = raw[:, 10] > 0.0
     speed2 = raw[:, 9] + 2.0 * gm / raw[:, 8]
     b, _ = target_plane(raw[:, 2:8], gm)
     out = QTable()
@@ -380,10 +393,18 @@ def _table(
     out["v_rel"] = (np.sqrt(np.maximum(speed2, 0.0)) * u.m / u.s).to(u.km / u.s)
     out["v_inf"] = (np.sqrt(np.maximum(raw[:, 9], 0.0)) * u.m / u.s).to(u.km / u.s)
     out["b_t"], out["b_r"] = (b[:, 0] * u.m).to(u.km), (b[:, 1] * u.m).to(u.km)
-    out["impact"] = raw[:, 10] > 0.0
+    out["impact"] = hits
     out["index"] = index
-    out["position"] = (raw[:, 2:5] * u.m).to(u.km)
-    out["velocity"] = (raw[:, 5:8] * u.m / u.s).to(u.km / u.s)
+    out["position"] = (contacts[:, 1:4] * u.m).to(u.km)
+    out["velocity"] = (contacts[:, 4:] * u.m / u.s).to(u.km / u.s)
+    if hits.any():
+        at_earth = hits & (out["planet"] == "earth")
+        places = np.full((len(raw), 2), np.nan)
+        when = Time(zero.jd1, zero.jd2 + contacts[:, 0] / DAY, format="jd", scale="tdb")
+        if at_earth.any():
+            places[at_earth] = geographic(contacts[at_earth, 1:4], when[at_earth])
+        out["entry_time"] = np.where(hits, when.isot, "")
+        out["entry_longitude"], out["entry_latitude"] = places[:, 0] * u.deg, places[:, 1] * u.deg
     out.meta = meta
     return out
 

@@ -1,0 +1,129 @@
+"""Rows of a catalogue from values that a user gives: an orbit, a body, its pole, with errors and sources."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from difflib import get_close_matches
+from typing import Any
+
+import astropy.units as u
+import numpy as np
+
+from flybystab.body.body import Body, check_body
+from flybystab.catalogues.record import ORBIT_SI, SHAPE
+from flybystab.constants import DAY
+from flybystab.errors import InvalidInput, UnknownName
+from flybystab.orbit.elements import GM_SUN, elements_from_state
+from flybystab.orbit.orbit import Orbit, heliocentric
+from flybystab.units import to_si
+
+#: What can have an error or a source: unit, and the stem of the columns.
+QUANTITIES: Mapping[str, tuple[u.UnitBase, str]] = {
+    "axes": (u.m, "semi_axes"),
+    "diameter": (u.m, "diameter"),
+    "density": (u.kg / u.m**3, "density"),
+    "period": (u.h, "spin"),
+    "pole": (u.deg, "pole"),
+    "orbit": (u.dimensionless_unscaled, "orbit"),
+}
+#: Errors that have a column.
+_ERRORS = ("axes", "density", "period")
+
+
+def checked_orbit(orbit: Any) -> Orbit:
+    """The orbit, or InvalidInput for anything else."""
+    if not isinstance(orbit, Orbit):
+        raise InvalidInput("orbit", orbit, "an Orbit: Orbit.from_elements or Orbit.from_state")
+    return orbit
+
+
+def orbit_columns(orbit: Orbit, name: str) -> dict[str, str]:
+    """Name, epoch and osculating elements (heliocentric, J2000 ecliptic) of an orbit."""
+    q, e, i, node, peri, since = elements_from_state(heliocentric(orbit))
+    row = {"name": name or orbit.name or "unnamed", "e": repr(e)}
+    row["epoch_jd_tdb"] = repr(float(orbit.epoch.tdb.jd))
+    angles = {
+        c: repr(float(np.degrees(x))) for c, x in zip(("i", "node", "peri"), (i, node, peri), strict=True)
+    }
+    row |= {f"{c}_deg": x for c, x in angles.items()}
+    if e == 1.0:
+        row |= {"q_au": repr(q / ORBIT_SI[0]), "tp_jd_tdb": repr(float(orbit.epoch.tdb.jd) - since / DAY)}
+    else:
+        a = q / (1.0 - e)
+        mean = since * np.sqrt(GM_SUN / abs(a) ** 3)
+        row |= {"a_au": repr(float(a / ORBIT_SI[0])), "M_deg": repr(float(np.degrees(mean)))}
+    return row
+
+
+def body_columns(body: Body) -> dict[str, str]:
+    """Semi-axes, density and period of a body that spins about its short axis.
+
+    Raises
+    ------
+    InvalidInput
+        For another rotation.
+    """
+    check_body(body)
+    axes = np.asarray(body.semi_axes.to_value(u.m), dtype=float)
+    row = dict(zip(SHAPE, map(repr, axes.tolist()), strict=True))
+    row["diameter_m"] = repr(float(2.0 * np.cbrt(np.prod(axes))))
+    row["shape_kind"] = "measured"
+    row["density_kg_m3"] = repr(float(body.density.to_value(u.kg / u.m**3)))
+    x, y, z = (float(w) for w in body.omega)
+    if x or y or not z:
+        raise InvalidInput(
+            "body.spin", body.spin, "a rotation about the short axis; for a tumbler: Asteroid.with_tumbling"
+        )
+    period = 2.0 * np.pi / abs(z) / 3600.0
+    return row | {"spin_period_h": repr(period), "spin_state": "principal"}
+
+
+def pole_columns(pole: Any) -> dict[str, str]:
+    """Ecliptic longitude and latitude (J2000) of a pole.
+
+    Parameters
+    ----------
+    pole : Quantity (2,)
+        Ecliptic longitude and latitude.
+    """
+    longitude, latitude = to_si(pole, u.rad, "pole", shape=(2,)).tolist()
+    if abs(latitude) > 0.5 * np.pi + 1e-12:
+        raise InvalidInput("pole", pole, "ecliptic longitude and latitude, the latter within 90 deg")
+    return {
+        "pole_ecl_lon_deg": repr(float(np.degrees(longitude))),
+        "pole_ecl_lat_deg": repr(float(np.degrees(latitude))),
+    }
+
+
+def error_columns(sigmas: Mapping[str, Any]) -> dict[str, str]:
+    """Columns of 1-sigma errors: ``axes`` (one value or three), ``density``, ``period``."""
+    row = {}
+    for key, value in sigmas.items():
+        if key not in _ERRORS:
+            raise UnknownName(
+                "error", str(key), get_close_matches(str(key), _ERRORS), f"(known: {', '.join(_ERRORS)})"
+            )
+        unit = QUANTITIES[key][0]
+        sigma = to_si(value, unit, f"sigmas[{key!r}]", shape=None, low=0.0)
+        if key == "axes":
+            for column, s in zip(SHAPE, np.broadcast_to(sigma, (3,)).tolist(), strict=True):
+                row[column.removesuffix("_m") + "_sigma_m"] = repr(float(s))
+        else:
+            column = {"density": "density_sigma_kg_m3", "period": "spin_period_sigma_h"}[key]
+            row[column] = repr(float(sigma))
+    return row
+
+
+def source_columns(sources: Mapping[str, str]) -> dict[str, str]:
+    """Columns of sources, by the names of :data:`QUANTITIES`."""
+    row = {}
+    for key, text in sources.items():
+        if key not in QUANTITIES:
+            raise UnknownName(
+                "source",
+                str(key),
+                get_close_matches(str(key), QUANTITIES),
+                f"(known: {', '.join(QUANTITIES)})",
+            )
+        row[QUANTITIES[key][1] + "_source"] = str(text)
+    return row

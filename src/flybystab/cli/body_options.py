@@ -1,0 +1,175 @@
+"""Options for the body of an asteroid: ``--axes --density --period --pole --assume``, with errors (``200+-20 m``)."""
+
+from __future__ import annotations
+
+import argparse
+import re
+from typing import Any
+
+from flybystab.errors import InvalidInput
+
+_NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
+_VALUE = re.compile(rf"\s*({_NUMBER})\s*(?:(?:\+-|\+/-|±)\s*({_NUMBER}))?\s*(.*?)\s*")
+
+
+class Measured(float):
+    """A number with its 1-sigma error, 0 if none is given."""
+
+    sigma: float = 0.0
+
+
+def measured(text: str, unit: str, name: str) -> Measured:
+    """Read ``35``, ``35 deg`` or ``35+-5 deg``; a bare number is in `unit`.
+
+    Raises
+    ------
+    InvalidInput
+        It is not such a value, or not of this dimension.
+    """
+    import astropy.units as u
+
+    found = _VALUE.fullmatch(text)
+    example = f"a value such as 20 {unit} or 20+-2 {unit}"
+    if found is None:
+        raise InvalidInput(name, text, example)
+    value, sigma, given = found.groups()
+    try:
+        factor = u.Unit(given).to(u.Unit(unit)) if given else 1.0
+    except (ValueError, TypeError, u.UnitConversionError):
+        raise InvalidInput(name, text, example) from None
+    out = Measured(float(value) * factor)
+    out.sigma = abs(float(sigma or 0.0)) * factor
+    return out
+
+
+def friction(text: str) -> Measured:
+    """Value of --friction, deg."""
+    return _typed(text, "deg", "--friction")
+
+
+def cohesion(text: str) -> Measured:
+    """Value of --cohesion, Pa."""
+    return _typed(text, "Pa", "--cohesion")
+
+
+def _typed(text: str, unit: str, name: str) -> Measured:
+    try:
+        return measured(text, unit, name)
+    except InvalidInput as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
+
+
+def body_arguments(sub: argparse.ArgumentParser) -> None:
+    """Add the options of the body."""
+    sub.add_argument("--axes", metavar="AxBxC", help="semi-axes, with errors: '200x170x150+-10 m', '0.2 km'")
+    sub.add_argument("--density", metavar="RHO", help="density: '2000+-300 kg/m3', '2 g/cm3'")
+    sub.add_argument("--period", metavar="P", help="spin period: '5.3+-0.1 h'")
+    sub.add_argument(
+        "--pole", metavar="LON,LAT", help="ecliptic longitude and latitude of the spin pole, deg"
+    )
+    sub.add_argument(
+        "--assume",
+        action="store_true",
+        help="take what is missing from the population of screen: its median, and samples in a report",
+    )
+
+
+def check_body_options(options: argparse.Namespace) -> None:
+    """Check the values of the options; InvalidInput for those that cannot be read."""
+    _given(options)
+
+
+def _axes(text: str) -> tuple[list[float], list[float]]:
+    """Semi-axes and their errors, m; an error or unit at the end counts for all."""
+    parts = re.split(r"\s*[x×]\s*", text.strip())
+    if len(parts) not in (1, 3):
+        raise InvalidInput("--axes", text, "one or three semi-axes: '200x170x150+-10 m'")
+    tail = re.fullmatch(rf"(.*?)((?:\s*(?:\+-|\+/-|±)\s*{_NUMBER})?)\s*([A-Za-z]*)", parts[-1])
+    assert tail is not None
+    error, unit = tail.group(2), tail.group(3)
+    found = []
+    for part in parts[:-1]:
+        has_unit = re.search(r"[A-Za-z]\s*$", part) is not None
+        has_error = re.search(r"\+-|\+/-|±", part) is not None
+        found.append(
+            measured(
+                part + ("" if has_error or has_unit else error) + ("" if has_unit else unit), "m", "--axes"
+            )
+        )
+    found.append(measured(parts[-1], "m", "--axes"))
+    found = sorted(found * (3 if len(found) == 1 else 1), reverse=True)
+    return [float(x) for x in found], [x.sigma for x in found]
+
+
+def _given(options: argparse.Namespace) -> tuple[dict[str, str], list[str]]:
+    """Columns of the options, and the names of those that were given."""
+    import astropy.units as u
+
+    from flybystab.catalogues.given import error_columns, pole_columns
+    from flybystab.catalogues.record import SHAPE
+
+    row: dict[str, str] = {}
+    names = []
+    sigmas: dict[str, Any] = {}
+    if getattr(options, "axes", None) is not None:
+        axes, errors = _axes(options.axes)
+        row |= dict(zip(SHAPE, map(repr, axes), strict=True)) | {
+            "shape_kind": "measured",
+            "diameter_sigma_m": "",
+        }
+        row["diameter_m"] = repr(float(2.0 * (axes[0] * axes[1] * axes[2]) ** (1.0 / 3.0)))
+        sigmas["axes"] = errors * u.m
+        names += ["axes"]
+        row["semi_axes_source"] = "--axes"
+    for key, column, unit in (
+        ("density", "density_kg_m3", "kg/m3"),
+        ("period", "spin_period_h", "h"),
+    ):
+        text = getattr(options, key, None)
+        if text is None:
+            continue
+        value = measured(text, unit, f"--{key}")
+        row[column] = repr(float(value))
+        sigmas[key] = value.sigma * u.Unit(unit)
+        names += [key]
+    if "density" in names:
+        row["density_source"] = "--density"
+    if "period" in names:
+        row |= {"spin_state": "principal", "spin_source": "--period"}
+        row |= dict.fromkeys(("tumbling_mode", "precession_period_h", "rotation_period_h"), "")
+    if getattr(options, "pole", None) is not None:
+        try:
+            longitude, latitude = (float(x) for x in options.pole.removesuffix("deg").split(","))
+        except ValueError:
+            raise InvalidInput(
+                "--pole", options.pole, "ecliptic longitude and latitude in deg: 120,-45"
+            ) from None
+        row |= pole_columns([longitude, latitude] * u.deg) | {"pole_source": "--pole"}
+        names += ["pole"]
+    row |= error_columns(sigmas)
+    return row, names
+
+
+def with_body_options(asteroid: Any, options: argparse.Namespace) -> Any:
+    """The asteroid with the values of the options in place of its own."""
+    from dataclasses import replace
+
+    row, names = _given(options)
+    if not names:
+        return asteroid
+    columns = {**asteroid.row, **row}
+    columns["assumed"] = ";".join(c for c in asteroid.assumed if c not in row)
+    return replace(asteroid, row=columns)
+
+
+def population_of(options: argparse.Namespace) -> Any:
+    """The population of a screening, with the errors of --friction and --cohesion; None without errors."""
+    from flybystab.screening.distributions import Distribution
+    from flybystab.screening.priors import Population
+
+    changes: dict[str, Any] = {}
+    for name, key, high in (("friction", "friction_angle_deg", 89.0), ("cohesion", "cohesion_Pa", None)):
+        value = getattr(options, name, None)
+        if isinstance(value, Measured) and value.sigma > 0.0:
+            changes[key] = Distribution("normal", mean=float(value), sd=value.sigma, low=0.0, high=high)
+    return Population(**changes) if changes else None

@@ -1,0 +1,64 @@
+"""Where and when an asteroid reaches the top of the atmosphere, or the surface of a body without one."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from flybystab.orbit.ephemeris import Window
+from flybystab.orbit.kepler import time_at_distance
+from flybystab.orbit.search.acceleration import Field
+from flybystab.orbit.search.dop853 import empty_room
+from flybystab.orbit.search.minima import two_body
+from flybystab.orbit.search.neighbours import carry
+from flybystab.typing import Array
+
+
+def entry(
+    field: Field, law: Array, window: Window, body: int, row: Array, floor: float, sign: float
+) -> tuple[float, Array]:
+    """First contact of an impact that a search has found.
+
+    Two-body motion gives a first guess; Newton's method on the distance, with the state integrated from the last step
+    outside with all forces, the rest.
+
+    Parameters
+    ----------
+    field, law : Field, ndarray (8,)
+        Forces of the search.
+    window : Window
+    body : int
+        Place in ``BODIES``.
+    row : ndarray, shape (WIDTH,)
+        Raw row of the impact: periapsis time (s) of the two-body orbit and the state (m, m/s) before the impact.
+    floor : float
+        Distance of contact, m.
+    sign : float
+        Direction of the integration in time. Backward, the contact is where the path would leave the body.
+
+    Returns
+    -------
+    float
+        Time, s from the epoch of the window.
+    ndarray, shape (6,)
+        State relative to the body, m and m/s.
+    """
+    gm, state = float(window.gm[body]), row[2:8]
+    q, ahead, energy = two_body(gm, state)
+    inbound = sign * float(state[:3] @ state[3:]) < 0.0 and np.isfinite(ahead)
+    start = float(row[1]) - (sign * ahead if inbound else 0.0)
+    last = time_at_distance(gm, q, q * energy / gm, floor)
+    t = start + sign * (ahead - last) if inbound and np.isfinite(last) else start
+    origin = state + window.states(body, np.array([start]))[0]
+    there = state
+    for _ in range(20):
+        out = np.empty((1, 6))
+        if carry(field, law, start, origin, np.array([t]), 1e-14, empty_room(), out) < 1:
+            break
+        there = out[0] - window.states(body, np.array([t]))[0]
+        r = float(np.linalg.norm(there[:3]))
+        speed = float(there[:3] @ there[3:]) / r
+        step = (floor - r) / speed
+        if abs(floor - r) < 1e-2 or not np.isfinite(step):
+            break
+        t += step
+    return t, there
