@@ -19,7 +19,7 @@ from typing import Any
 
 import numpy as np
 from astropy.time import Time
-from astropy.units import Quantity, Unit, UnitBase
+from astropy.units import Quantity, Unit, UnitBase, km
 
 from flybystab.errors import FlybystabError, InvalidInput, MissingExtra
 from flybystab.files import parse_json, read_bytes, read_text
@@ -32,6 +32,8 @@ KNOWN = {
     "Material": "flybystab.body.body",
     "Planet": "flybystab.orbit.planets",
 }
+#: Units of quantities in documents and CSV files, where tables differ: one key for one quantity.
+DOCUMENT_UNITS = {"distance": km}
 #: Text that starts with one of these is quoted: spreadsheets read it as a formula, ECSV readers as a comment (#).
 QUOTED_START = ("=", "+", "-", "@", "#", " ", "\t")
 #: Largest file that is read, bytes.

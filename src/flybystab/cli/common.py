@@ -178,16 +178,17 @@ def check_picture(path: str | None, endings: tuple[str, ...] = FIGURES, option: 
         raise InvalidInput(option, path, "a folder that exists and can be written")
 
 
-def check_table(path: str | None) -> None:
+def check_table(path: str | None, formats: tuple[str, ...] = ()) -> None:
     """Check before a computation that its table can be written."""
     if path is None:
         return
-    from flybystab.screening.results import FORMATS
+    from flybystab.screening.results import WRITTEN
     from flybystab.screening.table_files import check_output
 
-    if not path.endswith(FORMATS):
-        raise WrongUsage(f"--output = {path}: expected a file that ends in {' or '.join(FORMATS)}")
-    check_output(path)
+    formats = formats or WRITTEN
+    if not path.endswith(formats):
+        raise WrongUsage(f"--output = {path}: expected a file that ends in {' or '.join(formats)}")
+    check_output(path, formats)
 
 
 def grains_arguments(sub: argparse.ArgumentParser) -> None:

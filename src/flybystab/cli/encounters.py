@@ -35,7 +35,7 @@ def arguments(sub: argparse.ArgumentParser) -> None:
         "--clones", type=int, default=0, metavar="N", help="number of orbits drawn from the covariance (0)"
     )
     sub.add_argument("--seed", type=int, default=0, help="random seed of the clones (0)")
-    sub.add_argument("--output", metavar="FILE", help="write the table (.ecsv, .parquet)")
+    sub.add_argument("--output", metavar="FILE", help="write the table (.ecsv, .parquet, .csv)")
 
 
 def run(options: argparse.Namespace) -> None:

@@ -27,7 +27,7 @@ def arguments(sub: argparse.ArgumentParser) -> None:
         help="MPC code, or LAT,LON[,ALT] in deg, deg east, m (500, the geocentre); write --observer=-30.2,-70.8,2200 "
         "for a southern latitude",
     )
-    sub.add_argument("--output", metavar="FILE", help="write the table (.ecsv, .parquet)")
+    sub.add_argument("--output", metavar="FILE", help="write the table (.ecsv, .parquet, .csv)")
 
 
 def run(options: argparse.Namespace) -> None:

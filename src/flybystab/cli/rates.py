@@ -58,7 +58,7 @@ def arguments(sub: argparse.ArgumentParser) -> None:
     sub.add_argument("--population", metavar="FILE", help="priors of the bodies, TOML, as for screen")
     sub.add_argument(
         "--output", metavar="FILE",
-        help="with --verdicts: figure (.png, .pdf, .svg) or table of the samples (.ecsv, .parquet); resumable",
+        help="with --verdicts: figure (.png, .pdf, .svg) or table of the samples (.ecsv, .parquet, .csv); resumable",
     )  # fmt: skip
 
 
@@ -120,17 +120,17 @@ def _verdicts(
     from flybystab.population.disruption import disruption_rates
     from flybystab.population.rates import encounter_rates
     from flybystab.screening.priors import Population
-    from flybystab.screening.results import FORMATS
+    from flybystab.screening.results import WRITTEN
     from flybystab.screening.table_files import check_output
 
     output = None if options.output is None else Path(options.output)
     figure = output is not None and output.suffix in FIGURES
     if output is not None and not figure:
-        if output.suffix not in FORMATS:
+        if output.suffix not in WRITTEN:
             raise InvalidInput(
-                "--output", str(output), f"a file that ends in {', '.join((*FIGURES, *FORMATS))}"
+                "--output", str(output), f"a file that ends in {', '.join((*FIGURES, *WRITTEN))}"
             )
-        check_output(output)
+        check_output(output, WRITTEN)
     result = disruption_rates(
         orbits,
         planets,

@@ -83,14 +83,14 @@ def run(options: argparse.Namespace) -> None:
 
     from flybystab.flybys.document import table_document
     from flybystab.screening.priors import Population
-    from flybystab.screening.results import read_results
+    from flybystab.screening.results import FORMATS, read_results
     from flybystab.screening.summary import summary
 
     if options.population_default:
         print(Population().toml(), end="")
         return
-    check_table(options.output)
-    check_table(options.samples_output)
+    check_table(options.output, FORMATS)  # the summary reads it
+    check_table(options.samples_output, FORMATS)
     output = Path(options.output)
     run_study(options, output, samples_output=options.samples_output, overwrite=options.overwrite)
     found = summary(output)

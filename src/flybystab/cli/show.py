@@ -1,10 +1,11 @@
-"""``flybystab show FILE``: summary and plot of a screening table."""
+"""``flybystab show FILE``: summary and plot of a screening table, or the same as CSV."""
 
 from __future__ import annotations
 
 import argparse
 
-from flybystab.cli.common import check_picture, figure_argument, show
+from flybystab.cli.common import check_picture, check_table, show
+from flybystab.plots.formats import FIGURES
 
 HELP = "summary and plot of a screening table"
 EXAMPLE = "flybystab show screening.ecsv --output screening.png"
@@ -13,7 +14,9 @@ EXAMPLE = "flybystab show screening.ecsv --output screening.png"
 def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     sub.add_argument("file", help="table written by flybystab screen")
-    figure_argument(sub)
+    sub.add_argument(
+        "--output", metavar="FILE", help=f"write a figure ({', '.join(FIGURES)}) or the table (.csv)"
+    )
 
 
 def run(options: argparse.Namespace) -> None:
@@ -22,9 +25,16 @@ def run(options: argparse.Namespace) -> None:
     from flybystab.plots.screening import results_figure
     from flybystab.screening.results import read_results
     from flybystab.screening.summary import summary
+    from flybystab.screening.tables import write_table
 
-    check_picture(options.output)
+    as_csv = str(options.output).endswith(".csv")
+    if as_csv:
+        check_table(options.output)
+    else:
+        check_picture(options.output)
     table = read_results(options.file)
-    if options.output:
+    if as_csv:
+        write_table(table, options.output)
+    elif options.output:
         results_figure(table, options.output)
     show(options, lambda: table_document(table), lambda: [summary(table).text()])

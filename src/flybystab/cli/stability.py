@@ -36,7 +36,7 @@ def arguments(sub: argparse.ArgumentParser) -> None:
     material_arguments(sub)
     body_arguments(sub)
     shape_arguments(sub)
-    sub.add_argument("--output", metavar="FILE", help="with --all: write the table (.ecsv, .parquet)")
+    sub.add_argument("--output", metavar="FILE", help="with --all: write the table (.ecsv, .parquet, .csv)")
 
 
 def run(options: argparse.Namespace) -> None:

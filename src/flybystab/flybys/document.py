@@ -20,7 +20,7 @@ from flybystab.flybys.grains_document import grains_document
 from flybystab.flybys.result import FlybyResult
 from flybystab.flybys.spin_sample import SpinSample
 from flybystab.flybys.verdict_margins import VerdictMargins
-from flybystab.tabular import with_unit
+from flybystab.saving import DOCUMENT_UNITS, with_unit
 
 
 def plain(value: Any, name: str = "") -> Any:
@@ -186,7 +186,8 @@ def table_document(table: QTable) -> dict[str, Any]:
         for name in table.colnames:
             value = row[name]
             if isinstance(value, u.Quantity):
-                out[with_unit(name, value.unit)] = value.value
+                unit = DOCUMENT_UNITS.get(name, value.unit)
+                out[with_unit(name, unit)] = value.to_value(unit)
             else:
                 out[f"{name}_tdb" if isinstance(value, Time) else name] = value
         rows.append(out)

@@ -17,7 +17,9 @@ from flybystab.errors import FlybystabError, InvalidInput, MissingExtra
 from flybystab.files import read_bytes
 from flybystab.saving import pyarrow
 
+#: Formats of tables that are read back, and all that tables are written in.
 FORMATS = (".ecsv", ".parquet")
+WRITTEN = (*FORMATS, ".csv")
 #: Largest ECSV file that is read, bytes: the reader needs several times as much memory.
 RESULT_LIMIT = 4 * 2**30
 

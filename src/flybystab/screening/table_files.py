@@ -1,4 +1,4 @@
-"""Tables as files, ECSV or Parquet, written row by row: memory does not grow with the number of rows.
+"""Tables as files, ECSV, Parquet or CSV, written row by row: memory does not grow with the number of rows.
 
 A table grows in a temporary file (``NAME.part``), in Parquet by row groups. When complete it is synchronised to
 disk and renamed, so that a file of the final name is always complete. The header of an ECSV file gives the number of
@@ -13,14 +13,15 @@ import os
 import shutil
 import stat
 import tempfile
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO, Protocol
 
 from flybystab.errors import InvalidInput, OutputFailed
+from flybystab.saving import DOCUMENT_UNITS, csv_cell, pyarrow, with_unit
 from flybystab.screening.journal import sync_file, sync_folder
-from flybystab.screening.results import FORMATS, Column, cell, empty_table, pyarrow
+from flybystab.screening.results import FORMATS, Column, cell, empty_table
 
 #: Rows of one Parquet row group.
 ROW_GROUP = 10_000
@@ -30,12 +31,10 @@ LEAST_SPACE = 64 * 2**20
 _ROWS = 999_999_999_999
 #: Longest suffix of a file beside the output.
 _LONGEST = ".journal"
-#: Text that starts with one of these is quoted: spreadsheets read it as a formula, ECSV readers as a comment (#).
-_QUOTED_START = ("=", "+", "-", "@", "#", " ", "\t")
 
 
-def check_output(path: str | Path) -> Path:
-    """The path, if a result can be written there.
+def check_output(path: str | Path, formats: tuple[str, ...] = FORMATS) -> Path:
+    """The path, if a result can be written there in one of the formats.
 
     Raises
     ------
@@ -48,8 +47,8 @@ def check_output(path: str | Path) -> Path:
     out = Path(path)
     if "\0" in str(path):
         raise InvalidInput("output", repr(str(path)), "a file name without null characters")
-    if out.suffix not in FORMATS:
-        raise InvalidInput("output", str(path), f"a file name that ends in {' or '.join(FORMATS)}")
+    if out.suffix not in formats:
+        raise InvalidInput("output", str(path), f"a file name that ends in {' or '.join(formats)}")
     try:
         longest = os.pathconf(out.parent, "PC_NAME_MAX") if hasattr(os, "pathconf") else 255
         if (size := len(os.fsencode(out.name + _LONGEST))) > longest:
@@ -97,7 +96,7 @@ class _Ecsv:
         self._count = 0
 
     def write(self, cells: list[Any]) -> None:
-        self._stream.write((",".join(map(_text, cells)) + "\n").encode())
+        self._stream.write((",".join(map(csv_cell, cells)) + "\n").encode())
         self._count += 1
 
     def close(self, *, finish: bool) -> None:
@@ -107,13 +106,27 @@ class _Ecsv:
             self._stream.write(f"{self._count:<{len(str(_ROWS))}d}".encode())
 
 
-def _text(value: Any) -> str:
-    """A cell of an ECSV file."""
-    if not isinstance(value, str):
-        return str(value)
-    if value.startswith(_QUOTED_START) or any(c in value for c in ',"\r\n'):
-        return '"' + value.replace('"', '""') + '"'
-    return value
+class _Csv:
+    """Plain CSV: the unit in the name of each column, no metadata."""
+
+    def __init__(self, stream: BinaryIO, columns: Mapping[str, Column], meta: Mapping[str, Any]) -> None:
+        units = {k: DOCUMENT_UNITS.get(k, c.unit) for k, c in columns.items() if c.unit is not None}
+        self._factors = {
+            i: columns[name].unit.to(unit)  # type: ignore[union-attr]
+            for i, name in enumerate(columns)
+            if (unit := units.get(name)) not in (None, columns[name].unit)
+        }
+        self._stream = stream
+        self._put([with_unit(name, units[name]) if name in units else name for name in columns])
+
+    def write(self, cells: list[Any]) -> None:
+        self._put([x * self._factors[i] if i in self._factors else x for i, x in enumerate(cells)])
+
+    def _put(self, cells: list[Any]) -> None:
+        self._stream.write((",".join(map(csv_cell, cells)) + "\n").encode())
+
+    def close(self, *, finish: bool) -> None:
+        pass
 
 
 class _Parquet:
@@ -164,7 +177,7 @@ class TableFile:
     Parameters
     ----------
     path : Path
-        Final name, ``.ecsv`` or ``.parquet``.
+        Final name, ``.ecsv``, ``.parquet`` or ``.csv``.
     columns : mapping of str to Column
     meta : mapping
         Provenance.
@@ -193,9 +206,9 @@ class TableFile:
         self._replaced = _identity(path) if replace else None
         self.part, self._stream = _new_file(path)
         self._inode = os.fstat(self._stream.fileno()).st_ino
-        made: type[_Ecsv] | type[_Parquet] = _Parquet if path.suffix == ".parquet" else _Ecsv
+        made: dict[str, Callable[..., _Format]] = {".csv": _Csv, ".parquet": _Parquet}
         try:
-            self._file: _Format = made(self._stream, columns, meta)
+            self._file: _Format = made.get(path.suffix, _Ecsv)(self._stream, columns, meta)
         except BaseException:
             self._remove()
             raise
@@ -295,7 +308,7 @@ def write_rows(
     *,
     replace: bool = True,
 ) -> int:
-    """Write rows from an iterator to an ECSV or Parquet file; returns their number."""
+    """Write rows from an iterator to an ECSV, Parquet or CSV file; returns their number."""
     with TableFile(path, columns, meta, replace=replace) as file:
         for row in rows:
             file.write(row)

@@ -1,4 +1,4 @@
-"""Tables of encounters as files: ECSV with vector columns, or Parquet with scalar columns."""
+"""Tables of encounters as files: ECSV with vector columns, Parquet or CSV with scalar columns."""
 
 from __future__ import annotations
 
@@ -11,15 +11,16 @@ from astropy.table import QTable
 from astropy.time import Time
 from astropy.units import Quantity
 
-from flybystab.screening.results import Column
+from flybystab.screening.results import WRITTEN, Column
 from flybystab.screening.table_files import check_output, write_rows, write_whole
 
 
 def write_table(table: QTable, path: str | Path) -> None:
     """Write a table in the format of its suffix, with units and provenance.
 
-    In Parquet a time becomes text (ISO, TDB) and a vector three columns ``name_x``, ``name_y``, ``name_z``;
-    :func:`flybystab.screening.results.read_results` reads both.
+    In Parquet and CSV a time becomes text (ISO, TDB) and a vector three columns ``name_x``, ``name_y``, ``name_z``;
+    :func:`flybystab.screening.results.read_results` reads ECSV and Parquet.
+    CSV has the unit in the name of each column and no provenance.
 
     Raises
     ------
@@ -28,7 +29,7 @@ def write_table(table: QTable, path: str | Path) -> None:
     MissingExtra
         A Parquet file without pyarrow.
     """
-    out = check_output(path)
+    out = check_output(path, WRITTEN)
     if out.suffix == ".ecsv":
         counted = table.copy(copy_data=False)
         counted.meta = {**table.meta, "rows": len(table)}
