@@ -11,6 +11,7 @@ from astropy.time import Time
 import flybystab as fs
 from flybystab.catalogues.catalogue import catalogue
 from flybystab.catalogues.objects import asteroids_of
+from flybystab.catalogues.readers.sbdb_answer import physical
 from flybystab.errors import InvalidInput
 
 with warnings.catch_warnings():
@@ -79,6 +80,15 @@ def test_physical_parameters_of_sbdb(sbdb):
     ra, dec = np.radians([291.421, 66.758])
     pole = [np.cos(dec) * np.cos(ra), np.cos(dec) * np.sin(ra), np.sin(dec)]
     np.testing.assert_allclose(a.pole, pole, atol=1e-5)
+
+
+def test_density_by_gm_and_extent():
+    """Ceres: GM 62.6284 km3/s2 and its extents give the 2.162 g/cm3 that JPL has."""
+    items = [{"name": "GM", "value": "62.6284"}, {"name": "extent", "value": "964.4 x 964.2 x 891.8"}]
+    assert float(physical(items, "x")["density_kg_m3"]) == pytest.approx(2162.0, rel=2e-3)
+    items[1] = {"name": "diameter", "value": "939.4"}
+    assert float(physical(items, "x")["density_kg_m3"]) == pytest.approx(2162.0, rel=2e-3)
+    assert "density_kg_m3" not in physical(items[:1], "x")
 
 
 def test_a_parameter_that_is_not_modelled(sbdb):

@@ -24,6 +24,7 @@ from flybystab.catalogues.readers.conversion import (
 )
 from flybystab.catalogues.readers.parameters import check_parameters
 from flybystab.catalogues.readers.sbdb import comet_orbit, thousandfold
+from flybystab.constants import G
 from flybystab.errors import InvalidInput
 from flybystab.files import parse_json
 
@@ -152,6 +153,12 @@ def physical(items: Sequence[Mapping[str, Any]], file: str) -> dict[str, str]:
         axes = sorted(extent, reverse=True)
         out |= {f"semi_axis_{c}_m": f"{500.0 * x:.10g}" for c, x in zip("abc", axes, strict=True)}
         out["semi_axes_source"] = source("extent")
+    size = "extent" if len(extent) == 3 else "diameter" if "diameter" in given else ""
+    if "GM" in given and "density" not in given and size:
+        cubed = np.prod(extent) if size == "extent" else number(given["diameter"]["value"], size, file) ** 3
+        # GM in km3/s2 and lengths in km: the factors 1e9 cancel.
+        density = number(given["GM"]["value"], "GM", file) / G / (np.pi / 6.0 * float(cubed))
+        out |= {"density_kg_m3": f"{density:.6g}", "density_source": f"{source('GM')}, with {size}"}
     pole = re.fullmatch(
         r"([-+.\d]+)\s*/\s*([-+.\d]+)", str((given.get("pole") or {}).get("value", "")).strip()
     )
