@@ -69,6 +69,7 @@ def _day(year: str, month: str, day: str, file: str) -> tuple[float, str]:
     whole, _, fraction = day.partition(".")
     try:
         midnight = date(int(year), int(month), 1).toordinal() + int(whole) - 1 + 1721424.5
+        float("0." + fraction)
     except ValueError:
         raise InvalidInput("date", f"{year} {month} {day}", f"a date in {file}") from None
     return midnight, "0." + (fraction or "0")

@@ -47,7 +47,7 @@ def read_ecsv(text: str, file: str) -> list[Entry]:
     from astropy.io import ascii as tables
 
     try:
-        table = tables.read(text, format="ecsv")
+        table = tables.read(text.splitlines(), format="ecsv")
     except (ValueError, TypeError, KeyError, tables.InconsistentTableError) as error:
         raise InvalidInput("catalogue file", file, f"a readable ECSV table ({error})") from None
     if "a_au" in table.colnames:

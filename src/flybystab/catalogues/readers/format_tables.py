@@ -95,7 +95,9 @@ def read_table(text: str, file: str) -> list[Entry]:
     lines = list(_lines(text))
     columns = _cells(lines[0])
     if "FORMAT" not in columns:  # OpenOrb reads tables without a header
-        kind = columns[1]
+        kind = columns[1] if len(columns) > 1 else ""
+        if kind not in FORMATS:
+            raise InvalidInput("FORMAT", kind, f"a header, or one of {', '.join(FORMATS)}, in {file}")
         columns = ["OID", "FORMAT", *FORMATS[kind][0], "H", "t_0", "INDEX", "N_PAR", "MOID", "COMPCODE"]
     else:
         lines = lines[1:]

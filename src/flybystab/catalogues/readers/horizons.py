@@ -188,6 +188,9 @@ def _elements(
         if all(c in cells for c in _KEPLERIAN) and number(cells["EC"], "EC", file) < 1.0
         else _COMETARY
     )
+    missing = [c for c in use if c not in cells]
+    if missing:
+        raise InvalidInput("elements", ", ".join(missing), f"a column of each of {', '.join(use)} in {file}")
     names = list(use.values())
     texts = [cells[c] for c in use]
     values = [number(t, c, file) for t, c in zip(texts, use, strict=True)]
@@ -269,7 +272,7 @@ def _nongravitational(header: str, file: str) -> dict[str, str]:
     )
     if block is None:
         return {}
-    pairs = {k: float(v.lower().replace("d", "e")) for k, v in _PAIR.findall(block[1]) if v != "n.a."}
+    pairs = {k: number(v, k, file) for k, v in _PAIR.findall(block[1]) if v != "n.a."}
     given = {k: v for k, v in pairs.items() if v != 0.0 and looks_like_parameter(k)}
     check_parameters("JPL", given, file)
     accelerations = {k: v for k, v in given.items() if k in ("A1", "A2", "A3")}

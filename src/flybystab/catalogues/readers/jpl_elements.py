@@ -91,6 +91,7 @@ def _perihelion(text: str, file: str) -> tuple[float, str]:
     whole, _, fraction = text.partition(".")
     try:
         midnight = date(int(whole[:-4]), int(whole[-4:-2]), int(whole[-2:])).toordinal() + 1721424.5
+        float("0." + fraction)
     except ValueError:
         raise InvalidInput("Tp", text, f"a date as yyyymmdd.ddddd in {file}") from None
     return midnight, "0." + (fraction or "0")

@@ -153,7 +153,7 @@ def _parameters(words: Mapping[str, Sequence[str]], name: str, file: str) -> dic
         A model or a parameter that is not modelled: an area-to-mass ratio, the outgassing of comets.
     """
     values = [number(v, "NGR", file) for v in words.get("NGR", [])]
-    model = words.get("LSP", ["1" if values else "0"])[0]
+    model = (words.get("LSP") or ["1" if values else "0"])[0]
     if model not in _PARAMETERS or (values and is_comet(name)):
         given = [f"model {model} of OrbFit, parameter {k + 1}" for k in range(max(len(values), 1))]
         check_parameters("OrbFit", given, file)

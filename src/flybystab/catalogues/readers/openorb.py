@@ -78,7 +78,7 @@ def _entry(line: str, tags: Sequence[int], names: Sequence[str], file: str) -> E
             midnight = date(int(cells[6]), int(cells[7]), 1).toordinal() + 1721423.5
         except (ValueError, IndexError):
             raise InvalidInput("epoch", " ".join(cells[6:9]), f"year, month and day in {file}") from None
-        jd, rest = midnight + number(cells[8], "epoch", file), cells[9:]
+        jd, rest = midnight + number("".join(cells[8:9]), "epoch", file), cells[9:]
     else:
         jd, rest = number(cells[6], "epoch", file) + MJD, cells[7:]
     offset = 0.0

@@ -60,7 +60,7 @@ def from_sbdb_answer(text: str, file: str) -> tuple[dict[str, str], Covariance |
         record: dict[str, Any] = parse_json(text, "orbit file", file)
         orbit, thing = record["orbit"], record["object"]
         elements = {item["name"]: item for item in orbit["elements"]}
-        model = {p["name"]: p for p in orbit.get("model_pars") or []}
+        model = {p["name"]: p for p in orbit.get("model_pars") or [] if p["value"] is not None}
         full, key = str(thing["fullname"]), str(thing["des"])
         orbit_class = (thing.get("orbit_class") or {}).get("code", "")
         row = _elements(orbit, elements, file)
@@ -112,6 +112,8 @@ def _elements(orbit: Mapping[str, Any], elements: Mapping[str, Any], file: str) 
     """Columns of the elements: a and M, or q and tp where these are lacking (parabolas)."""
     epoch = str(orbit["epoch"])
     if all((elements.get(c) or {}).get("value") not in (None, "") for c in ("a", "ma")):
+        for c in _COLUMNS:
+            number(elements[c]["value"], c, file)
         row = {mine: str(elements[c]["value"]) for c, mine in _COLUMNS.items()} | {"epoch_jd_tdb": epoch}
         row |= {
             f"sigma_{mine}": str(elements[c]["sigma"])
