@@ -5,6 +5,7 @@ python benchmarks/campaign.py extremes [N [SEED]]     the same at the ends of ev
 python benchmarks/campaign.py integrators [N [SEED]]  against the integrator that knows no events; 300, seed 2
 python benchmarks/campaign.py coverage [N [SEED]]     the error estimate against a run at 1e-11; 100 with flow of each
                                                       yield surface at dilatancy 0 and 1, seed 3
+python benchmarks/campaign.py verdicts [N [SEED]]     verdicts, bound mass fractions beyond the model; 20,000, seed 5
 
 `stress` and `integrators` draw semi-axes to 1 : 0.1 : 0.1, 1 m to 1000 km, 1000 to 4000 kg/m3, any spin up to 1.2 times
 the cohesionless limit of a sphere, any attitude; friction 0.1 to 60 deg, the four surfaces, dilatancy 0 to 1, cohesion
@@ -412,11 +413,36 @@ def coverage(n: int, seed: int, tolerance: float = 1e-8, tight: float = 1e-11) -
     return shares
 
 
+def verdicts(n: int, seed: int) -> Counter[str]:
+    """Verdicts of bodies in equilibrium, and what is known of those that leave the model."""
+    rng = np.random.default_rng(seed)
+    scenes = []
+    while len(scenes) < n:
+        scene = draw(rng)
+        if fs.equilibrium(scene[0]).admissible:
+            scenes.append(scene)
+    bodies, encounters, attitudes = (list(part) for part in zip(*scenes, strict=True))
+    start = time.process_time()
+    table = fs.flyby_many(bodies, encounters, attitudes)
+    took = time.process_time() - start
+    count = Counter(table.verdict.tolist())
+    print(f"{n} flybys of bodies in equilibrium, seed {seed}; {1e3 * took / n:.2f} ms of processor time each")
+    for name, number in count.most_common():
+        print(f"{name:18s} {number:6d}  {number / n:.2%}")
+    bound = table.bound_fraction[table.verdict == "BEYOND MODEL"]
+    print(f"bound mass fraction of the {len(bound)} bodies BEYOND MODEL:")
+    for least, most in ((0.0, 0.5), (0.5, 0.9), (0.9, 1.0 - 1e-6), (1.0 - 1e-6, 1.1)):
+        share = np.mean((bound > least) & (bound <= most) | ((least == 0.0) & (bound == 0.0)))
+        print(f"   {least:4.2g} to {min(most, 1.0):4.2g}  {share:6.1%}")
+    return count
+
+
 COMMANDS = {
     "stress": (stress, 1000, 1),
     "extremes": (extremes, 1000, 4),
     "integrators": (integrators, 300, 2),
     "coverage": (coverage, 100, 3),
+    "verdicts": (verdicts, 20_000, 5),
 }
 
 if __name__ == "__main__":

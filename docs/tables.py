@@ -48,6 +48,7 @@ TABLES = {
     "shapes_timing": "python benchmarks/shapes.py timing",
     "stability": "python benchmarks/stability.py",
     "stress": "python benchmarks/campaign.py stress",
+    "verdicts": "python benchmarks/campaign.py verdicts",
     "throughput": "python benchmarks/screen.py throughput",
     "tracks": "python benchmarks/encounters.py tracks",
 }

@@ -207,3 +207,18 @@ def test_required_friction_is_given_on_the_default_surface_and_the_compression_c
     assert "mohr-coulomb" in cone.other_surfaces()
     sphere = prolate.with_(semi_axes=[1000, 1000, 1000] * u.m)  # triaxial compression
     assert equilibrium(sphere).other_surfaces() == ""
+
+
+@pytest.mark.parametrize("offset", [1e-3, 1e-7, 1e-10])
+def test_lode_angle_keeps_its_digits_at_the_corners(offset):
+    """Near a sphere with spin the angle departs from 30 deg linearly with the difference of two axes."""
+    spin = 1e-3 * u.rad / u.s
+
+    def angle(stretch):
+        axes = [1000.0 * (1.0 + stretch), 1000.0, 1000.0 / (1.0 + stretch)]
+        spun = Body(axes * u.m, RHO, spin=[0, 0, 1] * spin)
+        return equilibrium(spun).lode_angle.value
+
+    found, slope = angle(offset), (angle(2e-5) - angle(1e-5)) / 1e-5
+    assert abs(slope) > 1.0
+    assert found == pytest.approx(angle(0.0) + slope * offset, abs=1e-3 * abs(slope) * offset + 1e-10)

@@ -432,3 +432,16 @@ def test_units_of_a_body():
     units = body_units(b)
     assert units.energy == pytest.approx(units.stress * units.length**3)
     assert b.mass.value == pytest.approx(MASS * b.rho * units.length**3)
+
+
+def test_barriers_on_both_surfaces_are_those_of_the_bodies_on_them():
+    b = Body([1400, 850, 750] * u.m, 2 * u.g / u.cm**3, 6 * u.h)
+    s = stability(b)
+    cone = stability(b.with_(material=b.material.with_(yield_surface="drucker-prager")))
+    assert s.barrier_by_surface == {
+        "mohr-coulomb": s.critical_energy.barrier,
+        "drucker-prager": cone.critical_energy.barrier,
+    }
+    assert f"{cone.critical_energy.barrier.value:.3g}" in s.other_surfaces()
+    assert s.other_surfaces(resolution=1.0) == ""
+    assert "mohr-coulomb" in cone.other_surfaces()

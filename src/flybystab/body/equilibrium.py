@@ -28,7 +28,6 @@ from flybystab.body.body import (
 from flybystab.constants import G
 from flybystab.core.ellipsoid.rigid_stress import demand, invariants, load_interval, overload, rigid_stress
 from flybystab.core.ellipsoid.tide import components, tensor
-from flybystab.core.material.yield_surface import lode_angle
 from flybystab.errors import InvalidInput
 from flybystab.tabular import Record
 from flybystab.typing import Array
@@ -178,7 +177,7 @@ def equilibrium(body: Body, tide: Quantity | None = None) -> Equilibrium:
     check_body(body)
     m = body.material
     c = stress_components(body, tide)
-    p, s, det = invariants(c)
+    p, s, _ = invariants(c)
     phi_required, cohesion = demand(m.surface_code, m.phi, m.c_pa, c)
     tension = float(np.linalg.eigvalsh(tensor(c))[-1])
     holds = tension <= m.t_pa
@@ -193,11 +192,21 @@ def equilibrium(body: Body, tide: Quantity | None = None) -> Equilibrium:
         required_friction_angle=required * u.deg,
         required_cohesion=cohesion * u.Pa,
         largest_tension=tension * u.Pa,
-        lode_angle=(np.rad2deg(lode_angle(det)) if s > 0.0 else np.nan) * u.deg,
+        lode_angle=(np.rad2deg(_lode_angle(c)) if s > 0.0 else np.nan) * u.deg,
         admissible=bool(holds and overload(m.surface_code, m.phi, m.c_pa, c) <= 0.0),
         margin=(np.rad2deg(m.phi) - required) * u.deg,
         in_tension=bool(p < 0.0),
     )
+
+
+def _lode_angle(c: Array) -> float:
+    """Lode angle, rad, from the principal stresses ``sigma_1 >= sigma_2 >= sigma_3`` of ``c[6]``.
+
+    ``tan(theta) = (2 sigma_2 - sigma_1 - sigma_3)/(sqrt3 (sigma_1 - sigma_3))`` keeps all digits at the corners, where
+    the arcsine of the determinant has half of them.
+    """
+    low, middle, high = np.linalg.eigvalsh(tensor(c))
+    return float(np.arctan2((middle - low) - (high - middle), np.sqrt(3.0) * (high - low)))
 
 
 def cohesion_for(material: Material, tension: float) -> float:

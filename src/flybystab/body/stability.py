@@ -36,7 +36,7 @@ import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
 
-from flybystab.body.body import Body, check_body, refuse_cut_off
+from flybystab.body.body import DEFAULT_SURFACE, Body, check_body, refuse_cut_off
 from flybystab.body.equilibrium import Equilibrium, equilibrium, spin_limits
 from flybystab.body.spin_state import SpinState, spin_state
 from flybystab.constants import G
@@ -176,8 +176,34 @@ class Stability(Record):
         return np.asarray(self.directions.second)
 
     @property
+    def barrier_by_surface(self) -> dict[str, Quantity]:
+        """Energy barrier, J, on the default yield surface and on the compression cone, by name."""
+        found = {}
+        for name in dict.fromkeys((DEFAULT_SURFACE, "drucker-prager")):
+            material = self.body.material
+            own = name == material.yield_surface
+            other = self.body.with_(material=material.with_(yield_surface=name))
+            found[name] = (
+                self if own else stability(other, dilatancy=self.dilatancy)
+            ).critical_energy.barrier
+        return found
+
+    def other_surfaces(self, resolution: float = 0.01) -> str:
+        """Barrier on the default surface or the compression cone where it differs from the body's, as text.
+
+        Empty where it does not, by more than `resolution` relative.
+        """
+        own = self.critical_energy.barrier.value
+        said = []
+        for name, energy in self.barrier_by_surface.items():
+            differs = not np.isclose(energy.value, own, rtol=resolution, atol=0.0)
+            if name != self.body.material.yield_surface and differs:
+                said.append(f"{name} {energy.value:.3g} J")
+        return ", ".join(said)
+
+    @property
     def verdict(self) -> str:
-        """The level in words."""
+        """Description of the level."""
         return LEVELS[self.level]
 
     def __repr__(self) -> str:

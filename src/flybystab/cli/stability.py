@@ -150,6 +150,8 @@ def _asteroid(options: argparse.Namespace) -> None:
             f"small perturbations       {'stable' if s.stable_infinitesimal else 'not stable'}",
             f"critical strain           {s.critical_strain.second:.3g} (second order), "
             f"{s.critical_strain.third:.3g} (third), {s.critical_strain.barrier:.3g} (barrier)",
+            f"energy barrier            {s.critical_energy.barrier.to_value(u.J):.3g} J"
+            + (f" ({other})" if (other := s.other_surfaces()) else ""),
             f"admissible spin periods   {_period_range(limits)}",
             *([] if surface is None else [f"slopes at rest            {slopes_text(surface)}"]),
             *(
