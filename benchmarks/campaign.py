@@ -5,7 +5,7 @@ python benchmarks/campaign.py extremes [N [SEED]]     the same at the ends of ev
 python benchmarks/campaign.py integrators [N [SEED]]  against the integrator that knows no events; 300, seed 2
 python benchmarks/campaign.py coverage [N [SEED]]     the error estimate against a run at 1e-11; 100 with flow of each
                                                       yield surface at dilatancy 0 and 1, seed 3
-python benchmarks/campaign.py verdicts [N [SEED]]     verdicts, bound mass fractions beyond the model; 20,000, seed 5
+python benchmarks/campaign.py verdicts [N [SEED]]     verdicts, bound mass fractions beyond the model; 5000, seed 5
 
 `stress` and `integrators` draw semi-axes to 1 : 0.1 : 0.1, 1 m to 1000 km, 1000 to 4000 kg/m3, any spin up to 1.2 times
 the cohesionless limit of a sphere, any attitude; friction 0.1 to 60 deg, the four surfaces, dilatancy 0 to 1, cohesion
@@ -442,7 +442,7 @@ COMMANDS = {
     "extremes": (extremes, 1000, 4),
     "integrators": (integrators, 300, 2),
     "coverage": (coverage, 100, 3),
-    "verdicts": (verdicts, 20_000, 5),
+    "verdicts": (verdicts, 5000, 5),
 }
 
 if __name__ == "__main__":
