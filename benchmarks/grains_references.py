@@ -60,8 +60,8 @@ def inside(values: np.ndarray, others: np.ndarray, slack: float) -> bool:
     )
 
 
-def flybys(seeds: int, grains: int, first: int = 0) -> None:
-    """Every flyby of the reference data, from the case number `first` on."""
+def flybys(seeds: int, grains: int, first: int = 0, cases: int | None = None) -> None:
+    """Every flyby of the reference data, or `cases` of them from the number `first` on."""
     known: dict[Case, list[tuple[float, float, float]]] = defaultdict(list)
     with REFERENCE.open() as file:
         for r in csv.DictReader(file):
@@ -74,7 +74,8 @@ def flybys(seeds: int, grains: int, first: int = 0) -> None:
     )
     print("beta     q v_inf    P phase   largest clump                          classes       stretch")
     counts = np.zeros(5, int)
-    for case in sorted(known, key=lambda c: (c.beta, c.v_inf, -c.period, c.phase, c.q))[first:]:
+    ordered = sorted(known, key=lambda c: (c.beta, c.v_inf, -c.period, c.phase, c.q))
+    for case in ordered[first : None if cases is None else first + cases]:
         runs = [run_of(case, seed, grains) for seed in range(seeds)]
         clump = np.array([r.largest_fraction for r in runs])
         stretch = np.array([r.stretch for r in runs])
@@ -230,9 +231,10 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--seeds", type=int)
     parser.add_argument("--grains", type=int)
     parser.add_argument("--first", type=int, default=0, help="first case of the flybys (0)")
+    parser.add_argument("--cases", type=int, help="number of cases of the flybys (all 66)")
     options = parser.parse_args(arguments)
     command, seeds, grains = commands[options.what]
-    more = {"first": options.first} if options.what == "flybys" else {}
+    more = {"first": options.first, "cases": options.cases} if options.what == "flybys" else {}
     command(options.seeds or seeds, options.grains or grains, **more)
 
 

@@ -17,6 +17,7 @@ TABLES = {
     "flyby": "flybystab bench flyby --output docs/images/precision.png",
     "forecast": "python examples/apophis_forecast.py",
     "grains": "python benchmarks/piles.py grains",
+    "grains_flybys": "python benchmarks/grains_references.py flybys --cases 26",
     "honesty": "python benchmarks/honesty.py scripted --encounters 300",
     "honesty_real": "python benchmarks/honesty.py real --every 4",
     "integrators": "python benchmarks/campaign.py integrators",

@@ -11,7 +11,7 @@ from flybystab.body.grain_sizes import GrainSizes, grain_sizes
 from flybystab.body.pile import Pile, make_pile
 from flybystab.body.shape import Shape
 from flybystab.core.grains.clumps import moments, semi_axes, spin_of
-from flybystab.errors import InvalidInput, UnitMismatch, UnknownName, UnsettledBody
+from flybystab.errors import InvalidInput, NotModelled, UnitMismatch, UnknownName, UnsettledBody
 
 
 @pytest.fixture(autouse=True)
@@ -113,6 +113,8 @@ def test_bad_input_is_refused():
         make_pile(body(), 10**9)
     with pytest.raises(InvalidInput, match="times the central pressure"):
         make_pile(body(material=Material(cohesion=10 * u.MPa)), 100)
+    with pytest.raises(NotModelled, match="a pile of grains does not model a tension cut-off"):
+        make_pile(body(material=Material(cohesion=10 * u.Pa, tensile_strength=1 * u.Pa)), 100)
     with pytest.raises(InvalidInput, match="brittle"):
         make_pile(body(material=Material(cohesion=10 * u.Pa, brittle=True)), 100)
     with pytest.raises(InvalidInput, match="friction_angle"):

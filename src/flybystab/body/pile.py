@@ -16,7 +16,7 @@ import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
 
-from flybystab.body.body import Body, Material, check_settled
+from flybystab.body.body import Body, Material, check_settled, refuse_cut_off
 from flybystab.body.grain_calibration import Friction, contact_cohesion, contact_friction
 from flybystab.body.grain_sizes import GrainSizes, grain_sizes
 from flybystab.body.packing import settled_pile, simulation_of
@@ -163,8 +163,9 @@ def checked_number(grains: int) -> int:
 
 
 def check_grains(body: Body, grains: int) -> None:
-    """Refuse a number of grains, or a body, for which no pile is made."""
+    """Refuse a number of grains, or a body, of which no pile is made."""
     checked_number(grains)
+    refuse_cut_off(body.material, "a pile of grains")
     friction = contact_friction(body.material.phi)
     contact_cohesion(body.material.c_pa, friction, _central_pressure(body))
     if body.material.brittle and body.material.c_pa > 0.0:
