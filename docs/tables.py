@@ -18,6 +18,7 @@ TABLES = {
     "forecast": "python examples/apophis_forecast.py",
     "grains": "python benchmarks/piles.py grains",
     "grains_flybys": "python benchmarks/grains_references.py flybys --cases 26",
+    "grains_map": "python benchmarks/grains_ellipsoid.py map --grains 150",
     "honesty": "python benchmarks/honesty.py scripted --encounters 300",
     "honesty_real": "python benchmarks/honesty.py real --every 4",
     "integrators": "python benchmarks/campaign.py integrators",
