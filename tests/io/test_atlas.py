@@ -65,10 +65,10 @@ def test_the_list_is_complete_without_scripts(site, results):
 
 def test_downloads_hold_the_table(site, results):
     rows = json.loads((site / "encounters.json").read_text())["rows"]
-    assert [r["distance_AU"] for r in rows] == results["distance"].to_value(u.au).tolist()
+    assert [r["distance_km"] for r in rows] == results["distance"].to_value(u.km).tolist()
     with (site / "encounters.csv").open(newline="") as file:
         listed = list(csv.DictReader(file))
-    assert [float(r["distance_AU"]) for r in listed] == results["distance"].to_value(u.au).tolist()
+    assert [float(r["distance_km"]) for r in listed] == results["distance"].to_value(u.km).tolist()
     again = read_results(site / "encounters.ecsv")
     assert np.array_equal(again["jd_tdb"], results["jd_tdb"])
     (one,) = (site / "encounters").glob("*apophis*.json")
