@@ -1,6 +1,6 @@
 """What digits and U of a catalogue say of its orbits, held against later and better orbits, as tables.
 
-Usage: ``python benchmarks/orbit_errors.py [runoff] [digits] [impacts]``. Reference data are read from
+Usage: ``python benchmarks/orbit_errors.py [runoff] [digits] [impacts] [model]``. Reference data are read from
 ``../shared/data`` (or ``$FLYBYSTAB_SHARED/data``); nothing is downloaded.
 """
 
@@ -28,6 +28,7 @@ from flybystab.orbit.orbit import Orbit, later, seconds
 from flybystab.orbit.predictability import deviations_of
 from flybystab.orbit.search.acceleration import field
 from flybystab.orbit.search.dop853 import empty_room
+from flybystab.orbit.search.encounter_finder import find_encounters
 from flybystab.orbit.search.neighbours import carry, spread
 from flybystab.screening.draws import identity
 
@@ -178,9 +179,45 @@ def impacts() -> list[str]:
     return out
 
 
+def model() -> list[str]:
+    """Closest approaches of 400 asteroids with DE421 and DE440: how far apart they are, by the time from the epoch."""
+    asteroids = list(catalogue(DATA / f"{NEW}.csv.gz"))
+    orbits = [asteroids[i].orbit for i in np.random.default_rng(1).permutation(len(asteroids))[:400]]
+    span = Time("1950-01-01", scale="tdb"), Time("2049-01-01", scale="tdb")
+    ours, other = (
+        find_encounters(orbits, *span, within=0.05 * u.au, ephemeris=name, growth=True)
+        for name in ("de440", "de421")
+    )
+    found = []
+    for row in ours:
+        if row["model_error"].to_value(u.km) > 5.0:  # beyond an earlier passage
+            continue
+        near = other[other["index"] == row["index"]]
+        late = np.abs((near["time"] - row["time"]).to_value(u.s))
+        if not len(near) or late.min() > 3.0 * 86400.0:
+            continue
+        beside = near[int(np.argmin(late))]
+        gap = np.linalg.norm((beside["position"] - row["position"]).to_value(u.km))
+        along = late.min() * row["v_rel"].to_value(u.km / u.s)
+        epoch = orbits[int(row["index"])].epoch
+        found.append((abs((row["time"] - epoch).to_value(u.yr)), np.hypot(gap, along)))
+    years, gaps = np.array(found).T
+    out = [
+        "Closest approaches with DE421 and DE440: distance of the asteroids, km",
+        "  years   rows   median     68 %     95 %",
+    ]
+    for low, high in ((0, 5), (5, 10), (10, 20), (20, 40), (40, 80)):
+        here = gaps[(years >= low) & (years < high)]
+        out.append(
+            f"{low:3d}-{high:<3d} {here.size:6d} "
+            + " ".join(f"{x:8.3g}" for x in np.percentile(here, [50, 68, 95]))
+        )
+    return out
+
+
 def main(arguments: list[str]) -> int:
     """Print the tables that were asked for, by default all."""
-    known = {"runoff": runoff, "digits": digits, "impacts": impacts}
+    known = {"runoff": runoff, "digits": digits, "impacts": impacts, "model": model}
     for name in arguments or list(known):
         if name not in known:
             print(f"no table {name!r}: there are {', '.join(known)}", file=sys.stderr)

@@ -22,7 +22,7 @@ from flybystab.typing import Array
 
 #: Error of the model before any encounter, m: the median against JPL's approaches of 2020 (``flybystab bench sky``),
 #: and the time, s, after which it grows in proportion: passages with DE421 and DE440 are 0.2 km apart after 0 to 5 yr,
-#: 0.5 km after 5 to 10, 0.7 km after 10 to 20, 1.2 km after 20 to 40 and 3.3 km after 40 to 80 yr (medians;
+#: 0.5 km after 5 to 10, 0.8 km after 10 to 20, 1.4 km after 20 to 40 and 3.2 km after 40 to 80 yr (medians;
 #: ``python benchmarks/orbit_errors.py model``).
 MODEL_ERROR, _MODEL_TIME = 100.0, 2.0 * YEAR
 #: Shift of an orbit without a covariance, m; the result is scaled to one metre. Rounding is far smaller.
