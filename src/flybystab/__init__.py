@@ -105,6 +105,7 @@ _HOME = {
     "surface_change": "flybys.surface_change",
     "surface_history": "flybys.surface_history",
     "survival": "flybys.survival",
+    "virtual_impactors": "encounter.virtual_impactors",
     "target_map": "flybys.outcome_map",
 }
 
@@ -129,6 +130,7 @@ if TYPE_CHECKING:
     from flybystab.encounter.distribution import EncounterDistribution, encounter_distribution
     from flybystab.encounter.encounter import Encounter
     from flybystab.encounter.linear_target_plane import LinearPlane
+    from flybystab.encounter.virtual_impactors import virtual_impactors
     from flybystab.errors import FlybystabError
     from flybystab.flybys.binary import BinarySample, binary_flyby
     from flybystab.flybys.critical import CriticalValues, critical

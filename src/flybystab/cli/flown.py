@@ -61,6 +61,7 @@ def flown(options: argparse.Namespace) -> tuple[Any, Any, Any]:
         table = find_encounters(
             asteroid, tdb(SPAN[0], "start"), tdb(SPAN[1], "stop"), planets=[options.planet]
         )
+        table = table[table["planet"] != "sun"]
         if len(table) == 0:
             raise NoEncounter(
                 f"{asteroid.label} has no encounter with {options.planet} within 0.05 au between {SPAN[0]} and "

@@ -184,6 +184,7 @@ def encounter_distribution(
         tolerance=tolerance,
         workers=workers,
     )
+    table = table[table["planet"] == body.name]
     if not len(table):
         raise NoEncounter(
             f"{path.name or 'the orbit'} has no minimum of distance to {body.name} within "
@@ -236,7 +237,7 @@ def distributions(
     clones = path.clones(n, seed, ephemeris)
     points = [o for pair in path.sigma_points(ephemeris) for o in pair]
     bodies = list(dict.fromkeys(np.asarray(table["planet"]).tolist()))
-    far = [far_enough(planet(b)) if within is None else within.to_value(u.m) for b in bodies]
+    far = [far_enough(planet(b)) or 1.0 if within is None else within.to_value(u.m) for b in bodies]
     found = find_encounters(
         [*clones, *points],
         later(table["time"].min(), -reach),

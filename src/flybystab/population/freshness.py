@@ -125,6 +125,7 @@ def freshness(
     names = list(distances)
     limits = [to_si(distances[n], u.m, f"distances[{n!r}]", low=0.0, open_low=True) for n in names]
     table = find_encounters(asteroid, end - years * u.yr, end, planets=names, within=np.array(limits) * u.m)
+    table = table[table["planet"] != "sun"]
     ages = (end - table["time"]).to_value(u.yr) if len(table) else np.zeros(0)
     rates = [
         float(encounter_rates([asteroid], n, periapsis=q * u.m).rate[0].to_value(1 / u.yr))

@@ -139,6 +139,7 @@ def passages(asteroid: Asteroid, settings: Settings) -> list[Passage]:
             float(row["v_inf"].to_value(u.m / u.s)),
         )
         for row in table
+        if row["planet"] != "sun"
     ]
     return sorted(found, key=lambda p: (p.time.tdb.jd, p.planet))
 

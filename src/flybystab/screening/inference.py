@@ -210,6 +210,7 @@ def survived(
         The span reaches beyond the ephemeris.
     """
     table = find_encounters(asteroid, start, stop, planets=list(planets), within=within)
+    table = table[table["planet"] != "sun"]
     return [Encounter.from_orbit(asteroid.orbit, str(row["planet"]), row["time"]) for row in table]
 
 

@@ -7,9 +7,10 @@ from astropy.time import Time
 from reference import need_ephemeris
 
 import flybystab as fs
-from flybystab.constants import DAY
+from flybystab.constants import AU, DAY
 from flybystab.errors import Impact
-from flybystab.orbit.orbit import Orbit, later
+from flybystab.orbit.orbit import Orbit, later, seconds
+from flybystab.orbit.planets import PLANETS
 from flybystab.orbit.search.encounter_finder import find_encounters
 
 SPAN = Time("2020-01-01", scale="tdb"), Time("2040-01-01", scale="tdb")
@@ -69,3 +70,20 @@ def test_nothing_is_found_beyond_an_impact(sign):
     assert [one["asteroid"] for one in table.meta["failed"]] == ["0"]
     hit = find_encounters(down, *sorted([epoch, later(epoch, sign * 3 * DAY)]), ephemeris="de421")
     assert list(hit["impact"]) == [True]
+
+
+def test_a_fall_into_the_sun_is_a_row():
+    """Free fall from 1 au to 1 solar radius takes pi/2 sqrt(r^3 / 2 GM) less the last 0.6 h."""
+    need_ephemeris("de421")
+    epoch = Time("2020-01-01", scale="tdb")
+    falling = Orbit.from_state(epoch, [1.0, 0.0, 0.0] * u.au, [0.0, 0.5, 0.0] * u.km / u.s)
+    table = find_encounters(falling, epoch, later(epoch, 100.0 * DAY), ephemeris="de421")
+    assert list(table["planet"]) == ["sun"]
+    assert list(table["impact"]) == [True]
+    fall = 0.5 * np.pi * np.sqrt(AU**3 / (2.0 * PLANETS["sun"].gm))
+    assert seconds(table["time"][0], epoch) == pytest.approx(fall, rel=2e-3)
+    quiet = Orbit.from_state(epoch, [1.0, 0.0, 0.0] * u.au, [0.0, 10.0, 0.0] * u.km / u.s)
+    rows = find_encounters(
+        quiet, epoch, later(epoch, 300.0 * DAY), ["mercury", "sun"], 0.01 * u.au, ephemeris="de421"
+    )
+    assert "sun" not in rows["planet"]  # perihelion at 0.06 au

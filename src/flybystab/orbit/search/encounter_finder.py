@@ -23,7 +23,7 @@ from flybystab.constants import DAY, YEAR
 from flybystab.core.numerics.threads import in_order, worker_count
 from flybystab.errors import Impact, InvalidInput, NotConverged
 from flybystab.orbit.almanac import GRID, N_FAST, N_SLOW, SLOT
-from flybystab.orbit.ephemeris import BELT, BODIES, N_BODIES, Ephemeris, Window
+from flybystab.orbit.ephemeris import BELT, BODIES, N_BODIES, SUN, Ephemeris, Window
 from flybystab.orbit.forces import FORCES
 from flybystab.orbit.observatories import geographic
 from flybystab.orbit.orbit import (
@@ -92,7 +92,7 @@ def find_encounters(
         Span of the search. A passage within 1 s of an end counts at `start` and not at `stop`, so that spans side
         by side have each passage once.
     planets : sequence of str
-        Bodies to look for: planets and ``"moon"``.
+        Planets and ``"moon"``. Impacts on the Sun are always included (``planet`` is ``"sun"``).
     within : Quantity
         Largest distance between the centres; one value or one per planet.
     ephemeris : str or Ephemeris, optional
@@ -155,9 +155,6 @@ def find_encounters(
     if not names:
         raise InvalidInput("planets", planets, "at least one")
     found = [planet(n) for n in names]
-    for body in found:
-        if body.name == "sun":
-            raise InvalidInput("planets", body.name, f"one of {', '.join(BODIES[1:])}")
     reach = to_si(within, u.m, "within", shape=None, low=0.0, open_low=True)
     if reach.shape not in ((), (1,), (len(found),)):
         raise InvalidInput("within", within, "one distance, or one per planet")
@@ -191,6 +188,7 @@ def find_encounters(
     everything = field(window, [n for n in chosen if n != "non-gravitational"])
     limits = np.zeros(len(BODIES))
     limits[[BODIES.index(b.name) for b in found]] = reach
+    limits[SUN] = 0.0  # a perihelion is no encounter
     floors = np.array([PLANETS[name].impact_distance for name in BODIES])
     always = np.zeros(N_FAST + N_SLOW, dtype=bool)
     for name in ("sun", *(b.name for b in found)):
@@ -270,7 +268,8 @@ def find_encounters(
             raise hit
         failed[i] = {"asteroid": rows[i][0], "why": str(hit)}
     raw = raw[_in_span(raw, t_start, t_stop)]
-    asked = np.isin(raw[:, 0], [BODIES.index(b.name) for b in found])
+    # A fall into the Sun ends an orbit for good and is always a row.
+    asked = np.isin(raw[:, 0], [SUN, *(BODIES.index(b.name) for b in found)])
     elsewhere = [
         {"asteroid": rows[int(r[11])][0], "planet": BODIES[int(r[0])], "time_jd_tdb": later(middle, r[1]).jd}
         for r in raw[~asked]

@@ -1,0 +1,260 @@
+"""Virtual impactors: search for possible impacts along the line of variations.
+
+Orbits at equal distances along the direction of largest uncertainty (Milani et al. 2005) are integrated over a span.
+Encounters of consecutive orbits at nearly the same time belong together, and each minimum of the distance along the
+line is refined. Around it the target-plane coordinates b are linear in the standard normal variables z of the
+covariance, ``b = b0 + M (z - z0)``, so that b is normal with mean ``b0 - M z0`` and covariance ``M M^T``. The impact
+probability is that of the disc from which the planet is hit. Probabilities far below one over the number of orbits are
+within reach.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import astropy.units as u
+import numpy as np
+from astropy.table import QTable
+from astropy.time import Time
+from astropy.units import Quantity
+
+from flybystab.constants import DAY
+from flybystab.encounter.linear_target_plane import disc_probability
+from flybystab.errors import InvalidInput
+from flybystab.orbit.covariance import Covariance
+from flybystab.orbit.ephemeris import Ephemeris
+from flybystab.orbit.orbit import Orbit, _ephemeris, deviated, later, seconds
+from flybystab.orbit.planets import Planet, planet
+from flybystab.orbit.search.encounter_finder import find_encounters
+from flybystab.orbit.target_plane import capture_radius
+from flybystab.typing import Array
+from flybystab.units import checked_time, to_si, whole
+
+#: Encounters of consecutive orbits belong together if they are less than this apart, s.
+_TOGETHER = 10.0 * DAY
+#: Orbits of a refinement, and how often it is repeated at most.
+_GRID, _ROUNDS = 9, 14
+#: Deviations for the direction of the line, in standard deviations.
+_SMALL = 1e-2
+#: Displacement on the target plane of the differences for M, over the radius of the disc.
+_STEP = 0.2
+
+
+class _Line:
+    """Orbits of standard normal variables z, and their encounters with one planet."""
+
+    def __init__(self, orbit: Orbit, body: Planet, eph: str | Ephemeris | None, workers: int | None) -> None:
+        covariance = orbit.covariance
+        if not isinstance(covariance, Covariance):
+            raise InvalidInput(
+                "covariance", covariance, "a Covariance: the line of variations is that of one"
+            )
+        self.covariance, self.body, self.eph, self.workers = covariance, body, eph, workers
+        nothing = np.zeros((1, 6)), np.zeros((1, 3))
+        self.orbit = deviated(orbit, covariance.epoch, *nothing, "there", eph)[0]
+
+    def weak_direction(self, time: Time) -> Array:
+        """Direction of largest uncertainty of the position at `time`, a unit vector of the standard normal variables.
+
+        Small deviations along the principal axes of the covariance are integrated with all forces.
+        """
+        covariance = self.covariance
+        t = seconds(time, covariance.epoch)
+        window = _ephemeris(self.eph).window(covariance.epoch, min(t, 0.0), max(t, 0.0))
+        ends = []
+        for step in (_SMALL, -_SMALL):
+            found = covariance.deviations(covariance.values + step * covariance.factor.T)
+            orbits = deviated(self.orbit, covariance.epoch, *found, "variation", self.eph)
+            ends.append(np.array([o.flight(window).to(t)[:3] for o in orbits]))
+        return np.asarray(np.linalg.svd(ends[0] - ends[1])[0][:, 0])
+
+    def encounters(self, z: Array, start: Time, stop: Time, within: float) -> QTable:
+        """Encounters of the orbits of z, shape (m, n)."""
+        parameters = self.covariance.values + z @ self.covariance.factor.T
+        if not self.covariance._possible(parameters).all():
+            raise InvalidInput("sigmas", "an orbit that is not a conic", "a shorter line of variations")
+        found = self.covariance.deviations(parameters)
+        orbits = deviated(self.orbit, self.covariance.epoch, *found, "variation", self.eph)
+        table = find_encounters(
+            orbits, start, stop, [self.body.name], within * u.m, ephemeris=self.eph, workers=self.workers
+        )
+        return table[table["planet"] == self.body.name]
+
+    def near(self, z: Array, time: Time, within: float) -> Array:
+        """Time (s from `time`), distance (m), b (m), v_inf (m/s) of the encounter nearest to a time; nan without."""
+        table = self.encounters(z, later(time, -_TOGETHER), later(time, _TOGETHER), within)
+        out = np.full((len(z), 5), np.nan)
+        late = np.array([seconds(t, time) for t in table["time"]])
+        for row in np.argsort(-np.abs(late)):
+            one = table[row]
+            place = [one[k].to_value(u.m) for k in ("distance", "b_t", "b_r")]
+            out[one["index"]] = late[row], *place, one["v_inf"].to_value(u.m / u.s)
+        return out
+
+
+def virtual_impactors(
+    orbit: Any,
+    start: Time,
+    stop: Time,
+    planet: str | Planet = "earth",
+    *,
+    n: int = 1001,
+    sigmas: float = 5.0,
+    within: Quantity = 0.1 * u.au,
+    least: float = 1e-12,
+    ephemeris: str | Ephemeris | None = None,
+    workers: int | None = None,
+) -> QTable:
+    """Possible impacts of an uncertain orbit, by a search along its line of variations.
+
+    Parameters
+    ----------
+    orbit : Orbit
+        Or an object with an attribute ``orbit``; with a covariance.
+    start, stop : Time
+        Span of the search.
+    planet : str or Planet
+    n : int
+        Number of orbits on the line.
+    sigmas : float
+        Half length of the line, in standard deviations.
+    within : Quantity
+        Largest distance of an encounter that is considered.
+    least : float
+        Smallest impact probability that is listed.
+    ephemeris, workers
+        As of :func:`flybystab.find_encounters`.
+
+    Returns
+    -------
+    QTable
+        A row for each possible impact, in order of time: ``time`` (TDB) and ``distance`` (km; two-body, without a
+        surface) of the closest orbit on the line, ``sigma`` (its position on the line), ``stretching`` (km of the
+        target plane for one sigma along the line), ``width`` (km, standard deviation across it), ``probability``.
+        Impacts whose part of the line is shorter than the distance of two orbits can be missed.
+
+    Raises
+    ------
+    InvalidInput
+        No covariance, or the line leaves the conics.
+    OutOfSpan, UnitMismatch, UnknownName
+    """
+    path = getattr(orbit, "orbit", orbit)
+    if not isinstance(path, Orbit):
+        raise InvalidInput("orbit", orbit, "an Orbit, or an object with one as its attribute 'orbit'")
+    for name, value in (("start", start), ("stop", stop)):
+        checked_time(value, name)
+    body, count = _body(planet), whole(n, "n", 3)
+    reach = to_si(within, u.m, "within", low=0.0, open_low=True)
+    if not 0.0 < float(sigmas) <= 10.0:
+        raise InvalidInput("sigmas", sigmas, "a number in (0, 10]")
+    line = _Line(path, body, ephemeris, workers)
+    way = line.weak_direction(stop)
+    grid = np.linspace(-float(sigmas), float(sigmas), count)
+    table = line.encounters(grid[:, None] * way, start, stop, reach)
+    rows = [
+        found
+        for k, time in _minima(table, count)
+        if (found := _impact(line, way, float(grid[k]), float(grid[1] - grid[0]), time, reach)) is not None
+    ]
+    rows = sorted(
+        (r for r in _distinct(rows) if r["probability"] >= least), key=lambda r: float(r["time"].tdb.jd)
+    )
+    out = QTable()
+    out["time"] = Time([r["time"].tdb.jd for r in rows], format="jd", scale="tdb")
+    for name, unit in (("distance", u.km), ("sigma", None), ("stretching", u.km), ("width", u.km)):
+        values = np.array([r[name] for r in rows], dtype=float)
+        out[name] = values if unit is None else (values * u.m).to(unit)
+    out["probability"] = np.array([r["probability"] for r in rows], dtype=float)
+    out.meta = {
+        "planet": body.name,
+        "orbits": count,
+        "sigmas": float(sigmas),
+        "source": line.covariance.source,
+    }
+    return out
+
+
+def _minima(table: QTable, count: int) -> list[tuple[int, Time]]:
+    """Orbits (number, time) at a local minimum of distance among the encounters that belong together.
+
+    Minima from which the distance rises so slowly that zero is out of reach between two orbits are left out.
+    """
+    if not len(table):
+        return []
+    zero = table["time"][0]
+    t = (table["time"] - zero).to_value(u.s)
+    d, index = table["distance"].to_value(u.m), np.asarray(table["index"])
+    rows_of = [np.flatnonzero(index == k) for k in range(count)]
+    found = []
+    for row in range(len(table)):
+        beside = []
+        for k in (index[row] - 1, index[row] + 1):
+            rows = rows_of[k] if 0 <= k < count else np.zeros(0, dtype=int)
+            near = rows[np.abs(t[rows] - t[row]) < _TOGETHER]
+            if near.size:
+                beside.append(float(d[near[np.argmin(np.abs(t[near] - t[row]))]]))
+        if beside and (d[row] > min(beside) or d[row] > 1e9 + 2.0 * max(abs(x - d[row]) for x in beside)):
+            continue
+        found.append((int(index[row]), later(zero, float(t[row]))))
+    return found
+
+
+def _impact(
+    line: _Line, way: Array, sigma: float, spacing: float, time: Time, reach: float
+) -> dict[str, Any] | None:
+    """The possible impact around a minimum of distance along the line; None where the encounter is lost."""
+    half = spacing
+    best = np.full(5, np.nan)
+    for _ in range(_ROUNDS):
+        some = sigma + half * np.linspace(-1.0, 1.0, _GRID)
+        found = line.near(some[:, None] * way, time, reach)
+        if not np.isfinite(found[:, 1]).any():
+            return None
+        k = int(np.nanargmin(found[:, 1]))
+        sigma, best = float(some[k]), found[k]
+        beside = found[max(k - 1, 0) : k + 2, 1]
+        if np.isfinite(beside).all() and np.ptp(beside) < 1e-3 * line.body.radius:
+            break
+        half *= 2.0 / (_GRID - 1)
+    if not np.isfinite(best).all():
+        return None
+    disc = float(capture_radius(line.body.gm, line.body.impact_distance, best[4]))
+    z0 = sigma * way
+    size = len(z0)
+    h = np.full(size, 1e-5)
+    for _ in range(2):  # steps that displace the encounter by a part of the disc
+        steps = np.diag(h)
+        found = line.near(np.concatenate([z0 + steps, z0 - steps]), time, reach)[:, 2:4]
+        if not np.isfinite(found).all():
+            return None
+        matrix = ((found[:size] - found[size:]) / (2.0 * h[:, None])).T
+        h = np.clip(_STEP * disc / np.maximum(np.linalg.norm(matrix, axis=0), 1e-30), 1e-9, 0.3)
+    along = matrix @ way
+    covariance = matrix @ matrix.T
+    stretch = float(np.linalg.norm(along))
+    across = np.array([-along[1], along[0]]) / stretch
+    return {
+        "time": later(time, float(best[0])),
+        "distance": float(best[1]),
+        "sigma": sigma,
+        "stretching": stretch,
+        "width": float(np.sqrt(across @ covariance @ across)),
+        "probability": disc_probability(best[2:4] - matrix @ z0, covariance, disc),
+    }
+
+
+def _distinct(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+    """The rows without repetitions: minima that were refined to the same orbit."""
+    out: list[dict[str, Any]] = []
+    for r in rows:
+        same = (
+            abs(seconds(r["time"], o["time"])) < 600.0 and abs(r["sigma"] - o["sigma"]) < 1e-3 for o in out
+        )
+        if not any(same):
+            out.append(r)
+    return out
+
+
+def _body(name: str | Planet) -> Planet:
+    return planet(name)
