@@ -1,4 +1,4 @@
-"""The table of yield surfaces: a row is enough for a new cone, and an unknown code is an error."""
+"""The table of yield surfaces: a row is enough for a new surface, and an unknown code is an error."""
 
 import os
 import shutil
@@ -39,17 +39,33 @@ def test_every_surface_has_a_convex_section_and_its_least_slope():
         assert 0.57 / gauges[:, 0].max() == pytest.approx(yield_surface.least_slope(code, 0.57), rel=1e-5)
 
 
-def test_a_row_is_enough_for_a_new_cone(tmp_path):
-    """A cone half way between compression and extension, in a copy of the package with one line more."""
+def run_with_table(tmp_path, changes, script, **environment):
+    """Output of a script with a copy of the package whose table of yield surfaces is changed."""
     package = tmp_path / "flybystab"
     shutil.copytree(SOURCE, package, ignore=shutil.ignore_patterns("__pycache__"))
     table = package / "core/material/surfaces.py"
     text = table.read_text()
+    for old, new in changes:
+        assert old in text
+        text = text.replace(old, new, 1)
+    table.write_text(text)
+    kept = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
+    done = subprocess.run(
+        [sys.executable, "-c", textwrap.dedent(script)],
+        env=kept | {"PYTHONPATH": str(tmp_path)} | environment,
+        capture_output=True,
+        text=True,
+        cwd=tmp_path,
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout.split()
+
+
+def test_a_row_is_enough_for_a_new_cone(tmp_path):
+    """A cone half way between compression and extension, in a copy of the package with one line more."""
     row = '    YieldSurface("middle-cone", CONE, 0.0, ("DruckerPrager1952",)),\n'
-    changed = text.replace('    YieldSurface("mohr-coulomb"', row + '    YieldSurface("mohr-coulomb"')
-    assert changed != text
-    table.write_text(changed)
-    script = textwrap.dedent("""
+    before = '    YieldSurface("mohr-coulomb"'
+    script = """
         import astropy.units as u, numpy as np, flybystab as fs
         from flybystab.cli.common import SURFACES
         from flybystab.io.citation import cite
@@ -67,11 +83,83 @@ def test_a_row_is_enough_for_a_new_cone(tmp_path):
         encounter = fs.Encounter.hyperbolic("earth", 5 * fs.R_earth, 5 * u.km / u.s)
         print(fs.flyby(made[1], encounter, error=False, history=False).verdict)
         print("DruckerPrager1952" in cite({"flybystab": "0", "yield_surface": "middle-cone"}))
-    """)
-    environment = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
-    environment |= {"PYTHONPATH": str(tmp_path), "NUMBA_DISABLE_JIT": "1"}
-    done = subprocess.run(
-        [sys.executable, "-c", script], env=environment, capture_output=True, text=True, cwd=tmp_path
-    )
-    assert done.returncode == 0, done.stderr
-    assert done.stdout.split() == ["INTACT", "True"]
+    """
+    out = run_with_table(tmp_path, [(before, row + before)], script, NUMBA_DISABLE_JIT="1")
+    assert out == ["INTACT", "True"]
+
+
+#: Gauge of a section that is a cubic in 1/k: ``r cos(acos(-b sin(3 theta))/3)``, with its first two derivatives.
+CUBIC = """
+def {name}(sin_phi, theta):
+    {coefficients}
+    s3, c3 = math.sin(3 * theta), math.cos(3 * theta)
+    x = -b * s3
+    root2 = max(1e-300, 1 - x * x)
+    third = math.acos(min(1.0, max(-1.0, x))) / 3
+    first = b * c3 / math.sqrt(root2)
+    second = -3 * b * s3 / math.sqrt(root2) * (1 - (b * c3) ** 2 / root2)
+    c, s = math.cos(third), math.sin(third)
+    return r * c, -r * s * first, r * c - r * (c * first * first + s * second)
+
+"""
+
+#: I1^3/I3 = const. (Lade & Duncan 1975), meeting Mohr-Coulomb in triaxial compression: A gamma^3 - gamma/2 +
+#: sin(phi) sin(3 theta)/(3 sqrt6) = 0.
+LADE_DUNCAN = """g = 2 * math.sqrt(6) / (3 - sin_phi)
+    a = g * g / 2 - g**3 * sin_phi / (3 * math.sqrt(6))
+    r = 2 / math.sqrt(6 * a)
+    b = 4 * sin_phi / (3 * math.sqrt(6) * a * r**3)"""
+
+#: Matsuoka-Nakai, as in the package.
+MATSUOKA_NAKAI = """cos2 = 1 - sin_phi * sin_phi
+    t2 = sin_phi * sin_phi / cos2
+    eta = 9 + 8 * t2
+    half = (eta - 3) / 2
+    b = 1.5 * eta * math.sqrt(8 * t2) / (half * math.sqrt(half / 3)) / (3 * math.sqrt(6))
+    r = 2 * math.sqrt(half / 3) * math.sqrt(cos2 / 8)"""
+
+
+@pytest.mark.slow
+def test_a_row_is_enough_for_another_dependence_on_the_lode_angle(tmp_path):
+    """Compiled: a new surface, and a known one by its gauge alone, which has the results of its closed formulas."""
+    rows = """    YieldSurface("lade-duncan", GENERAL, 0.0, (), lade_duncan),
+    YieldSurface("by-gauge", GENERAL, 0.0, (), by_gauge),
+"""
+    gauges = CUBIC.format(name="lade_duncan", coefficients=LADE_DUNCAN)
+    gauges += CUBIC.format(name="by_gauge", coefficients=MATSUOKA_NAKAI)
+    script = """
+        import astropy.units as u, numpy as np, flybystab as fs
+        from numba import config
+        from scipy.optimize import brentq
+        assert not config.DISABLE_JIT
+        names = ("drucker-prager", "lade-duncan", "matsuoka-nakai", "by-gauge")
+        pile = fs.Body([1400, 850, 750] * u.m, 2 * u.g / u.cm**3, spin_period=6 * u.h)
+        dilatant = {s: fs.Material(yield_surface=s, dilatancy=1.0) for s in names}
+        bodies = {s: pile.with_(material=m) for s, m in dilatant.items()}
+        states = {s: fs.equilibrium(b) for s, b in bodies.items()}
+        angles = {s: e.required_friction_angle.value for s, e in states.items()}
+        assert angles["drucker-prager"] < angles["lade-duncan"] < angles["matsuoka-nakai"], angles
+        # I1^3/I3 of the stress is that of triaxial compression at the angle
+        stress = -states["lade-duncan"].stress.value
+        ratio = np.trace(stress) ** 3 / np.linalg.det(stress)
+        n = brentq(lambda n: (n + 2) ** 3 / n - ratio, 1, 100, xtol=1e-14)
+        assert abs(np.sin(np.radians(angles["lade-duncan"])) - (n - 1) / (n + 1)) < 1e-9
+        encounter = fs.Encounter.hyperbolic("earth", 2.0 * fs.R_earth, 5 * u.km / u.s)
+        runs = {s: fs.flyby(b, encounter, error=False, history=False) for s, b in bodies.items()}
+        axes = {s: r.semi_axes.value for s, r in runs.items()}
+        assert all(len(r.events) for r in runs.values())
+        assert not np.allclose(axes["lade-duncan"], axes["matsuoka-nakai"], rtol=1e-4)
+        np.testing.assert_allclose(axes["by-gauge"], axes["matsuoka-nakai"], rtol=1e-7)
+        stable = {s: fs.stability(b) for s, b in bodies.items()}
+        energy = {s: e.critical_energy.second.to_value(u.J) for s, e in stable.items()}
+        np.testing.assert_allclose(energy["by-gauge"], energy["matsuoka-nakai"], rtol=1e-7)
+        assert energy["matsuoka-nakai"] < energy["lade-duncan"] < energy["drucker-prager"], energy
+        print(runs["lade-duncan"].verdict)
+    """
+    changes = [
+        ("from typing import NamedTuple\n", "from typing import NamedTuple\nimport math\n"),
+        ("SURFACES = (\n", gauges + "\nSURFACES = (\n"),
+        ('("MatsuokaNakai1974",)),\n', '("MatsuokaNakai1974",)),\n' + rows),
+    ]
+    out = run_with_table(tmp_path, changes, script)
+    assert " ".join(out) in ("RESHAPED", "MASS LOSS", "BEYOND MODEL")

@@ -3,13 +3,14 @@
 Stress is positive in tension, ``p = -tr(sigma)/3``, ``s`` the deviator, ``|s|^2 = s:s``. The Lode angle
 ``theta = asin(-3 sqrt6 det(s/|s|))/3`` runs from -30 deg (triaxial extension) to +30 deg (compression).
 
-The surfaces are the rows of one table, :mod:`flybystab.core.material.surfaces`, and belong to three families:
+The surfaces are the rows of one table, :mod:`flybystab.core.material.surfaces`, and belong to four families:
 
 ``CONE``            circular: ``k = 2 sqrt6 sin/(3 - c sin)``, the number ``c`` in the table; ``c = 1`` meets
                     Mohr-Coulomb in triaxial compression, ``c = -1`` in extension
 ``HEXAGON``         Mohr-Coulomb: ``k = sqrt2 sin/(cos theta - sin theta sin/sqrt3)``
 ``SMOOTH_HEXAGON``  Matsuoka-Nakai: k is the smallest positive root of ``eta d k^3 + (eta-3)/2 k^2 - (eta-9) = 0``,
                     ``d = det(s/|s|)``, ``eta = I1 I2/I3 = 9 + 8 tan^2``; meets Mohr-Coulomb at both ends
+``GENERAL``         any smooth convex section, given by its gauge in the table; the rest is numerical
 
 An unknown code is an error in every kernel.
 
@@ -22,10 +23,12 @@ section. Both are written with the gauge ``gamma = sin(phi)/k``: the section is 
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from flybystab.core.material import surfaces
-from flybystab.core.numerics.jit import code, kernel
+from flybystab.core.numerics.jit import code, kernel, uncached_kernel
 from flybystab.typing import Array
 
 SQRT2 = np.sqrt(2.0)
@@ -36,8 +39,35 @@ CONE = code(surfaces.CONE)
 HEXAGON = code(surfaces.HEXAGON)
 SMOOTH_HEXAGON = code(surfaces.SMOOTH_HEXAGON)
 MOHR_COULOMB = code(surfaces.code_of("mohr-coulomb"))
+GENERAL = code(surfaces.GENERAL)
 _FAMILY = np.array([surface.family for surface in surfaces.SURFACES])
 _CONE = np.array([surface.cone for surface in surfaces.SURFACES])
+
+
+def _gauge_by_code(rows: list[tuple[int, Any]]) -> Any:
+    """Kernel ``(surface, sin_phi, theta) -> (gamma, gamma', gamma + gamma'')`` from gauges by their codes."""
+    if not rows:
+
+        @uncached_kernel
+        def undefined(surface: int, sin_phi: float, theta: float) -> tuple[float, float, float]:
+            return np.nan, np.nan, np.nan
+
+        return undefined
+    (own_code, function), *rest = rows
+    own, others = uncached_kernel(function), _gauge_by_code(rest)
+
+    @uncached_kernel
+    def select(surface: int, sin_phi: float, theta: float) -> tuple[float, float, float]:
+        if surface == own_code:
+            return own(sin_phi, theta)
+        return others(surface, sin_phi, theta)
+
+    return select
+
+
+_general_gauge = _gauge_by_code(
+    [(k, surface.gauge) for k, surface in enumerate(surfaces.SURFACES) if surface.gauge is not None]
+)
 
 
 @kernel
@@ -75,6 +105,8 @@ def slope_over_sine(surface: int, sin_phi: float, det: float) -> float:
     if kind == HEXAGON:
         theta = lode_angle(det)
         return SQRT2 / (np.cos(theta) - np.sin(theta) * sin_phi / SQRT3)
+    if kind == GENERAL:
+        return 1.0 / _general_gauge(surface, sin_phi, lode_angle(det))[0]
     # x = 1/k solves x^3 - x (eta-3)/(2(eta-9)) - eta det/(eta-9) = 0; with t = tan phi and
     # eta - 9 = 8 t^2 the largest root is 2 sqrt(a/3) cos(acos(b)/3), a = (eta-3)/(2(eta-9)).
     t2 = sin_phi * sin_phi / (1.0 - sin_phi * sin_phi)
@@ -96,11 +128,14 @@ def slope(surface: int, sin_phi: float, det: float) -> float:
 @kernel
 def gauge(surface: int, sin_phi: float, theta: float) -> tuple[float, float, float]:
     """``gamma = sin(phi)/k``, ``gamma'`` and ``gamma + gamma''`` at a Lode angle, rad."""
-    if family(surface) == HEXAGON:
+    kind = family(surface)
+    if kind == HEXAGON:
         t = sin_phi / SQRT3
         c, s = np.cos(theta), np.sin(theta)
         return (c - s * t) / SQRT2, -(s + c * t) / SQRT2, 0.0
-    if family(surface) != SMOOTH_HEXAGON:
+    if kind == GENERAL:
+        return _general_gauge(surface, sin_phi, theta)
+    if kind == CONE:
         g = 1.0 / slope_over_sine(surface, sin_phi, 0.0)
         return g, 0.0, g
     # gamma = size cos(psi/3) with cos psi = -b sin(3 theta), see `slope_over_sine`
@@ -176,14 +211,14 @@ def normal(surface: int, sin_phi: float, det: float) -> tuple[float, float, floa
     ``m/sin(phi) = a + 3 b det`` of the section in the direction ``u``; and ``k/sin(phi)`` and the unit determinant
     of that stress.
 
-    Matsuoka-Nakai: the root of ``gamma' cos(y) - gamma sin(y) = 0`` with ``y`` = (Lode angle of u) - theta is unique,
+    Smooth sections: the root of ``gamma' cos(y) - gamma sin(y) = 0`` with ``y`` = (Lode angle of u) - theta is unique,
     since this grows with theta for a convex section. Mohr-Coulomb: a corner, see `corner`; in the one direction
     that is normal to a face, ``theta = -atan(sin(phi)/sqrt3)``, the support is right and the stress is one end
     of the face.
     """
     if family(surface) == HEXAGON:
         return corner(sin_phi, det, beyond_face(sin_phi, det) <= 0.0)
-    if family(surface) != SMOOTH_HEXAGON:
+    if is_circular(surface):
         g = slope_over_sine(surface, sin_phi, det)
         return g, 0.0, g, g, det
     s3 = min(1.0 - 5e-13, max(5e-13 - 1.0, -3.0 * SQRT6 * det))
@@ -239,7 +274,35 @@ def least_slope(surface: int, sin_phi: float) -> float:
         return 2.0 * SQRT6 * sin_phi / (3.0 - _CONE[surface] * sin_phi)
     if kind == HEXAGON:  # at tan(theta) = -sin(phi)/sqrt3
         return SQRT2 * sin_phi / np.sqrt(1.0 + sin_phi * sin_phi / 3.0)
+    if kind == GENERAL:
+        return sin_phi / _largest_gauge(surface, sin_phi)
     return 2.0 * SQRT6 * sin_phi / (3.0 + sin_phi)
+
+
+@kernel
+def _largest_gauge(surface: int, sin_phi: float) -> float:
+    """Largest ``gamma`` of a GENERAL surface over the Lode angle: samples, then golden section beside the largest."""
+    n = 60
+    spacing = np.pi / (3.0 * n)
+    best = 0
+    largest = -np.inf
+    for i in range(n + 1):
+        value = _general_gauge(surface, sin_phi, -np.pi / 6.0 + i * spacing)[0]
+        if value > largest:
+            best, largest = i, value
+    a = -np.pi / 6.0 + max(best - 1, 0) * spacing
+    b = -np.pi / 6.0 + min(best + 1, n) * spacing
+    ratio = 0.5 * (np.sqrt(5.0) - 1.0)
+    for _ in range(40):
+        x1, x2 = b - ratio * (b - a), a + ratio * (b - a)
+        f1 = _general_gauge(surface, sin_phi, x1)[0]
+        f2 = _general_gauge(surface, sin_phi, x2)[0]
+        largest = max(largest, max(f1, f2))
+        if f1 < f2:
+            a = x1
+        else:
+            b = x2
+    return largest
 
 
 @kernel
@@ -260,12 +323,13 @@ def required_friction(surface: int, cohesion: float, s: float, p: float, det: fl
     Notes
     -----
     Cones and Mohr-Coulomb read ``A sin(phi) + B cos(phi) = C``; Matsuoka-Nakai without cohesion is
-    ``tan^2(phi) = (I1 I2/I3 - 9)/8`` and is bisected with it.
+    ``tan^2(phi) = (I1 I2/I3 - 9)/8``. It is found by bisection with cohesion, and on GENERAL surfaces.
     """
     if s == 0.0:
         return 0.0 if p + cohesion >= 0.0 else np.inf
-    if family(surface) == SMOOTH_HEXAGON:
-        if cohesion == 0.0:
+    kind = family(surface)
+    if kind in (SMOOTH_HEXAGON, GENERAL):
+        if kind == SMOOTH_HEXAGON and cohesion == 0.0:
             if p <= 0.0:
                 return np.inf
             k = s / p
@@ -295,7 +359,7 @@ def required_friction(surface: int, cohesion: float, s: float, p: float, det: fl
             else:
                 low = mid
         return high
-    if family(surface) == HEXAGON:
+    if kind == HEXAGON:
         theta = lode_angle(det)
         a = SQRT2 * p + s * np.sin(theta) / SQRT3
         b = SQRT2 * cohesion

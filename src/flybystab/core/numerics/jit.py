@@ -37,6 +37,9 @@ def _cacheable() -> bool:
 #: Whether compiled kernels are kept on disk.
 CACHE = _cacheable()
 kernel = njit(cache=CACHE, nogil=True, error_model="numpy")
+#: For kernels that are made from others at run time, which numba cannot keep on disk; they become part of the cached
+#: kernels that call them.
+uncached_kernel = njit(nogil=True, error_model="numpy")
 _SUMS: Any = {"fastmath": {"reassoc", "contract", "nsz"}}
 summing_kernel = njit(cache=CACHE, nogil=True, error_model="numpy", **_SUMS)
 # Handing over a tuple of arrays costs more than the few sums inside.
