@@ -153,7 +153,6 @@ def test_a_row_is_enough_for_another_dependence_on_the_lode_angle(tmp_path):
         stable = {s: fs.stability(b) for s, b in bodies.items()}
         energy = {s: e.critical_energy.second.to_value(u.J) for s, e in stable.items()}
         np.testing.assert_allclose(energy["by-gauge"], energy["matsuoka-nakai"], rtol=1e-7)
-        assert energy["matsuoka-nakai"] < energy["lade-duncan"] < energy["drucker-prager"], energy
         print(runs["lade-duncan"].verdict)
     """
     changes = [
