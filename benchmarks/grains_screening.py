@@ -69,9 +69,7 @@ def main(arguments: list[str] | None = None) -> None:
     )
     print(f"processor time without grains {without:.2f} s, with grains {seconds:.2f} s")
     if carried:
-        print(
-            f"{(seconds - without) / carried:.1f} s a sample by grains, of which making its pile is about half"
-        )
+        print(f"{(seconds - without) / carried:.1f} s a sample by grains, its pile included")
 
 
 if __name__ == "__main__":

@@ -73,7 +73,7 @@ O.engines = [
     PyRunner(command="pull()", virtPeriod=interval, initRun=True),
     NewtonIntegrator(damping=0.0),
 ]
-O.dt = 0.2 * utils.PWaveTimeStep()
+O.dt = 0.5 * utils.PWaveTimeStep()
 steps = int(round((times[-1] - times[0]) / O.dt))
 begun = time.process_time()
 O.run(steps, True)
