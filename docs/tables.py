@@ -19,6 +19,7 @@ TABLES = {
     "grains": "python benchmarks/piles.py grains",
     "grains_cases": "python benchmarks/grains_ellipsoid.py cases --minutes 48",
     "grains_flybys": "python benchmarks/grains_references.py flybys --cases 26",
+    "grains_flybys_2": "python benchmarks/grains_references.py flybys --first 26 --seeds 2",
     "grains_map": "python benchmarks/grains_ellipsoid.py map --grains 150",
     "honesty": "python benchmarks/honesty.py scripted --encounters 300",
     "honesty_real": "python benchmarks/honesty.py real --every 4",
