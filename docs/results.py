@@ -261,14 +261,15 @@ def main():
 
 Made by `python docs/results.py` on orbits of {full["catalogue"][0].rsplit("/")[-1]} (JPL, epoch mostly
 JD 2461200.5) and the embedded catalogue, ephemeris {full["ephemeris"][0]}. Each passage: the catalogue body with
-35 deg of friction and no cohesion, and {SAMPLES} samples of what is not known, seed 0. In the tables:
+35 deg of friction, no cohesion and the yield surface {full["yield_surface"][0]}, and {SAMPLES} samples of the
+uncertain inputs, seed 0. In the tables:
 
-- *margin*: friction angle less the largest mobilised;
-- *passage adds*: what the passage adds to the angle mobilised at rest; both are bounds where the quick bound decides;
-- *P(yield)*: share of the samples that can exist and then flow or hit the planet, with its Wilson interval;
-- *follows most*: inputs whose ranks the margin follows, with rank correlations.
+- *margin*: friction angle minus the largest mobilised one;
+- *passage adds*: increase of the mobilised angle by the encounter; both are bounds where the yield bound decides;
+- *P(yield)*: fraction of the samples in equilibrium that yield or reach the planet, with its Wilson interval;
+- *follows most*: inputs to which the margin is most sensitive, with Spearman's rank correlation.
 
-What is not known is drawn from these laws ([sampled inputs](screening.md#sampled-inputs)):
+Unmeasured inputs have these priors ([sampled inputs](screening.md#sampled-inputs)):
 
 {laws()}
 
