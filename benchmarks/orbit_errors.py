@@ -23,7 +23,7 @@ from flybystab.catalogues.orbit_errors import runoff as sigma_of_code
 from flybystab.constants import AU, YEAR
 from flybystab.encounter.encounter import Encounter
 from flybystab.orbit.ephemeris import Window, ephemeris
-from flybystab.orbit.forces import FORCES
+from flybystab.orbit.forces import FORCES, LAW_SIZE
 from flybystab.orbit.orbit import Orbit, later, seconds
 from flybystab.orbit.predictability import deviations_of
 from flybystab.orbit.search.acceleration import field
@@ -64,7 +64,7 @@ def places(orbits: Sequence[Orbit], time: Time, window: Window) -> NDArray[np.fl
     room, out = empty_room(), np.full((len(orbits), 1, 6), np.nan)
     for i, orbit in enumerate(orbits):
         push = orbit.nongrav
-        law = np.array([*push.a, *push.constants]) if any(push.a) else np.zeros(8)
+        law = push.row if push.active else np.zeros(LAW_SIZE)
         start = seconds(orbit.epoch, window.epoch)
         carry(
             forces,
@@ -82,7 +82,7 @@ def places(orbits: Sequence[Orbit], time: Time, window: Window) -> NDArray[np.fl
 def displacement(orbit: Orbit, time: Time, window: Window) -> float:
     """One sigma of an orbit in the direction least known at a time, m."""
     forces = field(window, [n for n in FORCES if n.endswith("point mass") or n == "1PN"])
-    law = np.array([*orbit.nongrav.a, *orbit.nongrav.constants])
+    law = orbit.nongrav.row
     times = np.array([seconds(time, window.epoch)])
     return float(spread(deviations_of(orbit), forces, law, window, times, 1e-13).displacement[0])
 

@@ -63,8 +63,8 @@ def test_the_ends_of_the_file_are_covered():
 def test_field_is_the_acceleration_of_the_other_code(names):
     """Two codes: one body after the other, exact series; all at once, from the almanac."""
     window = window_of("de421", 2459000.5, 100.0)
-    push = NonGravitational((3e-12, -2e-12, 1e-12), "comet")
-    law = np.array([*push.a, *push.constants]) if "non-gravitational" in names else np.zeros(8)
+    push = NonGravitational((3e-12, -2e-12, 1e-12), "comet", delay=35.0 * 86400.0, area_to_mass=1e-5)
+    law = push.row if "non-gravitational" in names else np.zeros(10)
     f = field(window, [n for n in names if n != "non-gravitational"])
     flat = model(window, names, push)
     rng = np.random.default_rng(5)

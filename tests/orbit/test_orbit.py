@@ -286,7 +286,7 @@ def test_one_pn_is_that_of_einstein_infeld_hoffmann():
         # and the same in the arrangement of a search
         rates = [np.empty(6), np.empty(6)]
         for chosen, out in zip(fields, rates, strict=True):
-            rate(chosen, np.zeros(8), t, np.concatenate([x, v]), empty_places(), out)
+            rate(chosen, np.zeros(10), t, np.concatenate([x, v]), empty_places(), out)
         assert np.linalg.norm((rates[0] - rates[1])[3:] - truth) < (1e-4 if k < 5 else 3e-3) * size
 
 
@@ -343,13 +343,14 @@ def test_apophis_after_2029_is_where_jpl_has_it(shared):
         orbits.append(Orbit.from_state(when, r * u.au, v * u.au / u.d, "sun", "ICRF", *push))
     before, after = orbits
     place, _ = before.at(after.epoch, ephemeris="de440")
-    # A metre before the passage is 5 km a year later. Pluto moves Apophis by 1.3 m until then; that leaving it out
-    # comes closer here is a cancellation: J3 and J4 of the Earth, which are not modelled, are 2 km of the rest, and
-    # the state of Didymos (below) needs Pluto.
-    assert np.linalg.norm((place - after.position).to_value(u.km)) < 7.0
+    # A metre before the passage is 5 km a year later: 6.5 km without J3 and J4 of the Earth, 4.6 km with them. J2 of
+    # the Sun moves this place by 5 km, Pluto by 6 km, the thirteen smaller asteroids by 11 km. That it comes closer
+    # without Pluto, J3 and J4 is a cancellation; the state of Didymos (below) needs Pluto.
+    assert np.linalg.norm((place - after.position).to_value(u.km)) < 5.0
     end = seconds(after.epoch, before.epoch)
     window = ephemeris("de440").window(before.epoch, 0.0, end)
-    others = tuple(name for name in default_forces(before) if name != "pluto point mass")
+    left_out = ("pluto point mass", "earth J3", "earth J4")
+    others = tuple(name for name in default_forces(before) if name not in left_out)
     place = before.flight(window, others).to(end) - window.states(0, np.array([end]))[0]
     assert np.linalg.norm(place[:3] / 1e3 - after.position.to_value(u.km)) < 1.0
 

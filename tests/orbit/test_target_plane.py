@@ -42,7 +42,7 @@ def test_every_point_of_a_hyperbola_has_the_same_b():
     """Turned into a general attitude: B and v_inf are constants of the motion, and turn with the frame."""
     encounter = fs.Encounter.hyperbolic("earth", 3 * fs.R_earth, 5 * u.km / u.s)
     t = np.array([-1e5, -3e3, 0.0, 500.0, 2e5])
-    turn = Rotation.random(rng=3).as_matrix()
+    turn = Rotation.random(random_state=3).as_matrix()
     states = encounter.track.states(t)
     turned = np.hstack([states[:, :3] @ turn.T, states[:, 3:] @ turn.T])
     north = (0.3, -0.5, 0.8)

@@ -132,7 +132,7 @@ def followed(
     away = orbit.barycentric(window) - window.states(index, np.array([epoch]))[0]
     if np.linalg.norm(away[:3]) < body.impact_distance:
         raise starts_inside(orbit.name, orbit.epoch, body)
-    acting = (n for n in FORCES if n != "non-gravitational" or any(orbit.nongrav.a))
+    acting = (n for n in FORCES if n != "non-gravitational" or orbit.nongrav.active)
     everything = without_itself(acting, orbit, window)
     first = _passage(orbit, window, index, forces or everything, reach, EPSILON)
     if first is not None:
@@ -178,9 +178,9 @@ def followed(
 
 def _spread(orbit: Orbit, beside: Deviations, window: Window, forces: tuple[str, ...], t: float) -> Spread:
     """Errors of the orbit at `t` s from the epoch of the window."""
-    law = np.array([*orbit.nongrav.a, *orbit.nongrav.constants])
+    law = orbit.nongrav.row
     if "non-gravitational" not in forces:
-        law[:3] = 0.0
+        law[:3] = law[9] = 0.0
     acting = field(window, [name for name in forces if name != "non-gravitational"])
     return spread(beside, acting, law, window, np.array([t]), _TOLERANCE)
 

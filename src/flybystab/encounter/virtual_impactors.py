@@ -21,7 +21,7 @@ from astropy.units import Quantity
 from flybystab.constants import DAY
 from flybystab.encounter.linear_target_plane import disc_probability
 from flybystab.errors import InvalidInput
-from flybystab.orbit.covariance import Covariance
+from flybystab.orbit.covariance import PUSHES, Covariance
 from flybystab.orbit.ephemeris import Ephemeris
 from flybystab.orbit.orbit import Orbit, _ephemeris, deviated, later, seconds
 from flybystab.orbit.planets import Planet, planet
@@ -50,7 +50,7 @@ class _Line:
                 "covariance", covariance, "a Covariance: the line of variations is that of one"
             )
         self.covariance, self.body, self.eph, self.workers = covariance, body, eph, workers
-        nothing = np.zeros((1, 6)), np.zeros((1, 3))
+        nothing = np.zeros((1, 6)), np.zeros((1, len(PUSHES)))
         self.orbit = deviated(orbit, covariance.epoch, *nothing, "there", eph)[0]
 
     def weak_direction(self, time: Time) -> Array:

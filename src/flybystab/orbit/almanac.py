@@ -1,11 +1,11 @@
-"""Where the bodies are, by polynomials on even grids: the same places as the ephemeris for a tenth of its cost.
+"""Positions of the bodies as polynomials on uniform grids, at a tenth of the cost of the ephemeris.
 
-An ephemeris keeps each body on intervals of its own. A search asks for all of them at once, hundreds of times
-an orbit. Here they stand side by side on three grids, by how fast they move: Earth, Moon, Mercury and Venus on
-pieces of 4 d (degree 12), Sun, Mars and the giant planets on 16 d (degree 7), the massive asteroids on 32 d
-(degree 4). What relativity needs of the heaviest bodies (motion, and what all do to each) is on a fourth, to a
-thousandth. The pieces lie inside those of the JPL files, so that no kink is smoothed over: 0.1 m from the
-ephemeris, the asteroids as good as their table. Barycentric ICRF, m, s.
+A JPL ephemeris has intervals of its own for each body, and a search needs all bodies at once, hundreds of times
+per revolution. The almanac has three grids by speed: Earth, Moon, Mercury and Venus on intervals of 4 d (degree 12),
+Sun, Mars, the giant planets and Pluto on 16 d (degree 7), the massive asteroids on 32 d (degree 4). A fourth has
+velocities, accelerations and potentials of the heaviest bodies for 1PN, to a relative error of 1e-3. Intervals do
+not cross interval boundaries of the JPL files, where derivatives jump. Positions agree with the ephemeris to 0.1 m,
+those of asteroids to the error of their table. Barycentric ICRF, m, s.
 """
 
 from __future__ import annotations
@@ -25,12 +25,12 @@ from flybystab.typing import Array
 #: Bodies of the two planetary grids, in the order of their slots.
 FAST = tuple(name for name in BODIES if 0.0 < PLANETS[name].orbit_radius < 1.2 * AU)
 SLOW = tuple(name for name in BODIES if name not in FAST)
-#: Slots of the grids: whole vectors of four.
+#: Slots of the grids, padded to multiples of four for vector instructions.
 N_FAST, N_SLOW, N_BELT = (-(-len(names) // 4) * 4 for names in (FAST, SLOW, BELT))
-#: Of each of ``BODIES``: its grid (0 fast, 1 slow) and its slot there.
+#: Grid (0 fast, 1 slow) and slot of each of ``BODIES``.
 GRID = np.array([0 if name in FAST else 1 for name in BODIES])
 SLOT = np.array([(FAST if name in FAST else SLOW).index(name) for name in BODIES])
-#: The planets whose part of relativity counts, beside the Sun's (:mod:`flybystab.orbit.relativity`).
+#: Planets that are sources of 1PN terms (:mod:`flybystab.orbit.relativity`).
 HEAVY = tuple(name for name in BODIES if PLANETS[name].relativity and name != "sun")
 N_HEAVY = len(HEAVY)
 #: Columns of the grids; those of ``HEAVY`` end with acceleration and potential of the Sun.
@@ -40,21 +40,21 @@ _NOWHERE = 1e15
 
 
 class Almanac(NamedTuple):
-    """Polynomials in ``x = -1...1`` of each piece; the columns of a grid are x of all slots, then y, then z.
+    """Polynomials in ``x = -1...1`` on each interval; the columns of a grid are x of all slots, then y, then z.
 
     Attributes
     ----------
     when : ndarray, shape (4, 3)
         Per grid: start (s), pieces per second, pieces.
     fast : ndarray, shape (pieces, 13, columns)
-        Places (m) of ``FAST``; then the Sun's velocity (m/s) and an empty column.
+        Positions (m) of ``FAST``; then the Sun's velocity (m/s) and an unused column.
     slow : ndarray, shape (pieces, 8, columns)
-        Places of ``SLOW``; slots without a body are far away.
+        Positions (m) of ``SLOW``; unused slots are far away.
     belt : ndarray, shape (pieces, 5, columns)
-        Places of the massive asteroids; no pieces without them.
+        Positions (m) of the massive asteroids; empty without them.
     heavy : ndarray, shape (pieces, 5, columns)
-        Of ``HEAVY``: places (m), velocities (m/s), accelerations (m/s2) by all other bodies, and the potential
-        (m2/s2) of those; then acceleration and potential of the Sun.
+        Positions (m), velocities (m/s), accelerations (m/s2) of ``HEAVY`` by all other bodies, and the potential
+        (m2/s2) of those; then acceleration and potential at the Sun.
     """
 
     when: Array
@@ -65,7 +65,7 @@ class Almanac(NamedTuple):
 
 
 class Places(NamedTuple):
-    """Where the bodies are at one time: columns as in :class:`Almanac`."""
+    """Positions of the bodies at one time: columns as in :class:`Almanac`."""
 
     fast: Array
     slow: Array

@@ -1,4 +1,4 @@
-"""Closest approach: where ``r.v`` crosses zero, and the path around it as a smooth function of time.
+"""Closest approach as a zero of ``r.v``, and the relative motion around it as a smooth function of time.
 
 A log of integration steps (time, position, velocity, acceleration) is read between its rows by the quintic
 that matches all three at both ends. That locates each minimum of distance; the root itself is then found on

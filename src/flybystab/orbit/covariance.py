@@ -1,8 +1,8 @@
 """Covariance of the elements of an orbit, and samples drawn from it.
 
-A covariance belongs to a set of elements at an epoch of its own, which need not be that of the orbit (JPL's
-differ by years). Only deviations from its own mean are used: they are added to the orbit's state at that
-epoch, without linearisation, so that the orbit stays the middle of its clones.
+A covariance belongs to a set of elements at an epoch of its own, which can differ from that of the orbit (JPL's
+differ by years). Only deviations from its own mean are used. They are added to the orbit's state at that epoch without
+linearisation, so that the clones are centred on the orbit.
 """
 
 from __future__ import annotations
@@ -31,16 +31,17 @@ SETS: Mapping[str, tuple[str, ...]] = {
     "equinoctial": ("a", "h", "k", "P", "Q", "L"),
     "cartesian": ("x", "y", "z", "vx", "vy", "vz"),
 }
-PUSHES = ("A1", "A2", "A3")
+#: Non-gravitational parameters that can be estimated with the elements.
+PUSHES = ("A1", "A2", "A3", "DT", "AMRAT")
 _SI: Mapping[str, u.UnitBase] = (
     dict.fromkeys(("a", "q", "x", "y", "z"), u.m)
     | dict.fromkeys(("vx", "vy", "vz"), u.m / u.s)
     | dict.fromkeys(("i", "node", "peri", "M", "L"), u.rad)
     | dict.fromkeys(("h", "k", "P", "Q"), u.dimensionless_unscaled)
-    | dict.fromkeys(PUSHES, u.m / u.s**2)
-    | {"e": u.dimensionless_unscaled, "tp": u.s}
+    | dict.fromkeys(PUSHES[:3], u.m / u.s**2)
+    | {"e": u.dimensionless_unscaled, "tp": u.s, "DT": u.s, "AMRAT": u.m**2 / u.kg}
 )
-#: Largest negative eigenvalue of the correlation matrix that rounding of published digits may leave.
+#: Largest negative eigenvalue of the correlation matrix that is attributed to rounding of the published digits.
 _ROUNDING = 1e-6
 
 
@@ -51,21 +52,21 @@ class Covariance:
     Attributes
     ----------
     epoch : Time
-        To which the elements belong, TDB.
+        Epoch of the elements, TDB.
     names : tuple of str
-        The parameters: one of the sets of :data:`SETS`, in any order, and those of A1, A2, A3 that were
-        estimated. A cartesian state has ICRF axes.
+        The parameters: one of the sets of :data:`SETS`, in any order, and the estimated ones of :data:`PUSHES`.
+        A cartesian state has ICRF axes.
     values : ndarray, shape (n,)
-        Mean; m, s, rad, m/s, m/s2.
+        Mean; m, s, rad, m/s, m/s2, m2/kg.
     matrix : ndarray, shape (n, n)
-        Covariance of them.
+        Covariance of `values`.
     source : str
-        Where it comes from.
+        Publisher and solution.
     correlated : bool
-        False where only the 1-sigmas are known: the matrix is diagonal for want of better, and an encounter
-        mapped with it can be wrong by a large factor, mostly too uncertain.
+        False where only the 1-sigmas are known. The matrix is then diagonal, and the uncertainty of an encounter can
+        be wrong by a large factor, mostly too large.
     caveat : str
-        What to say of errors by it where it is no published covariance; "without correlations" by default.
+        Note on a covariance that is not a published one; "without correlations" by default.
     """
 
     epoch: Time
@@ -149,7 +150,7 @@ class Covariance:
 
     @cached_property
     def _spectrum(self) -> tuple[Array, Array]:
-        """Eigenvalues and eigenvectors of the correlation matrix: the elements differ by 20 decades."""
+        """Eigenvalues and eigenvectors of the correlation matrix; the covariances span 20 decades."""
         sigma = np.where(self.sigma > 0.0, self.sigma, 1.0)
         correlation = self.matrix / np.outer(sigma, sigma)
         values, vectors = np.linalg.eigh(0.5 * (correlation + correlation.T))
@@ -164,14 +165,14 @@ class Covariance:
     def samples(self, n: int, seed: int) -> tuple[Array, int]:
         """Parameters drawn from the normal distribution, shape (n, len(names)), SI; number drawn again.
 
-        Row k depends on the seed and k alone. A draw that is no conic (perihelion inside the Sun's centre,
-        negative eccentricity, a Keplerian ellipse beyond e = 1) is drawn again; cometary elements and states
-        pass from ellipse to hyperbola freely.
+        Row k depends on the seed and k alone. Draws that are not a conic (negative perihelion distance or
+        eccentricity, Keplerian elements with a > 0 and e > 1) are rejected and redrawn; cometary elements and states
+        can change from ellipse to hyperbola.
 
         Raises
         ------
         InvalidInput
-            If a row was refused 100 times: the distribution does not fit these elements.
+            If a row was rejected 100 times: the elements are not normally distributed.
         """
         z = np.random.default_rng(seed).standard_normal((n, len(self.names)))
         out = self.values + z @ self.factor.T
@@ -228,8 +229,8 @@ class Covariance:
         return np.array([state_from_elements(*row) for row in columns])
 
     def pushes(self, parameters: Array) -> Array:
-        """A1, A2, A3 less their means, m/s2, shape (m, 3); zero for those that were not estimated."""
-        out = np.zeros((len(parameters), 3))
+        """A1, A2, A3 (m/s2), DT (s), AMRAT (m2/kg) less their means, shape (m, 5); zero if not estimated."""
+        out = np.zeros((len(parameters), len(PUSHES)))
         for j, name in enumerate(PUSHES):
             if name in self.names:
                 at = self.names.index(name)
@@ -237,7 +238,7 @@ class Covariance:
         return out
 
     def deviations(self, parameters: Array) -> tuple[Array, Array]:
-        """States and A1, A2, A3 less those of the mean, shapes (m, 6) and (m, 3)."""
+        """States and non-gravitational parameters less those of the mean, shapes (m, 6) and (m, 5)."""
         return self.states(parameters) - self.states(self.values[None, :]), self.pushes(parameters)
 
     def __repr__(self) -> str:

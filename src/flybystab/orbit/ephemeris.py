@@ -1,4 +1,4 @@
-"""Where the Sun, the planets and the Moon are: JPL ephemerides, evaluated by compiled code.
+"""JPL ephemerides of Sun, planets and Moon, evaluated by compiled code.
 
 A binary SPK file holds Chebyshev series per body and interval. A :class:`Window` copies the records of a time
 span out of the memory-mapped file into one flat array that kernels read; nothing is opened, read or copied

@@ -1,4 +1,4 @@
-"""An asteroid's orbit: a state at an epoch, its non-gravitational acceleration, and where that takes it."""
+"""Orbit of an asteroid: state at an epoch, non-gravitational acceleration, covariance, and its propagation."""
 
 from __future__ import annotations
 
@@ -30,15 +30,16 @@ if TYPE_CHECKING:
 _AU_D2 = u.au / u.d**2
 _SPEED = u.m / u.s
 _ZERO = 0.0 * _AU_D2
-#: Difference of two integrations that is worth a warning, m.
+_NO_DELAY, _NO_AREA = 0.0 * u.d, 0.0 * u.m**2 / u.kg
+#: Difference of two integrations above which a warning is given, m.
 _LARGE_ERROR = 1e3
-#: Closer and slower than this at its epoch an orbit is that of a massive asteroid itself, m and m/s.
+#: An orbit within this distance (m) and relative speed (m/s) of a massive asteroid at its epoch is that asteroid's.
 TWIN_DISTANCE, TWIN_SPEED = 1e8, 100.0
 
 
 @dataclass(frozen=True, eq=False)
 class Orbit:
-    """A state at an epoch, with what else moves the asteroid.
+    """State of an asteroid at an epoch, with its non-gravitational acceleration.
 
     Made by :meth:`from_elements` or :meth:`from_state`.
 
@@ -51,11 +52,11 @@ class Orbit:
     centre : str
         ``"ssb"`` (barycentre of the solar system), ``"sun"``, ``"earth"`` or another body.
     nongrav : NonGravitational
-        A1, A2, A3 and their law of distance.
+        A1, A2, A3, their dependence on distance, DT, and radiation pressure.
     name : str
         Free text, shown in tables.
     covariance : Covariance or None
-        How well the elements are known; see :meth:`clones`.
+        Of the elements; see :meth:`clones`.
     """
 
     epoch: Time
@@ -79,9 +80,12 @@ class Orbit:
         A1: Quantity = _ZERO,
         A2: Quantity = _ZERO,
         A3: Quantity = _ZERO,
-        law: str = "asteroid",
+        law: str | Sequence[float] = "asteroid",
         name: str = "",
         covariance: Covariance | None = None,
+        *,
+        DT: Quantity = _NO_DELAY,
+        AMRAT: Quantity = _NO_AREA,
     ) -> Orbit:
         """Orbit from heliocentric osculating elements, J2000 ecliptic and equinox (as JPL gives them).
 
@@ -95,12 +99,17 @@ class Orbit:
             Inclination, longitude of the node, argument of perihelion, mean anomaly.
         A1, A2, A3 : Quantity
             Radial, transverse and normal non-gravitational acceleration at 1 au; a plain 0 means none.
-        law : {"asteroid", "comet"}
-            Dependence of A1, A2, A3 on distance.
+        law : {"asteroid", "comet"} or sequence of five floats
+            Dependence of A1, A2, A3 on the heliocentric distance: ``(1 au/r)^2``, sublimation of water ice, or the
+            constants ALN, R0 (au), NM, NN, NK of ``g(r) = ALN (r/R0)^-NM [1 + (r/R0)^NN]^-NK``.
         name : str
             Shown in tables.
         covariance : Covariance, optional
             Of any set of elements at any epoch.
+        DT : Quantity
+            g is evaluated at the distance this time earlier; positive for a maximum after perihelion.
+        AMRAT : Quantity
+            Illuminated area over mass, for radiation pressure on an absorbing body.
 
         Raises
         ------
@@ -112,7 +121,7 @@ class Orbit:
             to_si(v, u.rad, n)
             for v, n in ((_angle(i), "i"), (_angle(node), "node"), (_angle(peri), "peri"), (_angle(M), "M"))
         ]
-        push = _nongrav(A1, A2, A3, law)
+        push = _nongrav(A1, A2, A3, law, DT, AMRAT)
         if isinstance(epoch, Time) and epoch.scale == "utc" and np.all(epoch.jd * 2.0 % 1.0 == 0.0):
             warnings.warn(
                 "epoch is in UTC; elements are published in TDB or TT, which is 69 s ahead in 2026: "
@@ -131,7 +140,7 @@ class Orbit:
         name: str,
         covariance: Covariance | None,
     ) -> Orbit:
-        """Orbit from a, e, i, node, peri, M in m and rad: units on a whole catalogue would cost a minute."""
+        """Orbit from a, e, i, node, peri, M in m and rad, without units: a catalogue takes a minute less."""
         a, e, i, node, peri, mean = elements
         if a == 0.0 or e < 0.0 or e == 1.0 or (a > 0.0) != (e < 1.0):
             raise InvalidInput("e", e, f"below 1 for a > 0, above 1 for a < 0 (a = {a:g} m)")
@@ -151,9 +160,12 @@ class Orbit:
         A1: Quantity = _ZERO,
         A2: Quantity = _ZERO,
         A3: Quantity = _ZERO,
-        law: str = "asteroid",
+        law: str | Sequence[float] = "asteroid",
         name: str = "",
         covariance: Covariance | None = None,
+        *,
+        DT: Quantity = _NO_DELAY,
+        AMRAT: Quantity = _NO_AREA,
     ) -> Orbit:
         """Orbit from a state.
 
@@ -167,7 +179,7 @@ class Orbit:
             ``"sun"``, ``"ssb"``, or a body of the ephemeris (``"earth"``, ``"moon"``, ...).
         frame : {"ICRF", "ecliptic"}
             Axes: ICRF (equator) or ecliptic of J2000.
-        A1, A2, A3, law, name, covariance
+        A1, A2, A3, law, name, covariance, DT, AMRAT
             As in :meth:`from_elements`.
 
         Raises
@@ -185,7 +197,15 @@ class Orbit:
             r, v = ecliptic_to_icrf() @ r, ecliptic_to_icrf() @ v
         elif str(frame).upper() != "ICRF":
             raise UnknownName("frame", str(frame), [], known="(known: ICRF, ecliptic)")
-        return cls(_epoch(epoch), r * u.m, v * u.m / u.s, where, _nongrav(A1, A2, A3, law), name, covariance)
+        return cls(
+            _epoch(epoch),
+            r * u.m,
+            v * u.m / u.s,
+            where,
+            _nongrav(A1, A2, A3, law, DT, AMRAT),
+            name,
+            covariance,
+        )
 
     def barycentric(self, window: Window) -> Array:
         """State at the epoch relative to the barycentre of the solar system, shape (6,), m and m/s."""
@@ -277,14 +297,14 @@ class Orbit:
         return flight.state
 
     def to_skyfield(self, centre: str = "sun", ephemeris: str | Ephemeris | None = None) -> OrbitVector:
-        """The path as a vector function of skyfield, with all forces.
+        """Position as a vector function of skyfield, with all forces.
 
         Parameters
         ----------
         centre : {"sun", "ssb"}
             Origin of the vectors, ICRF.
         ephemeris : str or Ephemeris, optional
-            Of the forces, and for light time: open the same with
+            For the forces. Use the same for the observer and light time; it is opened by
             :func:`flybystab.orbit.vector_function.ephemeris_file`.
 
         Returns
@@ -306,17 +326,17 @@ class Orbit:
     ) -> tuple[Orbit, ...]:
         """Orbits drawn from the covariance, at its epoch.
 
-        The deviations from the mean of the covariance are added to this orbit, taken to the epoch of the
-        covariance with all forces where that differs; A1, A2, A3 are drawn along where they were estimated.
+        The deviations from the mean of the covariance are added to this orbit, propagated to the epoch of the
+        covariance with all forces if that differs. Estimated non-gravitational parameters are drawn with the elements.
 
         Parameters
         ----------
         n : int
-            How many.
+            Number of clones.
         seed : int
             Clone k depends on the seed and k alone.
         ephemeris : str or Ephemeris, optional
-            For the way to the epoch of the covariance.
+            For the propagation to the epoch of the covariance.
         first, last : int
             Only numbers `first` to ``last - 1`` of the `n`.
 
@@ -335,8 +355,8 @@ class Orbit:
     def sigma_points(self, ephemeris: str | Ephemeris | None = None) -> tuple[tuple[Orbit, ...], ...]:
         """Pairs of orbits, plus and minus one sigma along each principal axis of the correlations.
 
-        Half of the difference that a pair makes anywhere is a column F of the linear map: the covariance
-        there is ``F F^T``. Half of their sum less the nominal measures what the linear map leaves out.
+        Half of the difference of a pair at any later time is a column of F, and the covariance there is ``F F^T``
+        to first order. Half of the sum less the nominal value is the second-order term.
         """
         covariance = self._known("sigma points")
         ways = covariance.factor.T
@@ -367,9 +387,14 @@ def deviated(
     ephemeris: str | Ephemeris | None,
     first: int = 0,
 ) -> tuple[Orbit, ...]:
-    """An orbit taken to `epoch`, plus deviations of the state (m, 6) and of A1, A2, A3 (m, 3) there; SI.
+    """Orbits that deviate from an orbit propagated to `epoch`.
 
-    They are named by `label` and their numbers from `first` on.
+    Parameters
+    ----------
+    states, pushes : ndarray, shapes (m, 6) and (m, 5)
+        Deviations of the state (m, m/s) and of A1, A2, A3 (m/s2), DT (s), AMRAT (m2/kg).
+    label : str
+        Their names are this and a number, from `first` on.
     """
     position, velocity, centre = orbit.position, orbit.velocity, orbit.centre
     if abs(seconds(epoch, orbit.epoch)) > 1e-3:
@@ -377,18 +402,25 @@ def deviated(
         position, velocity = orbit.at(epoch, centre, ephemeris)
     else:
         epoch = orbit.epoch
-    r, v, a = position.to_value(u.m), velocity.to_value(u.m / u.s), np.array(orbit.nongrav.a)
+    r, v, old = position.to_value(u.m), velocity.to_value(u.m / u.s), orbit.nongrav
+    mean = np.array([*old.a, old.delay, old.area_to_mass])
     return tuple(
         Orbit(
             epoch,
             (r + ds[:3]) * u.m,
             (v + ds[3:]) * u.m / u.s,
             centre,
-            NonGravitational(tuple((a + da).tolist()), orbit.nongrav.law),
+            _changed(old, mean + da),
             f"{orbit.name} {label} {k}".strip(),
         )
         for k, (ds, da) in enumerate(zip(states, pushes, strict=True), first)
     )
+
+
+def _changed(law: NonGravitational, values: Array) -> NonGravitational:
+    """The law with other A1, A2, A3 (m/s2), DT (s), AMRAT (m2/kg)."""
+    a1, a2, a3, delay, area = values.tolist()
+    return NonGravitational((a1, a2, a3), law.law, delay, area)
 
 
 def heliocentric(orbit: Orbit, ephemeris: str | Ephemeris | None = None) -> Array:
@@ -401,20 +433,20 @@ def heliocentric(orbit: Orbit, ephemeris: str | Ephemeris | None = None) -> Arra
 
 
 def default_forces(orbit: Orbit, *bodies: str) -> tuple[str, ...]:
-    """All point masses, 1PN, J2 of Sun, Earth and `bodies`, and A1, A2, A3 if the orbit has them."""
-    flat = {f"{name} J2" for name in ("sun", "earth", *bodies)}
+    """All point masses, 1PN, J2 of Sun, Earth and `bodies`, J3, J4 of the Earth, the non-gravitational law if any."""
+    flat = {"earth J3", "earth J4", *(f"{name} J2" for name in ("sun", "earth", *bodies))}
     return tuple(
         name
         for name in FORCES
         if name.endswith("point mass")
         or name == "1PN"
         or name in flat
-        or (name == "non-gravitational" and any(orbit.nongrav.a))
+        or (name == "non-gravitational" and orbit.nongrav.active)
     )
 
 
 def check_barycentre(window: Window) -> None:
-    """Warn that a barycentric state is read with an ephemeris whose barycentre differs from that of DE430 to DE441."""
+    """Warn of a barycentric state with an ephemeris whose barycentre differs from that of DE430 to DE441."""
     source = EPHEMERIDES.get(window.name)
     if source is not None and not source.kuiper_belt:
         warnings.warn(
@@ -426,10 +458,10 @@ def check_barycentre(window: Window) -> None:
 
 
 def massive_twin(window: Window, epoch: float, state: Array) -> str | None:
-    """The massive asteroid that an orbit is itself the orbit of, or None.
+    """Name of the massive asteroid to which an orbit belongs, or None.
 
-    The table of the massive asteroids is good to 60,000 km: what starts within 100,000 km of one of them, at less than
-    100 m/s, is taken for it. A passage as slow as that does not happen in the main belt.
+    The table of the massive asteroids has errors up to 60,000 km. An orbit is taken for that of a massive asteroid if
+    it is within 100,000 km of it at less than 100 m/s; passages in the main belt are much faster.
 
     Parameters
     ----------
@@ -444,7 +476,7 @@ def massive_twin(window: Window, epoch: float, state: Array) -> str | None:
 
 
 def without_itself(forces: Iterable[str], orbit: Orbit, window: Window) -> tuple[str, ...]:
-    """The forces without the pull of the massive asteroid that the orbit belongs to."""
+    """The forces without the point mass of the massive asteroid to which the orbit belongs."""
     twin = massive_twin(window, seconds(orbit.epoch, window.epoch), orbit.barycentric(window))
     return tuple(name for name in forces if name != f"{twin} point mass")
 
@@ -480,11 +512,19 @@ def _angle(value: Any) -> Any:
     return value.to(u.rad) if isinstance(value, Quantity) and value.unit.is_equivalent(u.rad) else value
 
 
-def _nongrav(a1: Quantity, a2: Quantity, a3: Quantity, law: str) -> NonGravitational:
+def _nongrav(
+    a1: Quantity, a2: Quantity, a3: Quantity, law: str | Sequence[float], delay: Quantity, area: Quantity
+) -> NonGravitational:
     unit = u.m / u.s**2
-    # A plain zero is no push in any unit.
+    # A plain zero needs no unit.
     pairs = ((a1, "A1"), (a2, "A2"), (a3, "A3"))
     values = tuple(0.0 if isinstance(v, int | float) and v == 0 else to_si(v, unit, n) for v, n in pairs)
-    out = NonGravitational((values[0], values[1], values[2]), law)
+    text = law if isinstance(law, str) else " ".join(str(float(x)) for x in np.atleast_1d(law))
+    out = NonGravitational(
+        (values[0], values[1], values[2]),
+        text,
+        to_si(delay, u.s, "DT"),
+        to_si(area, u.m**2 / u.kg, "AMRAT", low=0.0),
+    )
     _ = out.constants  # refuses an unknown law
     return out

@@ -1,4 +1,4 @@
-"""The bodies that an asteroid can meet: mass, figure, pole and the height where a passage becomes an impact.
+"""Sun, planets, Moon and Pluto: mass, figure, pole and impact distance.
 
 A new body is one new entry in ``_TABLE``; :mod:`flybystab.orbit` derives everything else from it. Three bodies are
 special: the Sun (the centre of two-body motion and of non-gravitational accelerations) and the pair of Earth and Moon,
@@ -10,6 +10,7 @@ GM: DE440 (Park et al. 2021), the planet alone, not its system, for Mars outward
 ephemerides: MAR097, JUP365, SAT427, URA111, NEP095; Pluto: Brozovic et al. 2015); Earth: IERS 2010.
 Radius and pole: IAU Working Group on Cartographic Coordinates and Rotational Elements 2009 and 2015
 (Archinal et al. 2011, 2018), equatorial radii, pole at J2000; Earth: WGS 84; Sun: IAU 2015 Resolution B3.
+J3 and J4 of the Earth: DE440.
 J2: Mercury: Mazarico et al. 2014; Venus: Konopliv et al. 1999; Earth, Moon, Sun: DE440; Mars: Konopliv et
 al. 2016; Jupiter: Iess et al. 2018; Saturn: Iess et al. 2019; Uranus: Jacobson 2014; Neptune: Jacobson
 2009. Each is scaled to the radius of the table.
@@ -49,16 +50,18 @@ class Planet:
     pole : tuple of float
         Unit vector of the rotation pole at J2000, ICRF.
     atmosphere : float
-        Height above `radius` that counts as the top of the atmosphere, m; zero without one.
+        Height of the top of the atmosphere above `radius`, m; zero without one.
     target : int
         NAIF number of the ephemeris target (a system barycentre from Mars outwards).
     orbit_radius : float
         Semi-major axis of the orbit around the Sun (Moon: that of the Earth), m; zero for the Sun.
     series : tuple of int, optional
-        NAIF numbers (centre, target) of the series of an ephemeris that gives its place: with it the body attracts
-        asteroids and can be encountered on a real orbit. None: only hyperbolic encounters (:func:`planet`).
+        NAIF numbers (centre, target) of the series of its position in an ephemeris. Such a body attracts asteroids
+        and can be encountered on a real orbit; without (None) only hyperbolic encounters are possible.
     relativity : bool
         Whether it is a source of the 1PN terms of its own (:mod:`flybystab.orbit.relativity`).
+    j3, j4 : float
+        Third and fourth zonal harmonic for `radius`, dimensionless; zero: not modelled.
     """
 
     name: str
@@ -71,6 +74,8 @@ class Planet:
     orbit_radius: float
     series: tuple[int, int] | None = None
     relativity: bool = False
+    j3: float = 0.0
+    j4: float = 0.0
 
     @property
     def impact_distance(self) -> float:
@@ -78,7 +83,7 @@ class Planet:
         return self.radius + self.atmosphere
 
     def impact_level(self, distance: float) -> str | None:
-        """What a passage at `distance` (m) reaches: ``"surface"``, ``"atmosphere"`` or None."""
+        """Lowest level reached at periapsis distance `distance` (m): ``"surface"``, ``"atmosphere"`` or None."""
         if distance < self.radius:
             return "surface"
         return "atmosphere" if distance < self.impact_distance else None
@@ -88,7 +93,7 @@ class Planet:
 
         The Earth's moves by 0.56 deg a century (IAU 2006 precession, Capitaine et al. 2003: X = 2004.19" T - 0.43" T^2,
         Y = -22.41" T^2, nutation of 9" left out): after the 2029 passage of Apophis that is 3 km within a year. The
-        others' stay, to 0.1 deg a century.
+        others are taken as fixed, which is good to 0.1 deg a century.
         """
         if self.name != "earth":
             return self.pole
@@ -126,6 +131,8 @@ def _body(
     orbit_radius: float,
     series: tuple[int, int],
     relativity: bool = False,
+    j3: float = 0.0,
+    j4: float = 0.0,
 ) -> Planet:
     """One entry of the table: GM in km3/s2, lengths in km, pole (ra, dec) in deg, radius of the orbit in au."""
     return Planet(
@@ -139,6 +146,8 @@ def _body(
         orbit_radius * AU,
         series,
         relativity,
+        j3,
+        j4,
     )
 
 
@@ -157,6 +166,8 @@ _TABLE = (
         1.000001,
         (0, 3),
         True,
+        -2.532410e-6,
+        -1.619898e-6,
     ),
     _body(
         "moon",
@@ -209,7 +220,7 @@ _TABLE = (
     _body("pluto", 869.6, 1188.3, 0.0, (132.993, -6.163), 0.0, 9, 39.482117, (0, 9)),
 )
 
-#: Every body that :func:`planet` knows, by name.
+#: All bodies by name.
 PLANETS: dict[str, Planet] = {body.name: body for body in _TABLE}
 
 
@@ -219,7 +230,7 @@ def planet(name: str | Planet) -> Planet:
     Parameters
     ----------
     name : str or Planet
-        English name, any case; a `Planet` is returned as it is, so that a made-up one can be used.
+        English name, any case. A `Planet` is returned unchanged, so that a hypothetical one can be used.
 
     Raises
     ------

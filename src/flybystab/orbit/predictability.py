@@ -15,7 +15,7 @@ import numpy as np
 from astropy.time import Time
 
 from flybystab.constants import YEAR
-from flybystab.orbit.covariance import Covariance
+from flybystab.orbit.covariance import PUSHES, Covariance
 from flybystab.orbit.ephemeris import Ephemeris
 from flybystab.orbit.orbit import Orbit, deviated
 from flybystab.typing import Array
@@ -68,8 +68,9 @@ class Deviations:
     ----------
     orbit : Orbit
         The orbit at the epoch of its covariance.
-    states, accelerations : ndarray, shapes (2, n, 6) and (2, n, 3)
-        Differences from the orbit: state (m, m/s, ICRF axes) and A1, A2, A3 (m/s2); first plus, then minus.
+    states, pushes : ndarray, shapes (2, n, 6) and (2, n, 5)
+        Differences from the orbit: state (m, m/s, ICRF axes), and A1, A2, A3 (m/s2), DT (s), AMRAT (m2/kg); first
+        plus, then minus.
     label : str
         Description.
     known : bool
@@ -80,7 +81,7 @@ class Deviations:
 
     orbit: Orbit
     states: Array
-    accelerations: Array
+    pushes: Array
     label: str
     known: bool = True
     scale: float = 1.0
@@ -98,9 +99,13 @@ def deviations_of(orbit: Orbit, ephemeris: str | Ephemeris | None = None) -> Dev
         r = orbit.position.to_value("m")
         out = np.concatenate([_SHIFT * r / np.linalg.norm(r), np.zeros(3)])
         points = np.array([out, -out])[:, None]
-        return Deviations(orbit, points, np.zeros((2, 1, 3)), "1 m away from the Sun", False, 1.0 / _SHIFT)
-    there = deviated(orbit, covariance.epoch, np.zeros((1, 6)), np.zeros((1, 3)), "there", ephemeris)[0]
+        return Deviations(
+            orbit, points, np.zeros((2, 1, len(PUSHES))), "1 m away from the Sun", False, 1.0 / _SHIFT
+        )
+    there = deviated(
+        orbit, covariance.epoch, np.zeros((1, 6)), np.zeros((1, len(PUSHES))), "there", ephemeris
+    )[0]
     found = [covariance.deviations(covariance.values + sign * covariance.factor.T) for sign in (1.0, -1.0)]
-    states, accelerations = (np.array(x) for x in zip(*found, strict=True))
+    states, pushes = (np.array(x) for x in zip(*found, strict=True))
     label = "one sigma in the direction least known" + (f", {covariance.caveat}" if covariance.caveat else "")
-    return Deviations(there, states, accelerations, label)
+    return Deviations(there, states, pushes, label)

@@ -1,14 +1,14 @@
-"""General relativity beside Newton's pull (1PN): Einstein-Infeld-Hoffmann (Moyer 2003, eq. 4-26; beta = gamma = 1).
+"""First post-Newtonian (1PN) acceleration: Einstein-Infeld-Hoffmann (Moyer 2003, eq. 4-26; beta = gamma = 1).
 
-Sources are the Sun, Venus, Earth, Jupiter and Saturn; the terms are ordered by what all bodies share. With Newton's
-field g and potential U, v the barycentric velocity,
+Sources are the Sun, Venus, Earth, Jupiter and Saturn; terms common to all bodies are factored out. With the Newtonian
+field g and potential U, and the barycentric velocity v,
 
 ``c^2 a = (v^2 - 4 U) g - 4 (g.v) v + sum_j {GM/r^3 [(U_j - 2 u^2 + 4 u.v + 1.5 (r.u/r)^2 + 0.5 r.a_j) r
 - 4 (r.v) u - 3 (r.u) (v - u)] + 3.5 GM a_j/r}``,
 
-r from source j, which moves with u and a_j where the others' potential is U_j. One source at rest gives Schwarzschild's
-in harmonic coordinates. The Sun alone as a source would be no better than Schwarzschild's: what the planets do to it
-and what they themselves do cancel in part.
+r is relative to source j, which has velocity u, acceleration a_j and the potential U_j of the other bodies. For one
+source at rest this is the Schwarzschild term in harmonic coordinates. With the Sun as the only source it would not be
+more accurate than that: the terms of the planets and those of the Sun's motion cancel in part.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from flybystab.orbit.ephemeris import BODIES, N_BODIES
 from flybystab.orbit.planets import PLANETS
 from flybystab.typing import Array
 
-#: The bodies whose part counts: what the others do moves an asteroid by a metre in four years (median of 19).
+#: Sources; the other bodies displace an asteroid by a metre in four years (median of 19).
 IS_SOURCE = np.array([PLANETS[name].relativity for name in BODIES])
 
 

@@ -62,7 +62,7 @@ def test_tide_is_trace_free_symmetric_and_even(tide):
 
 
 def test_tide_turns_with_the_frame():
-    q = Rotation.random(rng=4).as_matrix()
+    q = Rotation.random(random_state=4).as_matrix()
     r, pole = random_place(5), random_place(6, 1.0)
     np.testing.assert_allclose(point(q @ r), q @ point(r) @ q.T, atol=1e-20)
     np.testing.assert_allclose(oblate(q @ r, q @ pole), q @ oblate(r, pole) @ q.T, atol=1e-22)

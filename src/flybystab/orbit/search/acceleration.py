@@ -1,7 +1,7 @@
-"""The acceleration of an asteroid among bodies read from an almanac: what a search evaluates millions of times.
+"""Acceleration of an asteroid with the positions of the bodies from an almanac, for the search for encounters.
 
-The same forces as in :mod:`flybystab.orbit.forces`, from the same table, arranged so that the sums over bodies
-become vector instructions.
+The forces are those of :mod:`flybystab.orbit.forces`, from the same table, arranged so that the compiler vectorises
+the sums over bodies.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ from flybystab.orbit.almanac import (
     find_places,
 )
 from flybystab.orbit.ephemeris import BODIES, SUN, Window
-from flybystab.orbit.forces import core, fade, model, push
+from flybystab.orbit.forces import core, fade, model, push, zonal_factors
 from flybystab.orbit.relativity import of_source
 from flybystab.typing import Array
 
@@ -50,15 +50,15 @@ class Field(NamedTuple):
         GM (m3/s2) in use per slot; zero: left out.
     inner_fast, inner_slow : ndarray
         Square of the radius of the smooth core per slot, m2; ``nothing`` is zeros, for the asteroids.
-    flat : ndarray, shape (n, 10)
-        Bodies with J2: grid (0 fast, 1 slow), slot, strength ``3/2 J2 GM a^2`` (m5/s2), pole at t = 0, rate of the
-        pole (1/s), square of the radius of the core (m2).
+    flat : ndarray, shape (n, 12)
+        Bodies with zonal harmonics: grid (0 fast, 1 slow), slot, ``J2 GM a^2`` (m5/s2), pole at t = 0, rate of the
+        pole (1/s), ``J3 GM a^3``, ``J4 GM a^4``, square of the radius of the core (m2).
     gm_pn : float
-        GM of the Sun if there is relativity, else zero.
+        GM of the Sun with 1PN, else zero.
     heavy : ndarray, shape (2, N_HEAVY)
         GM in use of ``HEAVY``, and the square of the radius (m2) inside of which each is left out of relativity.
     head, data, gm : ndarray
-        The ephemeris itself, for places to the last digit.
+        The ephemeris itself, for positions without interpolation error.
     """
 
     book: Almanac
@@ -77,7 +77,7 @@ class Field(NamedTuple):
 
 
 def field(window: Window, forces: Iterable[str]) -> Field:
-    """The forces of that name (``FORCES``, without non-gravitational) in a window.
+    """The named forces (``FORCES``, without non-gravitational) in a window.
 
     Raises
     ------
@@ -95,8 +95,9 @@ def field(window: Window, forces: Iterable[str]) -> Field:
     rows = []
     for b in range(len(BODIES)):
         at = table._FLAT + table.FLAT_WIDTH * b
-        if flat_model[at] != 0.0:
-            rows.append([float(GRID[b]), float(SLOT[b]), *flat_model[at : at + table.FLAT_WIDTH], inner[b]])
+        numbers = flat_model[at : at + table.FLAT_WIDTH]
+        if numbers[[0, 7, 8]].any():
+            rows.append([float(GRID[b]), float(SLOT[b]), *numbers, inner[b]])
     return Field(
         almanac(window, bool(belt.any())),
         grids[0],
@@ -105,7 +106,7 @@ def field(window: Window, forces: Iterable[str]) -> Field:
         inners[0],
         inners[1],
         np.zeros(N_BELT),
-        np.array(rows).reshape(-1, 10),
+        np.array(rows).reshape(-1, 3 + table.FLAT_WIDTH),
         float(window.gm[SUN]) if flat_model[2] != 0.0 else 0.0,
         np.array([used[: len(BODIES)], inner])[:, [BODIES.index(name) for name in HEAVY]],
         window.head,
@@ -116,13 +117,13 @@ def field(window: Window, forces: Iterable[str]) -> Field:
 
 @kernel
 def empty_places() -> Places:
-    """Room for the places of all bodies."""
+    """Uninitialised positions of all bodies."""
     return Places(np.zeros(C_FAST), np.zeros(C_SLOW), np.zeros(C_BELT), np.zeros(C_HEAVY))
 
 
 @kernel
 def borrowed_field(f: Field) -> Field:
-    """The same field without reference counts, for use inside a kernel that has it as an argument."""
+    """The field without reference counts, for use inside a kernel that has it as an argument."""
     b = f.book
     return Field(
         Almanac(borrowed(b.when), borrowed(b.fast), borrowed(b.slow), borrowed(b.belt), borrowed(b.heavy)),
@@ -145,7 +146,10 @@ def borrowed_field(f: Field) -> Field:
 def _pull(
     p: Array, slots: int, gm: Array, inner: Array, x: float, y: float, z: float
 ) -> tuple[float, float, float, float, int]:
-    """Newton's pull of one grid (m/s2), its potential (m2/s2), and in how many bodies the asteroid is (left out)."""
+    """Newtonian acceleration by the bodies of one grid (m/s2), potential (m2/s2), number of bodies around the asteroid.
+
+    Bodies with the asteroid inside their smooth core are left out of both sums.
+    """
     ax = 0.0
     ay = 0.0
     az = 0.0
@@ -168,7 +172,7 @@ def _pull(
 
 @kernel
 def _pull_inside(p: Array, slots: int, gm: Array, inner: Array, x: Array, out: Array) -> None:
-    """Add to ``out[3:6]`` the pull of the bodies of one grid that the asteroid is inside of: a smooth core."""
+    """Add to ``out[3:6]`` the acceleration by those bodies of a grid whose smooth core contains the asteroid."""
     for i in range(slots):
         dx, dy, dz = p[i] - x[0], p[slots + i] - x[1], p[2 * slots + i] - x[2]
         r2 = dx * dx + dy * dy + dz * dz
@@ -192,9 +196,9 @@ def _push(law: Array, y: Array, places: Places, out: Array) -> None:
 
 @pasted_kernel
 def rate(field: Field, law: Array, t: float, y: Array, places: Places, out: Array) -> None:
-    """Write velocity and acceleration at ``t`` (s), ``y[6]`` into ``out[6]``, and where the bodies are.
+    """Write velocity and acceleration at ``t`` (s), ``y[6]`` into ``out[6]``, and positions of bodies into ``places``.
 
-    ``law[8]`` is A1, A2, A3 (m/s2) and the constants of their law; zeros for none.
+    ``law`` is :attr:`flybystab.orbit.forces.NonGravitational.row`; zeros without non-gravitational acceleration.
     """
     belt = field.book.when[2, 2] > 0.0
     find_places(field.book, t, belt, places)
@@ -220,11 +224,11 @@ def rate(field: Field, law: Array, t: float, y: Array, places: Places, out: Arra
         dy = py - p[slots + s]
         dz = pz - p[slots + slots + s]
         r2 = dx * dx + dy * dy + dz * dz
+        d = np.sqrt(r2)
         polar_x, polar_y, polar_z = row[3] + t * row[6], row[4] + t * row[7], row[5] + t * row[8]
-        z = dx * polar_x + dy * polar_y + dz * polar_z
-        c = row[2] / (r2 * r2 * np.sqrt(r2)) * (1.0 if r2 > row[9] else fade(r2 / row[9]))
-        a = c * (5.0 * z * z / r2 - 1.0)
-        b = -2.0 * c * z
+        z = (dx * polar_x + dy * polar_y + dz * polar_z) / d
+        w = 1.0 if r2 > row[11] else fade(r2 / row[11])
+        a, b = zonal_factors(w * row[2], w * row[9], w * row[10], d, z)
         ax += a * dx + b * polar_x
         ay += a * dy + b * polar_y
         az += a * dz + b * polar_z
@@ -277,7 +281,7 @@ def rate(field: Field, law: Array, t: float, y: Array, places: Places, out: Arra
     if n + m > 0:
         _pull_inside(fast, N_FAST, field.gm_fast, field.inner_fast, y, out)
         _pull_inside(slow, N_SLOW, field.gm_slow, field.inner_slow, y, out)
-    if law[0] != 0.0 or law[1] != 0.0 or law[2] != 0.0:
+    if law[0] != 0.0 or law[1] != 0.0 or law[2] != 0.0 or law[9] != 0.0:
         _push(law, y, places, out)
 
 

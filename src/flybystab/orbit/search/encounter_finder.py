@@ -1,7 +1,6 @@
-"""All encounters of many asteroids.
+"""Search for the encounters of many asteroids.
 
-Each asteroid is followed on its own (:mod:`flybystab.orbit.search.track`), so that none disturbs another, and
-threads share the work.
+Asteroids are massless and integrated independently (:mod:`flybystab.orbit.search.track`), in several threads.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from flybystab.core.numerics.threads import in_order, worker_count
 from flybystab.errors import Impact, InvalidInput, NotConverged
 from flybystab.orbit.almanac import GRID, N_FAST, N_SLOW, SLOT
 from flybystab.orbit.ephemeris import BELT, BODIES, N_BODIES, SUN, Ephemeris, Window
-from flybystab.orbit.forces import FORCES
+from flybystab.orbit.forces import FORCES, LAW_SIZE
 from flybystab.orbit.observatories import geographic
 from flybystab.orbit.orbit import (
     TWIN_DISTANCE,
@@ -50,13 +49,13 @@ from flybystab.units import checked_time, to_si
 
 _SPEED = u.m / u.s
 
-#: A passage this close to an end of the span counts at `start` and not at `stop`, s: more than its time is uncertain
-#: by, so that of two spans side by side exactly one has it.
+#: A passage this close to an end of the span counts at `start` and not at `stop`, s. It exceeds the error of the time,
+#: so that exactly one of two adjacent spans contains the passage.
 _EDGE = 1.0
-#: How far the search goes beyond the span to see a passage at its end on both sides, s.
+#: Margin of the integration beyond the span, so that a minimum at its end is bracketed, s.
 _MARGIN = 60.0
-#: Tolerance over the error (m) that it leaves the median asteroid with after ten years; the error grows with the
-#: square of time (``flybystab bench sky``).
+#: Tolerance over the error (m) of the median asteroid after ten years; the error grows with the square of time
+#: (``flybystab bench sky``).
 _AT_10_YEARS, _TOLERANCES = 1e-12 / 100.0, (1e-15, 1e-8)
 
 
@@ -82,7 +81,7 @@ def find_encounters(
     progress: Callable[[int, int, int], None] | None = None,
     threads: int | None = None,
 ) -> QTable:
-    """Every closest approach of every asteroid to every planet below a threshold.
+    """All closest approaches of asteroids to planets within a distance.
 
     Parameters
     ----------
@@ -98,12 +97,13 @@ def find_encounters(
     ephemeris : str or Ephemeris, optional
         ``"de421"``, ``"de440"``; the best installed by default.
     error : Quantity
-        Displacement that counts: of the point masses and 1PN an asteroid is given those that can move
-        it by more than a tenth of this before the end of the span; J2 of Sun, Earth and `planets` and its own
-        A1, A2, A3 always.
+        Allowed displacement: point masses and 1PN are left out where their estimated displacement of the asteroid
+        by the end of the span is below a tenth of this. J2 of Sun, Earth and `planets`, and the non-gravitational
+        acceleration are always included.
     tolerance : float, optional
-        Error per step of the integration, in units of 1.5e11 m and 30 km/s; by default what keeps the median
-        asteroid within `error` to the end of its span: ``1e-12 (error/0.1 km) (10 yr/span)^2``, from 1e-15 to 1e-8.
+        Error per step of the integration, in units of 1.5e11 m and 30 km/s. By default
+        ``1e-12 (error/0.1 km) (10 yr/span)^2``, from 1e-15 to 1e-8: the error of the median asteroid is then below
+        `error` at the end of the span.
     forces : tuple of str, optional
         Exactly these forces, names as in ``flybystab.orbit.forces.FORCES``, instead of choosing by `error`.
     growth : bool
@@ -175,7 +175,7 @@ def find_encounters(
     window = _window(eph, middle.tdb.jd1, middle.tdb.jd2, min(every), max(every))
     chosen = forces
     if chosen is None:
-        kinds = {any(orbit.nongrav.a): orbit for _, orbit in rows}
+        kinds = {orbit.nongrav.active: orbit for _, orbit in rows}
         used = {name for orbit in kinds.values() for name in default_forces(orbit, *(b.name for b in found))}
         chosen = tuple(name for name in FORCES if name in used)
     longest = np.maximum(np.abs(epochs - t_start), np.abs(epochs - t_stop))
@@ -194,13 +194,13 @@ def find_encounters(
     for name in ("sun", *(b.name for b in found)):
         b = BODIES.index(name)
         always[SLOT[b] + N_FAST * GRID[b]] = True
-    laws = np.zeros((len(rows), 8))
+    laws = np.zeros((len(rows), LAW_SIZE))
     if "non-gravitational" in chosen:
         for i, (_, orbit) in enumerate(rows):
-            if any(orbit.nongrav.a):
-                laws[i] = *orbit.nongrav.a, *orbit.nongrav.constants
+            if orbit.nongrav.active:
+                laws[i] = orbit.nongrav.row
     states = _states(rows, window, epochs)
-    # A massive asteroid does not pull itself: it has forces of its own.
+    # A massive asteroid does not attract itself.
     twins = {} if forces is not None else _twins(window, epochs, states)
     own = {
         i: field(window, [n for n in chosen if n not in ("non-gravitational", f"{name} point mass")])
@@ -243,7 +243,7 @@ def find_encounters(
             parts.append(out[:n].copy())
         return parts
 
-    # Parts small enough that threads end together, large enough that Python does not count.
+    # Parts small enough for an even load of the threads, large enough for a small overhead of Python.
     size = max(1, min(64, -(-len(rows) // (4 * workers)))) if workers > 1 else max(len(rows), 1)
     cuts = sorted({*range(0, len(rows), size), *twins, *(i + 1 for i in twins), len(rows)})
     tasks = [slice(i, j) for i, j in pairwise(cuts)]
@@ -324,7 +324,7 @@ def starts_inside(name: str, epoch: Time, body: Planet) -> InvalidInput:
 def _epochs(rows: list[tuple[str, Orbit]], origin: Time) -> Array:
     """Epochs, s (TDB) from `origin`; whole days first, so that no digit is lost."""
     zero = origin.tdb
-    # Asteroids of a catalogue share few epochs, and a Time takes long to say its date.
+    # Asteroids of a catalogue share few epochs, and reading a Time is slow.
     epochs = {id(orbit.epoch): orbit.epoch for _, orbit in rows}
     known = {key: (t.jd1, t.jd2) for key, t in epochs.items()}
     pairs = np.array([known[id(orbit.epoch)] for _, orbit in rows]).reshape(-1, 2)
@@ -361,7 +361,7 @@ def _twins(window: Window, epochs: Array, states: Array) -> dict[int, str]:
 def _forces_used(
     chosen: tuple[str, ...], shares: Array, least: float
 ) -> tuple[tuple[str, ...], dict[str, float], dict[str, float]]:
-    """Forces that at least one asteroid was given, their largest shares where known, and those of the others, km."""
+    """Forces used for at least one asteroid, their largest displacements (km) where known, and those of the others."""
     largest = {name: float(v) for name, v in zip(NAMES, shares.max(axis=0, initial=0.0), strict=True) if name}
     out = {name for name, value in largest.items() if value < least and name in chosen and len(shares)}
     kept = tuple(n for n in chosen if n not in out)

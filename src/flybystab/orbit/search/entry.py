@@ -23,7 +23,7 @@ def entry(
 
     Parameters
     ----------
-    field, law : Field, ndarray (8,)
+    field, law : Field, ndarray (10,)
         Forces of the search.
     window : Window
     body : int

@@ -1,7 +1,7 @@
-"""Which forces an orbit needs over a span: the displacement that each can make, against the error asked for.
+"""Selection of the forces for an orbit and a time span: estimated displacement by each against the allowed error.
 
-The same measure as :func:`flybystab.orbit.forces.shares`, ``3 int |a_i(t)| |t_end - t| dt``, along the two-body
-orbit around the Sun and with the bodies of the almanac: some microseconds an asteroid.
+The estimate is that of :func:`flybystab.orbit.forces.shares`, ``3 int |a_i(t)| |t_end - t| dt``, along the two-body
+orbit around the Sun with positions from the almanac. It takes some microseconds an asteroid.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from flybystab.orbit.search.acceleration import Field
 from flybystab.typing import Array
 
 N_SHARES = N_FAST + N_SLOW + N_BELT + 1
-#: The forces with a share, in its order: slots of the three grids (None where one is empty), then 1PN.
+#: Forces with an estimate, in its order: slots of the three grids (None for empty ones), then 1PN.
 NAMES = (
     *(f"{name} point mass" for name in (*FAST, *SLOW)),
     *[None] * (N_SLOW - len(SLOW)),
@@ -30,7 +30,7 @@ _SUN = int(SLOT[SUN])
 
 @kernel
 def shares_along(field: Field, t0: float, y: Array, t_end: float, places: Places, share: Array) -> None:
-    """Raise ``share`` (m) to the displacement that each force can make from ``t0`` to ``t_end``.
+    """Set ``share`` (m) to the larger of itself and the displacement by each force from ``t0`` to ``t_end``.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def shares_along(field: Field, t0: float, y: Array, t_end: float, places: Places
     t_end : float
         End, s, before or after.
     places : Places
-        Room.
+        Work space.
     share : ndarray, shape (N_SHARES,)
         In the order of ``NAMES``.
     """
@@ -87,7 +87,7 @@ def _square(p: Array, slots: int, i: int, x: Array) -> float:
 
 @kernel
 def reduced(field: Field, share: Array, least: float, always: Array) -> Field:
-    """The field without the forces of a share (m) below ``least``; slots flagged in ``always`` stay."""
+    """The field without forces whose ``share`` (m) is below ``least``; slots flagged in ``always`` are kept."""
     fast, slow, belt = field.gm_fast.copy(), field.gm_slow.copy(), field.gm_belt.copy()
     for i in range(N_FAST):
         if share[i] < least and not always[i]:

@@ -1,8 +1,8 @@
-"""Closest approaches inside one step of a search: rejected cheaply, sampled, and refined to the root.
+"""Closest approaches within one step of a search: exclusion by a lower bound, sampling, refinement.
 
-The chord between the ends of a step, less the most that an accelerated path can bulge from it
-(``h^2 |a| / 8``), bounds the distance from below. What that does not exclude is sampled on the quintic through
-the ends; a change of sign of ``r.v`` is refined on the integrator's own trajectory, against the ephemeris itself.
+The distance from the chord between the ends of a step, less the largest deviation of an accelerated path from it
+(``h^2 |a| / 8``), is a lower bound. Other steps are sampled on the quintic Hermite interpolant; a change of sign of
+``r.v`` is refined with steps of the integrator and positions from the ephemeris.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from flybystab.typing import Array
 #: Columns of a raw result: body, time (s), state relative to the body (6; m, m/s), distance (m), v_inf^2
 #: (m2/s2), impact (0, 1), asteroid.
 WIDTH = 12
-#: Pieces in which ``r.v`` is sampled; more where the body's pull or the Sun's tide can turn a slow path round.
+#: Intervals in which ``r.v`` is sampled: usual, and for slow relative motion, where it can change sign twice.
 _CUTS, FINE = 8, 64
 #: Upper bound of the acceleration of each of ``BODIES``, m/s2: GM_sun over the square of the perihelion distance for
 #: an eccentricity of 0.3, and for the Moon the Earth's pull (0.0029); the Sun's is below 1e-5.
@@ -64,7 +64,7 @@ def relative_state(field: Field, pair: Array, body: int, t: float, out: Array, w
 
 @kernel
 def end_state(field: Field, pair: Array, end: int, body: int, out: Array, work: Array) -> float:
-    """The same at an end of the step, where nothing is interpolated."""
+    """The same at an end of the step, without interpolation."""
     body_state(field.head, field.data, field.gm, body, pair[end, 0], work)
     for j in range(6):
         out[j] = pair[end, 1 + j] - work[j]
@@ -73,7 +73,7 @@ def end_state(field: Field, pair: Array, end: int, body: int, out: Array, work: 
 
 @kernel
 def cuts(field: Field, pair: Array, body: int) -> int:
-    """In how many pieces to sample: few unless ``|r.a|`` can outweigh ``v^2``, when ``r.v`` can turn twice."""
+    """Number of sampling intervals: `FINE` where ``|r.a|`` can exceed ``v^2`` and ``r.v`` can change sign twice."""
     a, b, work = np.empty(6), np.empty(6), np.empty(6)
     end_state(field, pair, 0, body, a, work)
     end_state(field, pair, 1, body, b, work)
@@ -101,8 +101,8 @@ def refine(
     p = np.empty((3, 6))
     for _ in range(12):
         step(field, law, t0, y0, t - t0, k, y, places)
-        # Places, and the planet's acceleration by a central difference over two minutes: a slow passage is
-        # steered by the Sun as much as by the planet.
+        # Positions, and the planet's acceleration by a central difference over two minutes: in a slow passage
+        # the Sun's tide matters as much as the planet's attraction.
         for i in range(3):
             body_state(field.head, field.data, field.gm, body, t + 60.0 * (i - 1), p[i])
         rv = 0.0
@@ -119,7 +119,7 @@ def refine(
             return t
         dt = -rv / slope
         if abs(dt) < 1e-5:
-            # What is left is linear: shift along the relative velocity.
+            # Linear in the remaining time: shift along the relative velocity.
             for j in range(3):
                 out[j] += dt * out[3 + j]
             return t + dt
@@ -209,7 +209,7 @@ def look(
         k[0] = first
         t = refine(field, law, pair[0, 0], pair[0, 1:7], k, body, b, row[2:8], places)
         d = np.sqrt(row[2] ** 2 + row[3] ** 2 + row[4] ** 2)
-        if d < floor:  # in and out again within one step
+        if d < floor:  # entry and exit within one step
             end_state(field, pair, 0, body, row[2:8], work)
             crash(row, body, field.gm[body], pair[0, 0], 1.0)
             return n + 1, row[1]

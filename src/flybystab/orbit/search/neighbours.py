@@ -13,8 +13,10 @@ from numpy.typing import NDArray
 from flybystab.constants import DAY, YEAR
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.threads import in_order
+from flybystab.orbit.covariance import PUSHES
 from flybystab.orbit.elements import GM_SUN
 from flybystab.orbit.ephemeris import SUN, Window
+from flybystab.orbit.forces import RADIATION_PRESSURE
 from flybystab.orbit.kepler import two_body
 from flybystab.orbit.orbit import seconds
 from flybystab.orbit.planets import planet
@@ -140,8 +142,8 @@ def spread(
     Parameters
     ----------
     beside : Deviations
-    field, law : Field, ndarray (8,)
-        Forces, and A1, A2, A3 (m/s2) with their law.
+    field, law : Field, ndarray (10,)
+        Forces, and :attr:`flybystab.orbit.forces.NonGravitational.row`.
     window : Window
     times : ndarray, shape (n,)
     tolerance : float
@@ -150,14 +152,16 @@ def spread(
     start = seconds(beside.orbit.epoch, window.epoch)
     state = beside.orbit.barycentric(window)
     law = law.copy()
-    if law[4] == 0.0:  # no law of distance: A1, A2, A3 are zero, but not always their errors
-        law[3:] = beside.orbit.nongrav.constants
-    points = beside.states.reshape(-1, 6), beside.accelerations.reshape(-1, 3)
+    if not law.any():  # no non-gravitational acceleration, but its parameters can have errors
+        law[:] = beside.orbit.nongrav.row
+    points = beside.states.reshape(-1, 6), beside.pushes.reshape(-1, len(PUSHES))
 
     def follow(deviation: Array, more: Array, at: Array) -> Array:
         out = np.full((at.size, 6), np.nan)
         its = law.copy()
-        its[:3] += more
+        its[:3] += more[:3]
+        its[8] += more[3]
+        its[9] += RADIATION_PRESSURE * more[4]
         carry(field, its, start, state + deviation, at, tolerance, empty_room(), out)
         return out
 
@@ -173,7 +177,7 @@ def spread(
         grid = np.unique(np.concatenate([[start], regular, times[rows]]))
         grid = grid if far >= start else grid[::-1]
         at = np.searchsorted(np.abs(grid - start), np.abs(times[rows] - start))
-        base = follow(np.zeros(6), np.zeros(3), grid)
+        base = follow(np.zeros(6), np.zeros(len(PUSHES)), grid)
         gaps = np.array([follow(*point, grid[at])[:, :3] for point in zip(*points, strict=True)])
         displacement[rows] = _largest(gaps - base[at, :3])
         helio = base - window.states(SUN, grid)
@@ -272,8 +276,8 @@ def add_growth(
         Of the rows: closest approach, or entry of an impact, s from the epoch of the window.
     beside : mapping
         Deviations by number of the asteroid, of each that the table has.
-    laws : ndarray, shape (n, 8)
-        A1, A2, A3 of each asteroid with their law.
+    laws : ndarray, shape (n, 10)
+        Non-gravitational law of each asteroid, :attr:`flybystab.orbit.forces.NonGravitational.row`.
     window, tolerances
         Of the search.
     field_of : callable

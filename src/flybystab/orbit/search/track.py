@@ -1,8 +1,8 @@
-"""One compiled integration per asteroid, with the search for encounters inside it.
+"""Integration of one asteroid after the other with DOP853, and the search for encounters within each step.
 
-DOP853 among prescribed bodies. Each asteroid has its own steps and only the forces that it needs. After each step
-every planet asked for is checked for a minimum of distance (:mod:`flybystab.orbit.search.minima`). An impact, on
-whichever body, is reported and ends that track.
+Each asteroid has its own step size and those forces that are relevant to it. After each step the distances from the
+requested planets are checked for minima (:mod:`flybystab.orbit.search.minima`). An impact on any body is reported and
+ends the integration of that asteroid.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ from flybystab.orbit.search.force_selection import reduced, shares_along
 from flybystab.orbit.search.minima import BENDING, FINE, chord_distance, crash, look
 from flybystab.typing import Array
 
-#: How a search ends: ``out`` too small, step size collapsed, start below the surface or atmosphere of a body.
+#: Status of a search: `out` too small, step size collapsed, start inside a body or its atmosphere, too many steps.
 FULL, STALLED, INSIDE, EXHAUSTED = 1, 2, 3, 4
 #: Most steps from the epoch to the end of the span; an asteroid of the inner main belt takes about 60 a year.
 MAX_STEPS = 1_000_000
@@ -41,14 +41,14 @@ def track_encounters(
     out: Array,
     n: int,
 ) -> tuple[int, int, float]:
-    """Encounters of one asteroid from ``t0`` to ``t_end``, s; before ``t_quiet`` only impacts.
+    """Encounters of one asteroid from ``t0`` to ``t_end``, s; only impacts before ``t_quiet``.
 
     Parameters
     ----------
     field : Field
         Forces, without the non-gravitational one.
-    law : ndarray, shape (8,)
-        A1, A2, A3 (m/s2) and their law; zeros for none.
+    law : ndarray, shape (10,)
+        :attr:`flybystab.orbit.forces.NonGravitational.row`; zeros for none.
     t0, y0 : float, ndarray
         Start (s) and barycentric state (m, m/s). Time may run backward.
     limits, floors : ndarray, shape (bodies,)
@@ -170,7 +170,7 @@ def search(
 ) -> tuple[int, int, int, float]:
     """Encounters of asteroids ``first``, ``first + 1``, ... until all are done or ``out`` is full.
 
-    ``least`` (m) is the share of a force below which it is left out; ``shares`` takes the estimates.
+    Forces with an estimated displacement below ``least`` (m) are left out; the estimates are written to ``shares``.
     Other arguments as in :func:`track_encounters`, one row per asteroid.
 
     Returns
@@ -182,7 +182,7 @@ def search(
     int
         0 done, 1 `out` was too small for the next asteroid, 2 its step size collapsed, 3 it starts inside a body.
     float
-        Where it did, s; for 3 the number of the body.
+        Time at which it did, s; for 3 the number of the body.
     """
     n = 0
     room, spare_room, places = empty_room(), empty_room(), empty_places()
