@@ -36,20 +36,18 @@ NOT_MODELLED: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
         "JPL": {
             "RHO": "an orbit with A2 in place of the thermal model (bulk density)",
-            "AMRAT": "an orbit with A1 or A2 in place of the area-to-mass ratio",
-            "DT": "a solution without the delay of the maximum of outgassing",
+            "AMRAT": "fs.Orbit.from_elements with AMRAT",
+            "DT": "fs.Orbit.from_elements with A1, A2, A3, their law and DT",
             "S0": "a solution without S0",
         },
-        "OrbFit": {
-            "AMRAT": "an orbit with A2 alone, or fs.Orbit.from_elements with A1 for the radiation pressure"
-        },
+        "OrbFit": {"AMRAT": "an orbit with A2 alone, or fs.Orbit.from_elements with A2 and AMRAT"},
         "MPC": dict.fromkeys(
             ("A1", "A2", "A3", "DT", "srp", "yc"), "JPL's orbit (SBDB), which names the law"
         ),
         "find_orb": {
             "A1": "fs.Orbit.from_elements with A1, A2, A3 and the law of the fit",
             "A3": "fs.Orbit.from_elements with A1, A2, A3 and the law of the fit",
-            "AMR": "a fit with A2 alone, or fs.Orbit.from_elements with A1 for the radiation pressure",
+            "AMR": "a fit with A2 alone, or fs.Orbit.from_elements with AMRAT",
         },
         "FORMAT": dict.fromkeys(("A1", "A2", "A3"), "fs.Orbit.from_elements or from_state with A1, A2, A3"),
         "table": {},
