@@ -105,6 +105,9 @@ _HOME = {
     "surface_change": "flybys.surface_change",
     "surface_history": "flybys.surface_history",
     "survival": "flybys.survival",
+    "impact_energy": "encounter.hazard_scales",
+    "palermo_scale": "encounter.hazard_scales",
+    "torino_scale": "encounter.hazard_scales",
     "virtual_impactors": "encounter.virtual_impactors",
     "target_map": "flybys.outcome_map",
 }
@@ -129,6 +132,7 @@ if TYPE_CHECKING:
     from flybystab.encounter.attitude_at_periapsis import attitude_at_start
     from flybystab.encounter.distribution import EncounterDistribution, encounter_distribution
     from flybystab.encounter.encounter import Encounter
+    from flybystab.encounter.hazard_scales import impact_energy, palermo_scale, torino_scale
     from flybystab.encounter.linear_target_plane import LinearPlane
     from flybystab.encounter.virtual_impactors import virtual_impactors
     from flybystab.errors import FlybystabError

@@ -281,8 +281,9 @@ def test_every_public_name_is_there():
 DIMENSIONLESS = {
     "spin_ratio", "bound_fraction", "share", "n", "seed", "q0", "q5", "q50", "q95", "q100",
     "INTACT", "semi_axes_relative", "spin_relative", "tide_error_relative", "growth",
+    "axis_ratio", "axis_ratio_limit", "strain", "nearest_relative", "bound_fraction_upper",
 }  # fmt: skip
-UNITS = ("_deg", "_km", "_m", "_s", "_Pa", "_rad_s", "_km_s")
+UNITS = ("_deg", "_km", "_m", "_s", "_Pa", "_rad_s", "_km_s", "_J")
 
 
 def numbers(value, key=""):

@@ -523,7 +523,7 @@ def test_the_row_that_is_no_body_is_named():
     with pytest.raises(InvalidInput, match=r"encounters\[0\] = .*a flybystab Encounter"):
         flyby_many([PILE, PILE], ["earth", e])
     with pytest.raises(InvalidInput, match=r"bodies = .*a sequence"):
-        flyby_many(PILE, e)
+        flyby_many(3, e)
     with pytest.raises(InvalidInput, match=r"attitudes = .*a sequence"):
         flyby_many([PILE], [e], 1.0)
     with pytest.raises(InvalidInput, match="tolerance"):
