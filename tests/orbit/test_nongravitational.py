@@ -12,7 +12,7 @@ from reference import need_ephemeris
 
 import flybystab as fs
 from flybystab.constants import AU, DAY
-from flybystab.errors import InvalidInput, UnknownName
+from flybystab.errors import FlybystabError, InvalidInput, UnknownName
 from flybystab.orbit.covariance import Covariance
 from flybystab.orbit.ephemeris import ephemeris
 from flybystab.orbit.forces import FORCES, RADIATION_PRESSURE, NonGravitational, acceleration, model, zonal
@@ -182,3 +182,12 @@ def test_bad_laws_are_named():
         fs.Orbit.from_state(EPOCH, R * u.m, V * u.m / u.s, AMRAT=-1.0 * u.m**2 / u.kg)
     with pytest.raises(fs.errors.UnitMismatch):
         fs.Orbit.from_state(EPOCH, R * u.m, V * u.m / u.s, DT=1.0 * u.m)
+
+
+@pytest.mark.parametrize("law", [None, object(), [1, 2, None, 4, 5], 3.0, [1.0] * 4, "water"])
+def test_a_law_that_is_none_is_refused_by_name(law):
+    with pytest.raises(FlybystabError, match="law"):
+        fs.Orbit.from_elements(
+            epoch=Time(2461000.5, format="jd", scale="tdb"), a=1.2 * u.au, e=0.3, i=5 * u.deg, node=10 * u.deg,
+            peri=20 * u.deg, M=30 * u.deg, law=law,
+        )  # fmt: skip

@@ -12,7 +12,7 @@ import numpy as np
 from astropy.time import Time
 from astropy.units import Quantity
 
-from flybystab.constants import DAY
+from flybystab.constants import AU, DAY
 from flybystab.errors import FlybystabWarning, Impact, InaccurateOrbit, InvalidInput, UnknownName
 from flybystab.orbit.closest_approach import first_contact
 from flybystab.orbit.covariance import Covariance
@@ -35,6 +35,8 @@ _NO_DELAY, _NO_AREA = 0.0 * u.d, 0.0 * u.m**2 / u.kg
 _LARGE_ERROR = 1e3
 #: An orbit within this distance (m) and relative speed (m/s) of a massive asteroid at its epoch is that asteroid's.
 TWIN_DISTANCE, TWIN_SPEED = 1e8, 100.0
+#: Largest semi-major axis of elements, m: far beyond the nearest stars.
+_FARTHEST = 1e9 * AU
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,7 +117,7 @@ class Orbit:
         ------
         UnitMismatch, InvalidInput, UnknownName
         """
-        axis = to_si(a, u.m, "a")
+        axis = to_si(a, u.m, "a", low=-_FARTHEST, high=_FARTHEST)
         ecc = to_si(e, u.dimensionless_unscaled, "e", low=0.0)
         angles = [
             to_si(v, u.rad, n)
@@ -519,7 +521,10 @@ def _nongrav(
     # A plain zero needs no unit.
     pairs = ((a1, "A1"), (a2, "A2"), (a3, "A3"))
     values = tuple(0.0 if isinstance(v, int | float) and v == 0 else to_si(v, unit, n) for v, n in pairs)
-    text = law if isinstance(law, str) else " ".join(str(float(x)) for x in np.atleast_1d(law))
+    try:
+        text = law if isinstance(law, str) else " ".join(str(float(x)) for x in np.atleast_1d(law))
+    except (TypeError, ValueError):
+        raise InvalidInput("law", law, "a name, or the five numbers ALN, R0 (au), NM, NN, NK") from None
     out = NonGravitational(
         (values[0], values[1], values[2]),
         text,
