@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 import sys
 import unicodedata
 from collections.abc import Callable, Mapping
@@ -120,6 +121,30 @@ def material_of(options: argparse.Namespace) -> Any:
     )
 
 
+def sampling_arguments(
+    sub: argparse.ArgumentParser, samples: int, what: str, *, population: str, grains: str
+) -> None:
+    """Add the options --samples, --seed, --population and --grains of commands that draw bodies from priors."""
+    sub.add_argument("--samples", type=int, default=samples, metavar="N", help=f"{what} ({samples})")
+    sub.add_argument("--seed", type=int, default=0, help="random seed (0)")
+    sub.add_argument("--population", metavar="FILE", help=population)
+    sub.add_argument("--grains", type=int, metavar="N", help=grains)
+
+
+def names_a_file(word: str) -> bool:
+    """Whether an argument that may be the name of an asteroid or a file is a file.
+
+    It is one if the file exists, if it ends like a file name, or if it lies in a folder that exists. Comet
+    designations such as C/2020 F3 are names.
+    """
+    from pathlib import Path
+
+    path = Path(word)
+    if path.exists():
+        return not path.is_dir()
+    return bool(re.search(r"\.[A-Za-z][A-Za-z0-9]{1,7}$", word)) or ("/" in word and path.parent.is_dir())
+
+
 def catalogue_argument(sub: argparse.ArgumentParser) -> None:
     """Add the option --catalogue."""
     sub.add_argument(
@@ -138,7 +163,7 @@ def asteroid_named(options: argparse.Namespace) -> Any:
     from flybystab.screening.selection import listed
 
     file = getattr(options, "catalogue", None)
-    if file is None and Path(options.name).is_file():
+    if file is None and names_a_file(options.name):
         found = listed(Path(options.name))
         if len(found) != 1:
             names = ", ".join(a.name for a in found[:5]) + (", ..." if len(found) > 5 else "")

@@ -6,7 +6,7 @@ import argparse
 import time
 from typing import Any
 
-from flybystab.cli.common import check_table, show, span_arguments, tdb
+from flybystab.cli.common import check_table, names_a_file, show, span_arguments, tdb
 from flybystab.errors import WrongUsage
 
 HELP = "close approaches of an asteroid or of a catalogue"
@@ -97,9 +97,8 @@ def _asteroids(name: str) -> list[Any]:
     from flybystab.catalogues.asteroid import Asteroid
     from flybystab.catalogues.catalogue import catalogue
 
-    path = Path(name)
-    if path.suffix in (".ke1", ".json", ".csv", ".gz") or path.is_file():
-        return list(catalogue(path))
+    if names_a_file(name):
+        return list(catalogue(Path(name)))
     return [Asteroid.from_catalogue(name)]
 
 

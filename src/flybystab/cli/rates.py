@@ -7,7 +7,7 @@ import sys
 from typing import Any
 
 from flybystab._version import __version__
-from flybystab.cli.common import show, surface_argument
+from flybystab.cli.common import sampling_arguments, show, surface_argument
 from flybystab.errors import InvalidInput
 
 HELP = "encounter rates of a population, and the rates of the verdicts"
@@ -47,15 +47,14 @@ def arguments(sub: argparse.ArgumentParser) -> None:
         default="1",
         help="of every body, for --verdicts (1 km); H: from H and the albedo",
     )
-    sub.add_argument(
-        "--samples", type=int, default=800, metavar="N", help="encounters sampled per planet (800)"
-    )
-    sub.add_argument("--seed", type=int, default=0, help="random seed (0)")
-    sub.add_argument(
-        "--grains", type=int, metavar="N", help="with --verdicts: piles of N grains where the ellipsoid ends"
+    sampling_arguments(
+        sub,
+        800,
+        "encounters sampled per planet",
+        population="priors of the bodies, TOML, as for screen",
+        grains="with --verdicts: follow bodies beyond the ellipsoid with piles of N grains",
     )
     surface_argument(sub)
-    sub.add_argument("--population", metavar="FILE", help="priors of the bodies, TOML, as for screen")
     sub.add_argument(
         "--output", metavar="FILE",
         help="with --verdicts: figure (.png, .pdf, .svg) or table of the samples (.ecsv, .parquet, .csv); resumable",

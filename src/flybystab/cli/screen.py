@@ -11,6 +11,8 @@ from flybystab.cli.common import (
     check_table,
     material_arguments,
     material_of,
+    names_a_file,
+    sampling_arguments,
     show,
     span_arguments,
     tdb,
@@ -54,24 +56,12 @@ def study_arguments(sub: argparse.ArgumentParser) -> None:
     span_arguments(sub, "2026-01-01", "2036-01-01")
     material_arguments(sub)
     shape_arguments(sub)
-    sub.add_argument(
-        "--samples",
-        type=int,
-        default=1,
-        metavar="N",
-        help="samples of the uncertain inputs (1: nominal only)",
-    )
-    sub.add_argument("--seed", type=int, default=0, help="random seed (0)")
-    sub.add_argument(
-        "--population",
-        metavar="FILE",
-        help="priors of the uncertain inputs, TOML; omitted ones keep their defaults",
-    )
-    sub.add_argument(
-        "--grains",
-        type=int,
-        metavar="N",
-        help="carry on by piles of N grains the samples where the ellipsoid ends",
+    sampling_arguments(
+        sub,
+        1,
+        "samples of the uncertain inputs; 1 for the nominal values only",
+        population="priors of the uncertain inputs, TOML; omitted ones keep their defaults",
+        grains="follow samples beyond the ellipsoid with piles of N grains",
     )
     sub.add_argument("--jobs", type=int, default=1, metavar="N", help="number of processes (1)")
     sub.add_argument("--dask", metavar="ADDRESS", help="dask scheduler to use instead of processes")
@@ -120,7 +110,7 @@ def run_study(
     from flybystab.screening.selection import listed
     from flybystab.screening.settings import settings
 
-    names = [Path(a) if _is_file(a) else a for a in options.asteroids]
+    names = [Path(a) if names_a_file(a) else a for a in options.asteroids]
     asteroids = listed(names or None)
     if options.shape:
         if len(asteroids) != 1:
@@ -138,7 +128,7 @@ def run_study(
             material=material_of(options),
             population=Population.from_file(options.population) if options.population else None,
             keep_samples=samples_output is not None,
-            grains=getattr(options, "grains", None),
+            grains=options.grains,
         ),
     )
     bar = ProgressBar()
@@ -155,9 +145,3 @@ def run_study(
         bar.end()
         print(f"flybystab: {output} holds the rows so far; the same command resumes the run", file=sys.stderr)
         raise
-
-
-def _is_file(word: str) -> bool:
-    from pathlib import Path
-
-    return Path(word).exists() or Path(word).suffix in (".csv", ".gz", ".ke1", ".json") or "/" in word
