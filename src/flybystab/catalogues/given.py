@@ -10,10 +10,9 @@ import astropy.units as u
 import numpy as np
 
 from flybystab.body.body import Body, check_body
-from flybystab.catalogues.record import ORBIT_SI, SHAPE
-from flybystab.constants import DAY
+from flybystab.catalogues.readers.conversion import state_row
+from flybystab.catalogues.record import SHAPE
 from flybystab.errors import InvalidInput, UnknownName
-from flybystab.orbit.elements import GM_SUN, elements_from_state
 from flybystab.orbit.orbit import Orbit, heliocentric
 from flybystab.units import to_si
 
@@ -39,20 +38,8 @@ def checked_orbit(orbit: Any) -> Orbit:
 
 def orbit_columns(orbit: Orbit, name: str) -> dict[str, str]:
     """Name, epoch and osculating elements (heliocentric, J2000 ecliptic) of an orbit."""
-    q, e, i, node, peri, since = elements_from_state(heliocentric(orbit))
-    row = {"name": name or orbit.name or "unnamed", "e": repr(e)}
-    row["epoch_jd_tdb"] = repr(float(orbit.epoch.tdb.jd))
-    angles = {
-        c: repr(float(np.degrees(x))) for c, x in zip(("i", "node", "peri"), (i, node, peri), strict=True)
-    }
-    row |= {f"{c}_deg": x for c, x in angles.items()}
-    if e == 1.0:
-        row |= {"q_au": repr(q / ORBIT_SI[0]), "tp_jd_tdb": repr(float(orbit.epoch.tdb.jd) - since / DAY)}
-    else:
-        a = q / (1.0 - e)
-        mean = since * np.sqrt(GM_SUN / abs(a) ** 3)
-        row |= {"a_au": repr(float(a / ORBIT_SI[0])), "M_deg": repr(float(np.degrees(mean)))}
-    return row
+    row = state_row(float(orbit.epoch.tdb.jd), heliocentric(orbit))
+    return {"name": name or orbit.name or "unnamed"} | row
 
 
 def body_columns(body: Body) -> dict[str, str]:

@@ -15,7 +15,7 @@ from flybystab.catalogues.asteroid import Asteroid
 from flybystab.constants import AU
 from flybystab.core.numerics.threads import in_order, worker_count
 from flybystab.errors import InvalidInput
-from flybystab.orbit.elements import GM_SUN
+from flybystab.orbit.elements import GM_SUN, elements_from_state
 from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.planets import Planet, planet
 from flybystab.population.mean_orbits import mean_orbit
@@ -278,11 +278,5 @@ def _of_orbit(orbit: Any, number: int) -> tuple[float, float, float]:
 
 def elements_of(position: Array, velocity: Array) -> tuple[float, float, float]:
     """Semi-major axis (m), eccentricity and ecliptic inclination (rad) of a heliocentric ICRF state (m, m/s)."""
-    from flybystab.orbit.elements import ecliptic_to_icrf
-
-    x, v = ecliptic_to_icrf().T @ position, ecliptic_to_icrf().T @ velocity
-    r = float(np.linalg.norm(x))
-    h = np.cross(x, v)
-    a = 1.0 / (2.0 / r - float(v @ v) / GM_SUN)
-    vector = np.cross(v, h) / GM_SUN - x / r
-    return a, float(np.linalg.norm(vector)), float(np.arctan2(np.hypot(h[0], h[1]), h[2]))
+    q, e, i, *_ = elements_from_state(np.concatenate([position, velocity]))
+    return (q / (1.0 - e) if e != 1.0 else np.inf), e, i

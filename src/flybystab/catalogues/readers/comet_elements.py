@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from flybystab.catalogues.designations import name_columns, unpacked
 from flybystab.catalogues.readers import reader
-from flybystab.catalogues.readers.conversion import number, perihelion_row, printed_covariance
+from flybystab.catalogues.readers.conversion import COMETARY, number, perihelion_row, printed_covariance
 from flybystab.catalogues.readers.parameters import (
     check_parameters,
     looks_like_parameter,
@@ -30,7 +30,6 @@ _LINE = re.compile(
     r"(?P<q>[ \d]{2}\.\d{2,6} *)  (?P<e>[ \d]\.\d{2,6} *)  (?P<peri>[ \d]{3}\.\d{2,4} *)  "
     r"(?P<node>[ \d]{3}\.\d{2,4} *)  (?P<i>[ \d]{3}\.\d{2,4} *)  (?P<epoch>[ \d]{8})(?P<rest>.*)$"
 )
-_NAMES = ("q", "e", "i", "node", "peri", "tp")
 _JSON = {"q": "Perihelion_dist", "e": "e", "i": "i", "node": "Node", "peri": "Peri"}
 _OTHER = frozenset({"H", "G"})
 
@@ -81,14 +80,14 @@ def _entry(
     midnight, fraction = perihelion
     tp = midnight + float(fraction)
     jd = _day(epoch[:4], epoch[4:6], epoch[6:], file)[0] if epoch else tp
-    elements = [number(cells[n], n, file) for n in _NAMES[:5]]
+    elements = [number(cells[n], n, file) for n in COMETARY[:5]]
     source = f"MPC comets ({file})"
     row = name_columns(label) | {"orbit_source": source, "orbit_class": "COM"}
     row |= perihelion_row(jd, elements, jd - tp)
     if magnitude:
         row["notes"] = f"total magnitude {magnitude} at 1 au: of the coma, not of the nucleus"
-    texts = [*(cells[n] for n in _NAMES[:5]), fraction]
-    return row, printed_covariance(jd, _NAMES, texts, jd - midnight, source)
+    texts = [*(cells[n] for n in COMETARY[:5]), fraction]
+    return row, printed_covariance(jd, COMETARY, texts, jd - midnight, source)
 
 
 def _is_json(text: str) -> bool:

@@ -23,6 +23,14 @@ if TYPE_CHECKING:
 
 #: Day number of Modified Julian Dates, d.
 MJD = 2400000.5
+#: Sets of elements in the order of the rows of a catalogue, and a state.
+KEPLERIAN = ("a", "e", "i", "node", "peri", "M")
+COMETARY = ("q", "e", "i", "node", "peri", "tp")
+CARTESIAN = ("x", "y", "z", "vx", "vy", "vz")
+#: Column of a catalogue for each Keplerian element.
+COLUMN_OF: Mapping[str, str] = dict(
+    zip(KEPLERIAN, ("a_au", "e", "i_deg", "node_deg", "peri_deg", "M_deg"), strict=True)
+)
 #: Radians of a degree.
 DEGREE = np.pi / 180.0
 #: Semi-major axes beyond this are left out of a row: q and the time of perihelion keep the digits, au.
@@ -114,11 +122,33 @@ def state_row(jd: float, state: Array) -> dict[str, str]:
     return perihelion_row(jd, (q / AU, e, *angles), since / DAY)
 
 
-def rotated(state: Array) -> Array:
-    """State, or matrix of its columns, from the axes of the ecliptic to those of the ICRF, shape (6, ...)."""
+def elements_row(
+    jd: float, names: Sequence[str], texts: Sequence[str], values: Sequence[float] | Array
+) -> dict[str, str]:
+    """Columns of a heliocentric orbit by any set of elements of the J2000 ecliptic.
+
+    Parameters
+    ----------
+    jd : float
+        Epoch, TDB.
+    names, values : sequences
+        Elements as in :func:`state_of`.
+    texts : sequence of str
+        The elements as printed: the digits of Keplerian elements are kept.
+    """
+    if set(names) == set(KEPLERIAN):
+        return epoch_row(jd) | {COLUMN_OF[n]: t for n, t in zip(names, texts, strict=True)}
+    if set(names) == set(COMETARY):
+        at = dict(zip(names, values, strict=True))
+        return perihelion_row(jd, [at[n] for n in COMETARY[:5]], -at["tp"])
+    return state_row(jd, state_of(names, values))
+
+
+def rotated(state: Array, *, to_ecliptic: bool = False) -> Array:
+    """State, or matrix of its columns, from the axes of the ecliptic to those of the ICRF, or back, shape (6, ...)."""
     from flybystab.orbit.elements import ecliptic_to_icrf
 
-    turn = ecliptic_to_icrf()
+    turn = ecliptic_to_icrf().T if to_ecliptic else ecliptic_to_icrf()
     return np.concatenate([turn @ state[:3], turn @ state[3:]])
 
 

@@ -16,12 +16,10 @@ import numpy as np
 from flybystab.catalogues.designations import name_columns
 from flybystab.catalogues.readers import reader
 from flybystab.catalogues.readers.conversion import (
+    CARTESIAN,
     covariance_of,
-    epoch_row,
+    elements_row,
     number,
-    perihelion_row,
-    state_of,
-    state_row,
 )
 from flybystab.catalogues.readers.parameters import check_parameters, looks_like_parameter
 from flybystab.errors import InvalidInput
@@ -30,17 +28,8 @@ from flybystab.files import parse_json
 if TYPE_CHECKING:
     from flybystab.catalogues.readers import Entry
 
-_CARTESIAN = ("x", "y", "z", "vx", "vy", "vz")
 _ELEMENTS = {"a": "a", "e": "e", "i": "i", "asc_node": "node", "arg_per": "peri", "M": "M"}
 _COMETARY = {"q": "q", "e": "e", "i": "i", "asc_node": "node", "arg_per": "peri", "Tp": "tp"}
-_COLUMNS = {
-    "a": "a_au",
-    "e": "e",
-    "i": "i_deg",
-    "asc_node": "node_deg",
-    "arg_per": "peri_deg",
-    "M": "M_deg",
-}
 #: Keys in capitals that are no parameters of the force model.
 _OTHER = frozenset({"H", "G", "U", "P", "Q", "M", "MOIDs", "Tp", "Tp_iso", "p_NEO", "p_HZ"})
 
@@ -82,14 +71,12 @@ def _entry(name: str, elements: Mapping[str, Any], file: str) -> Entry:
     values = [number(elements[k], k, file) for k in names]
     source = f"Find_Orb ({file})"
     row = name_columns(name) | {"orbit_source": source}
-    if names is _ELEMENTS:
-        row |= epoch_row(jd) | {_COLUMNS[k]: str(elements[k]) for k in names}
-    else:
+    labels = list(names.values())
+    if names is _COMETARY:
         values[5] -= jd
-        row |= perihelion_row(jd, values[:5], -values[5])
+    row |= elements_row(jd, labels, [str(elements[k]) for k in names], values)
     if elements.get("H") is not None:
         row["H_mag"] = str(elements["H"])
-    labels = list(names.values())
     keys = list(names)
     if "A2" in elements:
         row |= {"A2_au_d2": repr(number(elements["A2"], "A2", file)), "nongrav_law": "asteroid"}
@@ -135,5 +122,5 @@ def read_covariance(text: str, file: str) -> list[Entry]:
         raise InvalidInput("state_vect", len(values), f"6 numbers in {file}")
     source = f"Find_Orb ({file})"
     row = name_columns(Path(file).name.partition(".")[0]) | {"orbit_source": source}
-    row |= state_row(jd, state_of(_CARTESIAN, values))
-    return [(row, covariance_of(jd, _CARTESIAN, values, matrix, source, file))]
+    row |= elements_row(jd, CARTESIAN, (), values)
+    return [(row, covariance_of(jd, CARTESIAN, values, matrix, source, file))]

@@ -18,14 +18,17 @@ import numpy as np
 from flybystab.catalogues.designations import name_columns
 from flybystab.catalogues.readers import reader
 from flybystab.catalogues.readers.conversion import (
+    CARTESIAN,
+    COMETARY,
     GM_TOTAL,
+    KEPLERIAN,
     MJD,
     cartesian_covariance,
-    epoch_row,
+    elements_row,
     heliocentric_state,
     number,
-    perihelion_row,
     printed_covariance,
+    rotated,
     state_of,
     state_row,
 )
@@ -36,20 +39,17 @@ from flybystab.files import csv_rows
 if TYPE_CHECKING:
     from flybystab.catalogues.readers import Entry
 
-_COM = ("q", "e", "i", "node", "peri", "tp")
-_KEP = ("a", "e", "i", "node", "peri", "M")
-_CAR = ("x", "y", "z", "vx", "vy", "vz")
 #: Elements, centre and axes of each FORMAT.
 FORMATS: Mapping[str, tuple[tuple[str, ...], str, str]] = {
-    "COM": (_COM, "sun", "ecliptic"),
-    "BCOM": (_COM, "ssb", "ecliptic"),
-    "KEP": (_KEP, "sun", "ecliptic"),
-    "BKEP": (_KEP, "ssb", "ecliptic"),
-    "CART": (_CAR, "sun", "ecliptic"),
-    "CAR": (_CAR, "sun", "ecliptic"),
-    "BCART": (_CAR, "ssb", "ecliptic"),
-    "BCART_EQ": (_CAR, "ssb", "equator"),
-    "CAREQ": (_CAR, "sun", "equator"),
+    "COM": (COMETARY, "sun", "ecliptic"),
+    "BCOM": (COMETARY, "ssb", "ecliptic"),
+    "KEP": (KEPLERIAN, "sun", "ecliptic"),
+    "BKEP": (KEPLERIAN, "ssb", "ecliptic"),
+    "CART": (CARTESIAN, "sun", "ecliptic"),
+    "CAR": (CARTESIAN, "sun", "ecliptic"),
+    "BCART": (CARTESIAN, "ssb", "ecliptic"),
+    "BCART_EQ": (CARTESIAN, "ssb", "equator"),
+    "CAREQ": (CARTESIAN, "sun", "equator"),
 }
 #: Column names, in lower case, of each element; an epoch by name of its column is MJD or JD.
 _ALIASES: Mapping[str, tuple[str, ...]] = {
@@ -148,18 +148,14 @@ def _entry(row: Mapping[str, str], file: str) -> Entry:
     out = name_columns(cell("id")[1]) | {"orbit_source": source}
     if row.get("H"):
         out["H_mag"] = row["H"]
-    if centre == "sun" and names is _KEP:
-        out |= epoch_row(jd) | dict(
-            zip(("a_au", "e", "i_deg", "node_deg", "peri_deg", "M_deg"), texts, strict=True)
-        )
-    elif centre == "sun" and names is _COM:
-        out |= perihelion_row(jd, values[:5], -values[5])
+    if centre == "sun" and axes == "ecliptic":
+        out |= elements_row(jd, names, texts, values)
     else:
         state = state_of(names, values, gm)
-        if axes == "equator":
-            state = _equator(state)
+        if axes == "equator":  # state_of has turned it as if its axes were those of the ecliptic
+            state = rotated(state, to_ecliptic=True)
         out |= state_row(jd, heliocentric_state(jd, state, centre))
-    matrix = _matrix(row, kind, names is _CAR, axes, file)
+    matrix = _matrix(row, kind, names is CARTESIAN, axes, file)
     if matrix is not None:
         return out, cartesian_covariance(jd, names, values, matrix, source)
     if axes == "equator":  # the size of the digits does not depend on the axes
@@ -173,14 +169,6 @@ def _check(row: Mapping[str, str], file: str) -> None:
     given = {c.partition("_")[0].upper() for c in names if _given(row[c])}
     given |= {c for c in row if re.match(r"cov_([6-9]_|\d_[6-9])", c) and _given(row[c])}
     check_parameters("FORMAT", sorted(given), file)
-
-
-def _equator(state: np.ndarray) -> np.ndarray:
-    """Undo the rotation of :func:`state_of` for states that have axes of the equator."""
-    from flybystab.orbit.elements import ecliptic_to_icrf
-
-    turn = ecliptic_to_icrf().T
-    return np.concatenate([turn @ state[:3], turn @ state[3:]])
 
 
 def _matrix(row: Mapping[str, str], kind: str, cartesian: bool, axes: str, file: str) -> np.ndarray | None:
@@ -204,5 +192,5 @@ def _matrix(row: Mapping[str, str], kind: str, cartesian: bool, axes: str, file:
     matrix = 0.5 * (matrix + matrix.T)
     if axes != "equator":
         return matrix
-    turn = np.column_stack([_equator(unit) for unit in np.eye(6)])
+    turn = rotated(np.eye(6), to_ecliptic=True)
     return turn @ matrix @ turn.T

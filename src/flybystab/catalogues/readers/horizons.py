@@ -16,12 +16,12 @@ import numpy as np
 from flybystab.catalogues.designations import is_comet, name_columns
 from flybystab.catalogues.readers import reader
 from flybystab.catalogues.readers.conversion import (
+    CARTESIAN,
     GM_TOTAL,
     decimals_of,
-    epoch_row,
+    elements_row,
     heliocentric_state,
     number,
-    perihelion_row,
     printed_covariance,
     rotated,
     state_of,
@@ -40,7 +40,6 @@ if TYPE_CHECKING:
 _VECTOR = ("X", "Y", "Z", "VX", "VY", "VZ")
 _COMETARY = {"QR": "q", "EC": "e", "IN": "i", "OM": "node", "W": "peri", "TP": "tp"}
 _KEPLERIAN = {"A": "a", "EC": "e", "IN": "i", "OM": "node", "W": "peri", "MA": "M"}
-_COLUMNS = {"A": "a_au", "EC": "e", "IN": "i_deg", "OM": "node_deg", "W": "peri_deg", "MA": "M_deg"}
 #: Length (m) and time (s) of the output units.
 _UNITS = {"AU-D": (AU, DAY), "KM-S": (1e3, 1.0), "KM-D": (1e3, DAY)}
 _PAIR = re.compile(r"([A-Za-z][A-Za-z0-9-]*) ?= *([-+]?[.\d]+(?:[EeDd][-+]?\d+)?|n\.a\.)")
@@ -199,15 +198,12 @@ def _elements(
     if use is _COMETARY:
         offset = jd
         values[5] -= jd
+    in_au = [repr(values[0]), *texts[1:]] if au != 1.0 else texts
     if centre == "ssb":
         row |= state_row(jd, heliocentric_state(jd, state_of(names, values, gm), "ssb"))
-    elif use is _COMETARY:
-        row |= perihelion_row(jd, values[:5], -values[5])
     else:
-        row |= epoch_row(jd) | {_COLUMNS[c]: t for c, t in zip(use, texts, strict=True)}
-        row["a_au"] = texts[0] if au == 1.0 else repr(values[0])
-    digits = [row.get("a_au", texts[0]) if au != 1.0 else texts[0], *texts[1:]]
-    return row, printed_covariance(jd, names, digits, offset, source, gm)
+        row |= elements_row(jd, names, in_au, values)
+    return row, printed_covariance(jd, names, in_au, offset, source, gm)
 
 
 def _of_digits(
@@ -220,7 +216,7 @@ def _of_digits(
     for value, text, factor in zip(in_au, texts, step, strict=True):
         decimals = int(np.floor(decimals_of(text) - np.log10(factor)))
         shown.append(f"{value:.{max(decimals, 0)}f}")
-    return printed_covariance(jd, ("x", "y", "z", "vx", "vy", "vz"), shown, 0.0, source)
+    return printed_covariance(jd, CARTESIAN, shown, 0.0, source)
 
 
 def _own_orbit(header: str, row: dict[str, str], file: str) -> Entry:

@@ -14,9 +14,8 @@ from flybystab.catalogues.designations import name_columns
 from flybystab.catalogues.readers import reader
 from flybystab.catalogues.readers.conversion import (
     MJD,
-    epoch_row,
+    elements_row,
     number,
-    perihelion_row,
     printed_covariance,
 )
 from flybystab.catalogues.readers.parameters import check_parameters
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
 
 _KEPLERIAN = {"a": "a", "e": "e", "i": "i", "Node": "node", "w": "peri", "M": "M"}
 _COMETARY = {"q": "q", "e": "e", "i": "i", "Node": "node", "w": "peri", "Tp": "tp"}
-_COLUMNS = {"a": "a_au", "e": "e", "i": "i_deg", "node": "node_deg", "peri": "peri_deg", "M": "M_deg"}
 _OTHER = frozenset({"Num", "Name", "Num Name", "Designation", "Epoch", "H", "G", "Ref"})
 
 
@@ -77,12 +75,12 @@ def _entry(row: dict[str, str], file: str) -> Entry:
     if comet:
         midnight, texts[5] = _perihelion(texts[5], file)
         offset = jd - midnight
-        elements = [number(t, n, file) for t, n in zip(texts[:5], names, strict=False)]
-        out |= perihelion_row(jd, elements, offset - float(texts[5])) | {"orbit_class": "COM"}
-    else:
-        out |= epoch_row(jd) | {_COLUMNS[names[c]]: t for c, t in zip(names, texts, strict=True)}
-        if row.get("H"):
-            out["H_mag"] = row["H"]
+        out["orbit_class"] = "COM"
+    elif row.get("H"):
+        out["H_mag"] = row["H"]
+    values = [number(t, n, file) for t, n in zip(texts, names, strict=True)]
+    values[5] -= offset
+    out |= elements_row(jd, list(names.values()), texts, values)
     return out, printed_covariance(jd, list(names.values()), texts, offset, source)
 
 

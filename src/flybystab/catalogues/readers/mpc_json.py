@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 
 from flybystab.catalogues.designations import name_columns
 from flybystab.catalogues.readers import reader
-from flybystab.catalogues.readers.conversion import number, perihelion_row, printed_covariance
+from flybystab.catalogues.readers.conversion import COMETARY, number, perihelion_row, printed_covariance
 from flybystab.catalogues.readers.mpc import from_mpc
 from flybystab.catalogues.readers.parameters import check_parameters, looks_like_parameter
 from flybystab.errors import InvalidInput
@@ -127,5 +127,4 @@ def _by_perihelion(row: Mapping[str, Any], file: str) -> Entry:
     source = f"MPC comets ({file})"
     out = name_columns(label) | {"orbit_source": source} | perihelion_row(jd, elements, jd - tp)
     whole, _, fraction = str(row["perihelion_date_jd"]).partition(".")
-    names = ("q", "e", "i", "node", "peri", "tp")
-    return out, printed_covariance(jd, names, [*texts, "0." + fraction], jd - float(whole), source)
+    return out, printed_covariance(jd, COMETARY, [*texts, "0." + fraction], jd - float(whole), source)

@@ -16,12 +16,11 @@ import numpy as np
 from flybystab.catalogues.designations import name_columns
 from flybystab.catalogues.readers import reader
 from flybystab.catalogues.readers.conversion import (
+    CARTESIAN,
     MJD,
     covariance_of,
+    elements_row,
     number,
-    perihelion_row,
-    state_of,
-    state_row,
 )
 from flybystab.catalogues.readers.parameters import check_parameters
 from flybystab.errors import InvalidInput
@@ -32,7 +31,7 @@ if TYPE_CHECKING:
     from flybystab.typing import Array
 
 _COM = {"q": "q", "e": "e", "i": "i", "node": "node", "argperi": "peri", "peri_time": "tp"}
-_CAR = {c: c for c in ("x", "y", "z", "vx", "vy", "vz")}
+_CAR = {c: c for c in CARTESIAN}
 _YARKOVSKY = ("yarkovsky", "yarkovski")
 _UNIT = 1e-10  # au/d2
 
@@ -83,10 +82,7 @@ def _entry(document: Mapping[str, Any], file: str) -> Entry:
     row = _identity(document) | {"orbit_source": source}
     if kind == "COM":
         values[names.index("tp")] += MJD - jd
-        by = dict(zip(names, values, strict=True))
-        row |= perihelion_row(jd, [by[n] for n in ("q", "e", "i", "node", "peri")], -by["tp"])
-    else:
-        row |= state_row(jd, state_of(names[:6], values[:6]))
+    row |= elements_row(jd, names[:6], (), values[:6])
     if "A2" in names:
         row |= {"A2_au_d2": repr(values[names.index("A2")]), "nongrav_law": "asteroid"}
     magnitude = document.get("magnitude_data") or {}

@@ -11,7 +11,13 @@ from typing import TYPE_CHECKING, Any
 
 from flybystab.catalogues.designations import is_comet, name_columns
 from flybystab.catalogues.readers import reader
-from flybystab.catalogues.readers.conversion import number, perihelion_row, printed_covariance
+from flybystab.catalogues.readers.conversion import (
+    COLUMN_OF,
+    KEPLERIAN,
+    number,
+    perihelion_row,
+    printed_covariance,
+)
 from flybystab.catalogues.readers.parameters import check_parameters, looks_like_parameter
 from flybystab.errors import InvalidInput
 from flybystab.files import parse_json
@@ -20,12 +26,12 @@ if TYPE_CHECKING:
     from flybystab.catalogues.readers import Entry
 
 _COLUMNS = {
-    "semi_major_axis": "a_au",
-    "eccentricity": "e",
-    "inclination": "i_deg",
-    "ascending_node_longitude": "node_deg",
-    "perihelion_argument": "peri_deg",
-    "mean_anomaly": "M_deg",
+    "semi_major_axis": COLUMN_OF["a"],
+    "eccentricity": COLUMN_OF["e"],
+    "inclination": COLUMN_OF["i"],
+    "ascending_node_longitude": COLUMN_OF["node"],
+    "perihelion_argument": COLUMN_OF["peri"],
+    "mean_anomaly": COLUMN_OF["M"],
 }
 _COMETARY = (
     "perihelion_distance",
@@ -34,7 +40,6 @@ _COMETARY = (
     "ascending_node_longitude",
     "perihelion_argument",
 )
-_NAMES = ("a", "e", "i", "node", "peri", "M")
 
 
 def _is_neows(text: str) -> bool:
@@ -88,7 +93,7 @@ def _entry(thing: Mapping[str, Any], file: str) -> Entry:
         row |= {"epoch_jd_tdb": str(data["epoch_osculation"])} | dict(
             zip(_COLUMNS.values(), texts, strict=True)
         )
-        return row, printed_covariance(jd, _NAMES, texts, 0.0, source)
+        return row, printed_covariance(jd, KEPLERIAN, texts, 0.0, source)
     elements = [number(data.get(c, ""), c, file) for c in _COMETARY]
     since = jd - number(data.get("perihelion_time", ""), "perihelion_time", file)
     return row | perihelion_row(jd, elements, since), None

@@ -17,14 +17,14 @@ import numpy as np
 from flybystab.catalogues.designations import is_comet, name_columns
 from flybystab.catalogues.readers import FRAME, reader
 from flybystab.catalogues.readers.conversion import (
+    CARTESIAN,
+    COMETARY,
+    KEPLERIAN,
     MJD,
     covariance_of,
-    epoch_row,
+    elements_row,
     number,
-    perihelion_row,
     printed_covariance,
-    state_of,
-    state_row,
 )
 from flybystab.catalogues.readers.parameters import check_parameters
 from flybystab.errors import InvalidInput
@@ -34,12 +34,11 @@ if TYPE_CHECKING:
     from flybystab.orbit.covariance import Covariance
 
 _SETS: Mapping[str, tuple[str, ...]] = {
-    "KEP": ("a", "e", "i", "node", "peri", "M"),
+    "KEP": KEPLERIAN,
     "EQU": ("a", "h", "k", "P", "Q", "L"),
-    "COM": ("q", "e", "i", "node", "peri", "tp"),
-    "CAR": ("x", "y", "z", "vx", "vy", "vz"),
+    "COM": COMETARY,
+    "CAR": CARTESIAN,
 }
-_COLUMNS = ("a_au", "e", "i_deg", "node_deg", "peri_deg", "M_deg")
 #: Parameters of the force models in the order of the LSP and NGR lines; only model 1 is that of asteroids.
 _PARAMETERS: Mapping[str, tuple[str, ...]] = {"0": (), "1": ("AMRAT", "A2")}
 _UNIT = 1e-10  # au/d2, of A2
@@ -125,12 +124,7 @@ def _solution(name: str, lines: Sequence[str], file: str) -> Entry:
         values[5] += MJD - jd
     row = _identity(name) | {"orbit_solution": "NEOCC OEF2", "frame": FRAME}
     row["orbit_source"] = f"ESA NEOCC ({file})" if kinds[0] == "KEP" else f"OrbFit {kinds[0]} ({file})"
-    if kinds[0] == "KEP":
-        row |= dict(zip(_COLUMNS, texts, strict=True)) | epoch_row(jd)
-    elif kinds[0] == "COM":
-        row |= perihelion_row(jd, values[:5], -values[5])
-    else:
-        row |= state_row(jd, state_of(names, values))
+    row |= elements_row(jd, names, texts, values)
     if "MAG" in words and number(words["MAG"][0], "MAG", file) > -9.0:
         row["H_mag"] = words["MAG"][0]
     parameters = _parameters(words, name, file)
@@ -218,10 +212,10 @@ def _row(line: str, file: str) -> Entry:
     if len(cells) > 10 and cells[10] not in ("0", "0.0"):
         check_parameters("OrbFit", ["parameters of the force model, which this file does not give"], file)
     jd = number(cells[1], "epoch", file) + MJD
-    row = _identity(cells[0]) | epoch_row(jd) | dict(zip(_COLUMNS, cells[2:8], strict=True))
+    row = _identity(cells[0]) | elements_row(jd, KEPLERIAN, cells[2:8], ())
     if len(cells) > 8:
         row["H_mag"] = cells[8]
     source = f"OrbFit ({file})"
     return row | {"frame": FRAME, "orbit_source": source}, printed_covariance(
-        jd, _SETS["KEP"], cells[2:8], 0.0, source
+        jd, KEPLERIAN, cells[2:8], 0.0, source
     )

@@ -19,14 +19,14 @@ import numpy as np
 from flybystab.catalogues.designations import name_columns
 from flybystab.catalogues.readers import reader
 from flybystab.catalogues.readers.conversion import (
+    CARTESIAN,
+    COMETARY,
+    KEPLERIAN,
     MJD,
     covariance_of,
-    epoch_row,
+    elements_row,
     number,
-    perihelion_row,
     printed_covariance,
-    state_of,
-    state_row,
 )
 from flybystab.catalogues.readers.parameters import check_parameters, named_parameters
 from flybystab.errors import InvalidInput
@@ -36,11 +36,10 @@ if TYPE_CHECKING:
     from flybystab.typing import Array
 
 _SETS = {
-    (2, 3, 4, 5, 6, 7): ("a", "e", "i", "node", "peri", "M"),
-    (75, 3, 4, 5, 6, 76): ("q", "e", "i", "node", "peri", "tp"),
-    (39, 40, 41, 42, 43, 44): ("x", "y", "z", "vx", "vy", "vz"),
+    (2, 3, 4, 5, 6, 7): KEPLERIAN,
+    (75, 3, 4, 5, 6, 76): COMETARY,
+    (39, 40, 41, 42, 43, 44): CARTESIAN,
 }
-_COLUMNS = ("a_au", "e", "i_deg", "node_deg", "peri_deg", "M_deg")
 
 
 def _is_openorb(text: str) -> bool:
@@ -87,12 +86,7 @@ def _entry(line: str, tags: Sequence[int], names: Sequence[str], file: str) -> E
         values[5] -= offset
     source = f"OpenOrb ({file})"
     row = name_columns(line[:16].strip()) | {"orbit_source": source}
-    if "M" in names:
-        row |= epoch_row(jd) | dict(zip(_COLUMNS, texts, strict=True))
-    elif "q" in names:
-        row |= perihelion_row(jd, values[:5], -values[5])
-    else:
-        row |= state_row(jd, state_of(names, values))
+    row |= elements_row(jd, names, texts, values)
     if 38 in tags:
         rest = rest[1:]
     matrix = None if "q" in names else _matrix(rest, tags, file)

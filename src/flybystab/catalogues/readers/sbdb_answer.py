@@ -15,6 +15,8 @@ import numpy as np
 from flybystab.catalogues.designations import name_columns
 from flybystab.catalogues.readers import FRAME, reader
 from flybystab.catalogues.readers.conversion import (
+    COLUMN_OF,
+    KEPLERIAN,
     covariance_of,
     equatorial_to_ecliptic,
     julian,
@@ -32,7 +34,7 @@ if TYPE_CHECKING:
     from flybystab.catalogues.readers import Entry
     from flybystab.orbit.covariance import Covariance
 
-_COLUMNS = {"a": "a_au", "e": "e", "i": "i_deg", "om": "node_deg", "w": "peri_deg", "ma": "M_deg"}
+_COLUMNS = dict(zip(("a", "e", "i", "om", "w", "ma"), COLUMN_OF.values(), strict=True))
 _LABELS = {"om": "node", "w": "peri"}
 _ACCELERATIONS = ("A1", "A2", "A3")
 #: Constants of the laws of distance, as JPL lists them.
@@ -89,9 +91,8 @@ def _with_digits(row: Mapping[str, str], covariance: Covariance | None) -> Covar
     """The covariance of the printed digits in place of one that they exceed: an answer without ``full-prec=1``."""
     if not all(row.get(c) for c in _COLUMNS.values()):
         return covariance
-    names = ("a", "e", "i", "node", "peri", "M")
     texts = [row[c] for c in _COLUMNS.values()]
-    digits = printed_covariance(float(row["epoch_jd_tdb"]), names, texts, 0.0, row["orbit_source"])
+    digits = printed_covariance(float(row["epoch_jd_tdb"]), KEPLERIAN, texts, 0.0, row["orbit_source"])
     if digits is None or covariance is None:
         return covariance
     states, _ = covariance.deviations(covariance.values + covariance.factor.T)
@@ -223,7 +224,7 @@ def _uncorrelated(
     """1-sigmas of elements and accelerations; None where the row alone has them all, or where they are lacking."""
     elements = {item["name"]: item for item in orbit["elements"]}
     with_errors = [n for n, p in pushes.items() if p.get("sigma")]
-    use = ("a", "e", "i", "om", "w", "ma")
+    use = tuple(_COLUMNS)
     keplerian = all((elements.get(c) or {}).get("value") not in (None, "") for c in use)
     if not keplerian:
         use = ("q", "e", "i", "om", "w", "tp")
