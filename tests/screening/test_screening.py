@@ -72,6 +72,16 @@ def test_one_sample_is_the_catalogue_body():
     assert table["numerical_error"][2] < 1e-3 * u.deg
 
 
+def test_a_distant_passage_adds_nothing_to_what_a_tumbler_mobilises_alone():
+    # Apophis mobilises 8.49 to 8.53 deg (Mohr-Coulomb) as it tumbles freely
+    far = screen(["Apophis"], "1990-01-01", "1999-01-01", within=0.04 * u.au)
+    assert len(far) == 2
+    assert np.all(far["friction_rise"] < 1e-3 * u.deg)
+    assert far["required_friction_at_rest"].to_value(u.deg) == pytest.approx(8.5283, abs=1e-3)
+    near = screen(["Apophis"], "2029-01-01", "2030-01-01", within=0.04 * u.au)
+    assert np.all(near["friction_rise"] > 0.05 * u.deg)
+
+
 def test_an_orbit_into_the_planet_is_an_impact():
     def hit(asteroid, settings):
         e = Encounter.hyperbolic("earth", periapsis=0.5 * R_EARTH * u.m, v_inf=9 * u.km / u.s)

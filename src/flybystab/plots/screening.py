@@ -132,10 +132,13 @@ def results_figure(results: QTable | str | Path, path: str | Path, names: int = 
     if left.get_legend_handles_labels()[0]:
         left.legend(fontsize=7)
     out = int((verdict == Verdict.NOT_IN_EQUILIBRIUM).sum())
+    rest = len(table) - out - int(stands.sum())
+    hidden = f"{out} of bodies that are not in equilibrium" + (
+        f", {rest} without a finite margin" if rest else ""
+    )
     least = f"; {NOTHING:g} deg: that or less" if np.any(rise[stands] == NOTHING) else ""
     figure.suptitle(
-        f"{len(table)} encounters, ephemeris {table.meta.get('ephemeris', '-')}; not shown: {out} of bodies that "
-        "are not in equilibrium" + least,
+        f"{len(table)} encounters, ephemeris {table.meta.get('ephemeris', '-')}; not shown: {hidden}{least}",
         fontsize=9,
     )
     exact = stands & ~bound

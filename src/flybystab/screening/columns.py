@@ -43,7 +43,9 @@ COLUMNS: dict[str, Column] = {
     "density": Column(float, u.kg / u.m**3, "bulk density of the catalogue body"),
     "spin_period": Column(float, u.h, "2 pi over the spin rate of the catalogue body"),
     "required_friction_at_rest": Column(
-        float, u.deg, "mobilised far from the planet; inf if no friction suffices"
+        float,
+        u.deg,
+        "largest mobilised far from the planet, of a tumbler in all its phases; inf if no friction suffices",
     ),
     "friction_rise": Column(float, u.deg, "increase during the passage; an upper limit if decided by bound"),
     "samples": Column(int, None, "samples drawn"),

@@ -109,6 +109,18 @@ def nominal(asteroid: Asteroid, material: Material, population: Population | Non
     return draw._replace(phi=np.array([material.phi]), cohesion=np.array([material.c_pa]))
 
 
+def free_rotation(asteroid: Asteroid, draw: Draws, phases: int = 720) -> Draws:
+    """The catalogue body, a draw of one, at equally spaced phases of its free rotation; itself unless it tumbles."""
+    if not asteroid.tumbles:
+        return draw
+    omega = _tumbling_rates(asteroid, np.arange(phases) / phases)
+    axes, rho, phi, cohesion = (
+        np.repeat(x, phases, axis=0) for x in (draw.axes, draw.rho, draw.phi, draw.cohesion)
+    )
+    period = 2.0 * np.pi / np.linalg.norm(omega, axis=1)
+    return draw._replace(axes=axes, rho=rho, phi=phi, cohesion=cohesion, omega=omega, period=period)
+
+
 def completed(asteroid: Asteroid, population: Population | None = None) -> Asteroid:
     """The asteroid with the medians of the population for what its row lacks; its assumptions say so.
 

@@ -16,9 +16,16 @@ from flybystab.flybys.verdict import Verdict
 from flybystab.orbit.ephemeris import ephemeris
 from flybystab.screening.clones import OrbitSampling
 from flybystab.screening.columns import VERDICTS, YIELDED, share_of
-from flybystab.screening.draws import Attitudes, Draws, nominal
+from flybystab.screening.draws import Attitudes, Draws, free_rotation, nominal
 from flybystab.screening.encounters import Passage
-from flybystab.screening.sample_verdicts import SampleVerdicts, contributors, inputs, sample_verdicts, wilson
+from flybystab.screening.sample_verdicts import (
+    SampleVerdicts,
+    contributors,
+    friction_at_rest,
+    inputs,
+    sample_verdicts,
+    wilson,
+)
 from flybystab.screening.settings import Settings
 
 #: Values by column; omitted columns are empty.
@@ -46,6 +53,7 @@ def body_row(passage: Passage, settings: Settings) -> Row:
     try:
         attitude = catalogue_body(passage, settings)
         known = attitude.draws
+        rest = float(friction_at_rest(free_rotation(asteroid, known), material).max())
         main = sample_verdicts(
             passage, known, attitude, material, tolerance=settings.tolerance, sharp=SHARP, measure=True
         )
@@ -55,8 +63,8 @@ def body_row(passage: Passage, settings: Settings) -> Row:
         "verdict": main.verdict[0],
         "margin": float(np.rad2deg(main.margin[0])),
         "decided_by": "dynamics" if main.dynamic[0] else "bound",
-        "required_friction_at_rest": float(np.rad2deg(main.rest[0])),
-        "friction_rise": float(np.rad2deg(_rise(known.phi[0] - main.margin[0], main.rest[0]))),
+        "required_friction_at_rest": float(np.rad2deg(rest)),
+        "friction_rise": float(np.rad2deg(_rise(known.phi[0] - main.margin[0], rest))),
         "numerical_error": main.numerical,
         "error": main.error[0],
         "assumed": "; ".join(
@@ -112,7 +120,7 @@ def sampled_row(row: Row, orbits: OrbitSampling, draw: Draws, result: SampleVerd
 
 def _rise(most: float, rest: float) -> float:
     """Mobilised friction added by an encounter; inf if no friction suffices, nan if none suffices at rest either."""
-    return most - rest if np.isfinite(rest) else np.nan
+    return max(most - rest, 0.0) if np.isfinite(rest) else np.nan
 
 
 def sample_rows(passage: Passage, attitudes: Attitudes, result: SampleVerdicts) -> Iterator[Row]:

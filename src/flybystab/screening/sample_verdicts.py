@@ -40,6 +40,11 @@ def _quick(draw: Draws, code: int, size: tuple[float, float]) -> tuple[Array, ND
     return friction, verdict
 
 
+def friction_at_rest(draw: Draws, material: Material) -> Array:
+    """Friction angle (rad) that each body mobilises far from any planet; inf where no angle suffices."""
+    return _quick(draw, material.surface_code, (0.0, 0.0))[0][:, 0]
+
+
 @dataclass
 class SampleVerdicts:
     """Verdicts on the samples of one passage.
