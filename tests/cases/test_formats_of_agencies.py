@@ -308,10 +308,14 @@ def test_horizons_has_the_law_of_its_accelerations(tmp_path):
     (a,) = catalogue(path)
     assert a.orbit.nongrav.law == "comet"
     assert a.row["A1_au_d2"] == "4.887055233121e-10"
-    path.write_text(NONGRAV.replace("DT=  0.", "DT=  35.07") + TEXT)
-    with pytest.raises(InvalidInput, match="DT"):
-        catalogue(path)
-    path.write_text(NONGRAV.replace("R0=  2.808", "R0=  5.0") + TEXT)
+    path.write_text(NONGRAV.replace("DT=  0.", "DT=  35.07").replace("AMRAT=  0.", "AMRAT= 1.5E-4") + TEXT)
+    (b,) = catalogue(path)
+    assert b.orbit.nongrav.delay == pytest.approx(35.07 * DAY, rel=1e-15)
+    assert b.orbit.nongrav.area_to_mass == 1.5e-4
+    path.write_text(NONGRAV.replace("R0=  2.808", "R0=  5.0") + TEXT)  # of carbon monoxide
+    (c,) = catalogue(path)
+    assert c.orbit.nongrav.constants == (0.1112620426, 5.0 * AU, 2.15, 5.093, 4.6142)
+    path.write_text(NONGRAV.replace("R0=  2.808", "R0=  5.0").replace("NM=  2.15", "") + TEXT)
     with pytest.raises(InvalidInput, match="law"):
         catalogue(path)
 

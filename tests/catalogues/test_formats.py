@@ -79,8 +79,7 @@ def test_neocc_orbit(tmp_path):
     assert a.quantity("a_au").value == 2.5158372264739257
     assert a.quantity("A2_au_d2").value == pytest.approx(-2.9e-14)
     path.write_text(KE1.replace(" NGR   0.0", " NGR   0.2"))
-    with pytest.raises(InvalidInput, match="AMRAT"):  # radiation pressure is not in the force model
-        catalogue(path)
+    assert catalogue(path)[0].orbit.nongrav.area_to_mass == pytest.approx(0.2e-3 * 1370.0 / 1361.0)
     path.write_text(KE1.replace("ECLM", "EQUM"))
     with pytest.raises(InvalidInput, match="OEF2"):
         catalogue(path)

@@ -2,6 +2,7 @@
 
 import os
 import warnings
+from pathlib import Path
 
 import astropy.units as u
 import numpy as np
@@ -91,9 +92,12 @@ def test_density_by_gm_and_extent():
     assert "density_kg_m3" not in physical(items[:1], "x")
 
 
-def test_a_parameter_that_is_not_modelled(sbdb):
-    with pytest.raises(InvalidInput, match="DT"):
-        catalogue(sbdb("67P.dat"))
+def test_the_delay_of_a_comet(sbdb):
+    """In the units that astroquery gives its parameters, against the file of the same solution."""
+    (a,) = catalogue(sbdb("67P.dat"))
+    (b,) = catalogue(Path(__file__).parents[1] / "cases" / "files" / "67P.json")
+    assert a.orbit.nongrav == b.orbit.nongrav
+    assert a.orbit.nongrav.delay > 0.0
 
 
 def test_elements_of_horizons(horizons):

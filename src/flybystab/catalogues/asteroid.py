@@ -18,6 +18,7 @@ from flybystab.body.shape import Shape
 from flybystab.catalogues.covariance_files import embedded_covariance
 from flybystab.catalogues.record import BODILY, ORBIT, ORBIT_SI, ORBITAL, PERIHELION, SHAPE, Record
 from flybystab.catalogues.tumbling import attitude_matrix, ecliptic_direction, free_spin, tumbling_state
+from flybystab.constants import DAY
 from flybystab.errors import InvalidInput
 from flybystab.units import to_si
 
@@ -245,7 +246,7 @@ class Asteroid(Record):
 
     @cached_property
     def orbit(self) -> Orbit:
-        """The orbit, from the elements of the row with every digit, and A1, A2, A3 (zero where not known).
+        """The orbit, from the elements of the row with every digit, with A1, A2, A3, DT, AMRAT (zero if not known).
 
         The elements are a, e, i, node, peri, M, or q and the time of perihelion in place of a and M.
 
@@ -263,7 +264,9 @@ class Asteroid(Record):
             au_per_day2(self._number(c)) if self.row.get(c) else 0.0
             for c in ("A1_au_d2", "A2_au_d2", "A3_au_d2")
         )
-        push = NonGravitational((a1, a2, a3), self.row.get("nongrav_law") or "asteroid")
+        delay = self._number("DT_d") * DAY if self.row.get("DT_d") else 0.0
+        area = self._number("AMRAT_m2_kg") if self.row.get("AMRAT_m2_kg") else 0.0
+        push = NonGravitational((a1, a2, a3), self.row.get("nongrav_law") or "asteroid", delay, area)
         _ = push.constants  # refuses an unknown law
         if self.knows(*PERIHELION) and not self.knows("a_au", "M_deg"):
             state = self._state_by_perihelion()
@@ -274,7 +277,7 @@ class Asteroid(Record):
 
     def _state_by_perihelion(self) -> np.ndarray:
         """Heliocentric state (m, m/s), shape (6,), by the distance and the time of perihelion; any conic."""
-        from flybystab.constants import AU, DAY
+        from flybystab.constants import AU
         from flybystab.orbit.elements import state_from_elements
 
         i, node, peri = (float(np.radians(self._number(c))) for c in ("i_deg", "node_deg", "peri_deg"))

@@ -33,6 +33,7 @@ UNITS: Mapping[str, u.UnitBase] = MappingProxyType(
     | {"H_mag": u.mag, "amplitude_mag": u.mag, "epoch_jd_tdb": u.d, "a_au": u.au, "sigma_a_au": u.au}
     | {"q_au": u.au, "tp_jd_tdb": u.d}
     | dict.fromkeys(("A1_au_d2", "A2_au_d2", "A3_au_d2"), u.au / u.d**2)
+    | {"DT_d": u.d, "AMRAT_m2_kg": u.m**2 / u.kg}
     | dict.fromkeys(
         ("e", "sigma_e", "inertia_a_over_c", "inertia_b_over_c", "condition_code"), u.dimensionless_unscaled
     )
@@ -69,6 +70,8 @@ ORBITAL = frozenset(
         "A1_au_d2",
         "A2_au_d2",
         "A3_au_d2",
+        "DT_d",
+        "AMRAT_m2_kg",
         "frame",
         "sigma_source",
         "nongrav_source",
@@ -96,6 +99,8 @@ LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType(
     | {"q_au": (0.0, 1e4), "tp_jd_tdb": (-1e7, 1e7)}
     # A third of the Sun's gravity at 1 au; the largest accelerations of comets are 1e-6 au/d2.
     | dict.fromkeys(("A1_au_d2", "A2_au_d2", "A3_au_d2"), (-1e-4, 1e-4))
+    # The largest delays of comets are about 100 d; thin plates of space debris reach 100 m2/kg.
+    | {"DT_d": (-1e4, 1e4), "AMRAT_m2_kg": (0.0, 1e3)}
 )
 
 

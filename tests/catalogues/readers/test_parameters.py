@@ -12,6 +12,7 @@ from flybystab.catalogues.readers import READERS, reader_names
 from flybystab.catalogues.readers.native import read_native
 from flybystab.catalogues.readers.parameters import MODELLED, NOT_MODELLED
 from flybystab.errors import InvalidInput, UnknownName
+from flybystab.orbit.forces import NonGravitational
 
 FILES = Path(__file__).parents[2] / "cases" / "files"
 
@@ -164,7 +165,52 @@ def test_accelerations_of_layup_are_refused(tmp_path, column):
         catalogue(path)
 
 
-@pytest.mark.parametrize("key", ["A1", "AMR", "T0", "dx"])
+def test_area_over_mass_of_find_orb_and_of_orbfit(tmp_path):
+    """m2/kg; m2/ton with a solar constant of 1370 W/m2: the accelerations agree to the digits of the constants."""
+    path = tmp_path / "x"
+    item = {"AMR": 2e-3, "sigma_AMR": 1e-4}
+    path.write_text(with_item("find_orb_total.json", ["objects", "Test_1001", "elements"], item))
+    (a,) = catalogue(path)
+    assert a.orbit.nongrav.area_to_mass == 2e-3
+    assert a.orbit.nongrav.a == (0.0, 0.0, 0.0)
+    assert a.orbit.covariance.names[-1] == "AMRAT"
+    assert a.orbit.covariance.sigma[-1] == pytest.approx(1e-4)
+    path.write_text(text("2018VP1.eq0").replace("LSP   0  0    6", "LSP   1  2    6") + " NGR  2.0 -1e-4\n")
+    (b,) = catalogue(path)
+    assert b.orbit.nongrav.area_to_mass == pytest.approx(2e-3 * 1370.0 / 1361.0)
+    assert b.orbit.nongrav.row[-1] == pytest.approx(2e-3 * 1370.0 / 299792458.0, rel=1e-9)
+    assert float(b.row["A2_au_d2"]) == pytest.approx(-1e-14, rel=1e-15)
+    document = json.loads(text("2020AB.json"))
+    for part in ("CAR", "COM"):
+        document[part]["coefficient_names"].append("srp")
+        document[part]["coefficient_values"].append(2.0)
+        document[part]["covariance"] = {}
+    path.write_text(json.dumps(document))
+    assert catalogue(path)[0].orbit.nongrav == NonGravitational(area_to_mass=b.orbit.nongrav.area_to_mass)
+
+
+def test_an_estimated_area_over_mass_of_orbfit_is_in_the_covariance(tmp_path):
+    content = text("2018VP1.eq0").replace("LSP   0  0    6", "LSP   1  2    7   1")
+    content = content.replace("LSP   1  2    7   1", "LSP   1  2    7   1\n NGR  2.0 0.0")
+    lines = content.splitlines()
+    rows = [k for k, line in enumerate(lines) if line.strip().startswith("COV")]
+    upper = np.zeros((7, 7))
+    upper[np.triu_indices(6)[0], np.triu_indices(6)[1]] = [
+        float(c) for k in rows for c in lines[k].split()[1:]
+    ]
+    upper[6, 6] = 0.25
+    cells = upper[np.triu_indices(7)]
+    lines[rows[0] : rows[-1] + 1] = [
+        " COV  " + " ".join(f"{x:.15e}" for x in cells[k : k + 3]) for k in range(0, 28, 3)
+    ]
+    lines = [line for line in lines if not line.startswith("! RMS")]
+    (tmp_path / "x").write_text("\n".join(lines) + "\n")
+    (a,) = catalogue(tmp_path / "x")
+    assert a.orbit.covariance.names[-1] == "AMRAT"
+    assert a.orbit.covariance.sigma[-1] == pytest.approx(0.5e-3 * 1370.0 / 1361.0)
+
+
+@pytest.mark.parametrize("key", ["A1", "T0", "dx"])
 def test_find_orb_does_not_say_which_law_its_parameters_have(tmp_path, key):
     path = tmp_path / "x.json"
     path.write_text(with_item("find_orb_total.json", ["objects", "Test_1001", "elements"], {key: 1e-9}))

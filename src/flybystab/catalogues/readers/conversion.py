@@ -228,7 +228,7 @@ def cartesian_covariance(
 ) -> Covariance:
     """Covariance of the state with ICRF axes, from that of elements (au, days, degrees) to first order.
 
-    Parameters are those of :func:`state_of`; A1, A2, A3 may follow the elements, in au/d2.
+    Parameters are those of :func:`state_of`; A1, A2, A3 (au/d2), DT (d), AMRAT (m2/kg) may follow the elements.
     """
     from flybystab.orbit.covariance import PUSHES, SETS, Covariance
 
@@ -243,10 +243,10 @@ def cartesian_covariance(
         step[k] = max(1e-6 * abs(middle[k]), min(float(sigma[k]), 1e-3), 1e-9)
         difference = state_of(elements, middle + step, gm) - state_of(elements, middle - step, gm)
         jacobian[:6, k] = difference / (2.0 * step[k])
-    for k in range(len(extra)):
-        jacobian[6 + k, len(elements) + k] = AU / DAY**2
+    scale = np.array([_SI[_UNITS[n]] for n in extra])
+    jacobian[6:, len(elements) :] = np.diag(scale)
     mean = np.concatenate(
-        [state_of(elements, middle, gm), np.array(values[len(elements) :], dtype=float) * AU / DAY**2]
+        [state_of(elements, middle, gm), np.array(values[len(elements) :], dtype=float) * scale]
     )
     return Covariance(
         _time(jd),
@@ -277,12 +277,12 @@ _UNITS: Mapping[str, str] = (
     | dict.fromkeys(("i", "node", "peri", "M", "L"), "deg")
     | dict.fromkeys(("e", "h", "k", "P", "Q"), "")
     | dict.fromkeys(("A1", "A2", "A3"), "au/d2")
-    | {"tp": "d"}
+    | {"tp": "d", "DT": "d", "AMRAT": "m2/kg"}
 )
 
 #: SI units of these.
 _SI: Mapping[str, float] = {
-    "au": AU, "au/d": AU / DAY, "deg": DEGREE, "": 1.0, "au/d2": AU / DAY**2, "d": DAY,
+    "au": AU, "au/d": AU / DAY, "deg": DEGREE, "": 1.0, "au/d2": AU / DAY**2, "d": DAY, "m2/kg": 1.0,
 }  # fmt: skip
 
 
@@ -296,7 +296,7 @@ def covariance_of(
     *,
     correlated: bool = True,
 ) -> Covariance:
-    """Covariance of heliocentric elements of the ecliptic, in au, days, degrees and au/d2.
+    """Covariance of heliocentric elements of the ecliptic, in au, days, degrees, au/d2 and m2/kg.
 
     A cartesian state has the axes of the ecliptic.
 

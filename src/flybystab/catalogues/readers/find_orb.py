@@ -21,6 +21,7 @@ from flybystab.catalogues.readers.conversion import (
     elements_row,
     number,
 )
+from flybystab.catalogues.readers.nongravitational import nongravitational_columns
 from flybystab.catalogues.readers.parameters import check_parameters, looks_like_parameter
 from flybystab.errors import InvalidInput
 from flybystab.files import parse_json
@@ -30,6 +31,8 @@ if TYPE_CHECKING:
 
 _ELEMENTS = {"a": "a", "e": "e", "i": "i", "asc_node": "node", "arg_per": "peri", "M": "M"}
 _COMETARY = {"q": "q", "e": "e", "i": "i", "asc_node": "node", "arg_per": "peri", "Tp": "tp"}
+#: Parameters of the models with one parameter: Yarkovsky A2 (au/d2), and area over mass (m2/kg).
+_PARAMETERS = {"A2": "A2", "AMR": "AMRAT"}
 #: Keys in capitals that are no parameters of the force model.
 _OTHER = frozenset({"H", "G", "U", "P", "Q", "M", "MOIDs", "Tp", "Tp_iso", "p_NEO", "p_HZ"})
 
@@ -78,15 +81,18 @@ def _entry(name: str, elements: Mapping[str, Any], file: str) -> Entry:
     if elements.get("H") is not None:
         row["H_mag"] = str(elements["H"])
     keys = list(names)
-    if "A2" in elements:
-        row |= {"A2_au_d2": repr(number(elements["A2"], "A2", file)), "nongrav_law": "asteroid"}
+    given = {mine: elements[k] for k, mine in _PARAMETERS.items() if k in elements}
+    if len(given) > 1:  # A2 with AMR is no model of Find_Orb that fits both
+        check_parameters("find_orb", [f"{' and '.join(given)} together"], file)
+    row |= nongravitational_columns(given, False, file, law="asteroid")
     sigmas = [elements.get(f"{k} sigma") for k in keys]
     if any(s is None for s in sigmas):
         return row, None
     sigma = [number(s, "sigma", file) for s in sigmas]
-    if "A2" in elements and elements.get("sigma_A2") is not None:
-        labels, values = [*labels, "A2"], [*values, float(row["A2_au_d2"])]
-        sigma.append(number(elements["sigma_A2"], "sigma_A2", file))
+    for k, mine in _PARAMETERS.items():
+        if k in elements and elements.get(f"sigma_{k}") is not None:
+            labels, values = [*labels, mine], [*values, number(elements[k], k, file)]
+            sigma.append(number(elements[f"sigma_{k}"], f"sigma_{k}", file))
     matrix = np.diag(np.square(sigma))
     return row, covariance_of(
         jd, labels, values, matrix, f"1-sigmas without correlations, {source}", file, correlated=False

@@ -27,8 +27,8 @@ from flybystab.catalogues.readers.conversion import (
     state_of,
     state_row,
 )
+from flybystab.catalogues.readers.nongravitational import nongravitational_columns
 from flybystab.catalogues.readers.parameters import check_parameters, looks_like_parameter
-from flybystab.catalogues.readers.sbdb_answer import LAWS
 from flybystab.constants import AU, DAY
 from flybystab.errors import InvalidInput
 from flybystab.files import parse_json
@@ -254,12 +254,12 @@ def _physical(header: str) -> dict[str, str]:
 
 
 def _nongravitational(header: str, file: str) -> dict[str, str]:
-    """A1, A2, A3 and their law from the description of the object.
+    """A1, A2, A3, their law, DT and AMRAT from the description of the object.
 
     Raises
     ------
     InvalidInput
-        Parameters that are not modelled, or another law.
+        Parameters that are not modelled, or a law without all of its constants.
     """
     block = re.search(
         r"non-gravitational force model[^\n]*:\s*\n(.*?)(?:\n\s*\n|\n\*{5}|\n(?:ASTEROID|COMET) comments|\Z)",
@@ -271,17 +271,5 @@ def _nongravitational(header: str, file: str) -> dict[str, str]:
     pairs = {k: number(v, k, file) for k, v in _PAIR.findall(block[1]) if v != "n.a."}
     given = {k: v for k, v in pairs.items() if v != 0.0 and looks_like_parameter(k)}
     check_parameters("JPL", given, file)
-    accelerations = {k: v for k, v in given.items() if k in ("A1", "A2", "A3")}
-    if not accelerations:
-        return {}
-    constants = {k: v for k, v in pairs.items() if k in LAWS["comet"]}
     comet = is_comet(name_columns(_line(header, "Target body name") or "x")["designation"])
-    laws = [name for name, law in LAWS.items() if all(constants.get(k) == v for k, v in law.items())]
-    if not laws and (constants or not comet):
-        raise InvalidInput(
-            "A1, A2, A3",
-            f"with the law {constants or 'not given'} in {file}",
-            "constants of the laws 1/r2 or water",
-        )
-    row = {f"{k}_au_d2": repr(v) for k, v in accelerations.items()}
-    return row | {"nongrav_law": laws[0] if laws else "comet"}
+    return nongravitational_columns(pairs, comet, file)

@@ -2,8 +2,8 @@
 
 Fields: https://github.com/Smithsonian/mpc-public/tree/main/mpc_orb (schema 0.1 to 0.7). ``CAR`` is a heliocentric
 state with axes of the ecliptic, ``COM`` q, e, i, node, argperi, peri_time (MJD); epoch in MJD, TT; ``covKL`` is row
-K, column L of the covariance in the same units; yarkovsky in 1e-10 au/d2 (the unit of OrbFit, which makes the
-orbits).
+K, column L of the covariance in the same units; yarkovsky in 1e-10 au/d2 and srp in m2/ton (the units of OrbFit,
+which makes the orbits).
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from flybystab.catalogues.readers.conversion import (
     elements_row,
     number,
 )
+from flybystab.catalogues.readers.nongravitational import ORBFIT_AREA, nongravitational_columns
 from flybystab.catalogues.readers.parameters import check_parameters
 from flybystab.errors import InvalidInput
 from flybystab.files import parse_json
@@ -32,8 +33,9 @@ if TYPE_CHECKING:
 
 _COM = {"q": "q", "e": "e", "i": "i", "node": "node", "argperi": "peri", "peri_time": "tp"}
 _CAR = {c: c for c in CARTESIAN}
-_YARKOVSKY = ("yarkovsky", "yarkovski")
-_UNIT = 1e-10  # au/d2
+#: Names and units of the parameters: 1e-10 au/d2, and m2/ton as in OrbFit.
+_PARAMETERS = {"yarkovsky": "A2", "yarkovski": "A2", "srp": "AMRAT"}
+_UNIT = {"A2": 1e-10, "AMRAT": ORBFIT_AREA}
 
 
 def _is_mpc_orbit(text: str) -> bool:
@@ -83,8 +85,9 @@ def _entry(document: Mapping[str, Any], file: str) -> Entry:
     if kind == "COM":
         values[names.index("tp")] += MJD - jd
     row |= elements_row(jd, names[:6], (), values[:6])
-    if "A2" in names:
-        row |= {"A2_au_d2": repr(values[names.index("A2")]), "nongrav_law": "asteroid"}
+    row |= nongravitational_columns(
+        dict(zip(names[6:], values[6:], strict=True)), False, file, law="asteroid"
+    )
     magnitude = document.get("magnitude_data") or {}
     if magnitude.get("H") is not None:
         row["H_mag"] = str(magnitude["H"])
@@ -109,7 +112,7 @@ def _identity(document: Mapping[str, Any]) -> dict[str, str]:
 def _solution(
     part: Mapping[str, Any], known: Mapping[str, str], file: str
 ) -> tuple[list[str], list[float], Array | None]:
-    """Names, values and covariance of a part of the document; A2 in au/d2.
+    """Names, values and covariance of a part of the document; A2 in au/d2, AMRAT in m2/kg.
 
     Raises
     ------
@@ -127,8 +130,9 @@ def _solution(
     if sorted(theirs[:6]) != sorted(known):
         raise InvalidInput("coefficient_names", theirs[:6], f"{', '.join(known)} in {file}")
     check_parameters("MPC", theirs[6:], file)
-    names = [known[n] for n in theirs[:6]] + ["A2" for n in theirs[6:] if n in _YARKOVSKY]
-    values = given[:6] + [v * _UNIT for v in given[6:]]
+    extra = [_PARAMETERS[n] for n in theirs[6:]]
+    names = [known[n] for n in theirs[:6]] + extra
+    values = given[:6] + [v * _UNIT[n] for v, n in zip(given[6:], extra, strict=True)]
     if not any(v is not None for v in cells.values()):
         return names, values, None
     n = len(names)
@@ -136,5 +140,5 @@ def _solution(
     for i in range(n):
         for j in range(i, n):
             matrix[i, j] = matrix[j, i] = number(cells.get(f"cov{i}{j}"), f"cov{i}{j}", file)
-    scale = np.array([1.0] * 6 + [_UNIT] * (n - 6))
+    scale = np.array([1.0] * 6 + [_UNIT[x] for x in extra])
     return names, values, matrix * np.outer(scale, scale)

@@ -2,8 +2,9 @@
 
 Elements: ``KEP`` a (au), e, i, node, peri, M (deg); ``EQU`` a (au), h, k, p, q, mean longitude (deg); ``COM`` q (au),
 e, i, node, peri (deg), time of perihelion (MJD); ``CAR`` state of the ecliptic (au, au/d). ``COV`` is the upper
-triangle, row by row, in the same units, then 1e-10 au/d2 for A2 (OrbFit 5.0, module ``orbit_elements``, and the
-description of the files at https://neo.ssa.esa.int/computer-access; checked against the ``RMS`` lines).
+triangle, row by row, in the same units, then m2/ton for the area-to-mass ratio and 1e-10 au/d2 for A2 (OrbFit 5.0,
+module ``orbit_elements``, and the description of the files at https://neo.ssa.esa.int/computer-access; checked
+against the ``RMS`` lines).
 """
 
 from __future__ import annotations
@@ -26,6 +27,7 @@ from flybystab.catalogues.readers.conversion import (
     number,
     printed_covariance,
 )
+from flybystab.catalogues.readers.nongravitational import ORBFIT_AREA, nongravitational_columns
 from flybystab.catalogues.readers.parameters import check_parameters
 from flybystab.errors import InvalidInput
 
@@ -41,7 +43,8 @@ _SETS: Mapping[str, tuple[str, ...]] = {
 }
 #: Parameters of the force models in the order of the LSP and NGR lines; only model 1 is that of asteroids.
 _PARAMETERS: Mapping[str, tuple[str, ...]] = {"0": (), "1": ("AMRAT", "A2")}
-_UNIT = 1e-10  # au/d2, of A2
+#: Units of these: m2/ton with the solar constant of OrbFit, 1e-10 au/d2.
+_UNIT: Mapping[str, float] = {"AMRAT": ORBFIT_AREA, "A2": 1e-10}
 
 
 def _is_oef(text: str) -> bool:
@@ -128,8 +131,7 @@ def _solution(name: str, lines: Sequence[str], file: str) -> Entry:
     if "MAG" in words and number(words["MAG"][0], "MAG", file) > -9.0:
         row["H_mag"] = words["MAG"][0]
     parameters = _parameters(words, name, file)
-    if "A2" in parameters:
-        row |= {"A2_au_d2": repr(parameters["A2"] * _UNIT), "nongrav_law": "asteroid"}
+    row |= nongravitational_columns(parameters, False, file, law="asteroid")
     covariance = _covariance(jd, names, values, words, parameters, row["orbit_source"], file)
     if covariance is None and kinds[0] != "KEP":
         covariance = printed_covariance(
@@ -139,12 +141,12 @@ def _solution(name: str, lines: Sequence[str], file: str) -> Entry:
 
 
 def _parameters(words: Mapping[str, Sequence[str]], name: str, file: str) -> dict[str, float]:
-    """Values of the parameters of the force model by name.
+    """Values of the parameters of the force model by name: A2 (au/d2), AMRAT (m2/kg).
 
     Raises
     ------
     InvalidInput
-        A model or a parameter that is not modelled: an area-to-mass ratio, the outgassing of comets.
+        A model or a parameter that is not modelled, as the outgassing of comets.
     """
     values = [number(v, "NGR", file) for v in words.get("NGR", [])]
     model = (words.get("LSP") or ["1" if values else "0"])[0]
@@ -159,8 +161,7 @@ def _parameters(words: Mapping[str, Sequence[str]], name: str, file: str) -> dic
     solved = _solved(words, file)
     if any(s not in labels for s in solved):
         check_parameters("OrbFit", [s for s in solved if s not in labels], file)
-    check_parameters("OrbFit", [n for n, v in found.items() if n != "A2" and (v != 0.0 or n in solved)], file)
-    return {n: v for n, v in found.items() if n == "A2"}
+    return {n: v * _UNIT[n] for n, v in found.items()}
 
 
 def _solved(words: Mapping[str, Sequence[str]], file: str) -> list[str]:
@@ -199,8 +200,8 @@ def _covariance(
     rms = [number(c, "RMS", file) for c in words.get("RMS", [])] or np.sqrt(np.diag(matrix))
     if len(rms) != n or not np.allclose(np.sqrt(np.diag(matrix)), rms, rtol=1e-4):
         raise InvalidInput("orbit file", file, expected)
-    scale = np.array([1.0] * 6 + [_UNIT] * len(solved))
-    all_values = [*values, *(parameters[s] * _UNIT for s in solved)]
+    scale = np.array([1.0] * 6 + [_UNIT[s] for s in solved])
+    all_values = [*values, *(parameters[s] for s in solved)]
     return covariance_of(jd, [*names, *solved], all_values, matrix * np.outer(scale, scale), source, file)
 
 

@@ -16,13 +16,15 @@ from flybystab.errors import InvalidInput
 MODELLED: Mapping[str, frozenset[str]] = MappingProxyType(
     {
         # https://ssd-api.jpl.nasa.gov/doc/sbdb.html (model_pars)
-        "JPL": frozenset({"A1", "A2", "A3", "ALN", "NK", "NM", "NN", "R0"}),
+        "JPL": frozenset({"A1", "A2", "A3", "DT", "AMRAT", "ALN", "NK", "NM", "NN", "R0"}),
         # Parameters 1 and 2 of model 1 in the LSP and NGR lines of OrbFit: area-to-mass ratio and Yarkovsky A2.
-        "OrbFit": frozenset({"A2"}),
-        # non_grav_coefficients of https://github.com/Smithsonian/mpc-public/tree/main/mpc_orb (A2 in 1e-10 au/d2).
-        "MPC": frozenset({"yarkovsky", "yarkovski"}),
-        # A2 alone is its Yarkovsky model; with A1 it is one of several laws, which the file does not name.
-        "find_orb": frozenset({"A2"}),
+        "OrbFit": frozenset({"A2", "AMRAT"}),
+        # non_grav_coefficients of https://github.com/Smithsonian/mpc-public/tree/main/mpc_orb (A2 in 1e-10 au/d2, srp
+        # in m2/ton).
+        "MPC": frozenset({"yarkovsky", "yarkovski", "srp"}),
+        # A2 alone is its Yarkovsky model, AMR its radiation pressure; A1 belongs to one of several laws, which the file
+        # does not name.
+        "find_orb": frozenset({"A2", "AMR"}),
         # Non-gravitational terms of layup have constants g(r) of their own (https://github.com/Smithsonian/layup).
         "FORMAT": frozenset(),
         # Element tables of MPC and JPL without room for parameters.
@@ -36,18 +38,14 @@ NOT_MODELLED: Mapping[str, Mapping[str, str]] = MappingProxyType(
     {
         "JPL": {
             "RHO": "an orbit with A2 in place of the thermal model (bulk density)",
-            "AMRAT": "fs.Orbit.from_elements with AMRAT",
-            "DT": "fs.Orbit.from_elements with A1, A2, A3, their law and DT",
             "S0": "a solution without S0",
         },
-        "OrbFit": {"AMRAT": "an orbit with A2 alone, or fs.Orbit.from_elements with A2 and AMRAT"},
-        "MPC": dict.fromkeys(
-            ("A1", "A2", "A3", "DT", "srp", "yc"), "JPL's orbit (SBDB), which names the law"
-        ),
+        "OrbFit": {},
+        # The units of A1, A2, A3 and DT are not documented (the tables say m2/ton).
+        "MPC": dict.fromkeys(("A1", "A2", "A3", "DT", "yc"), "JPL's orbit (SBDB), which names the law"),
         "find_orb": {
             "A1": "fs.Orbit.from_elements with A1, A2, A3 and the law of the fit",
             "A3": "fs.Orbit.from_elements with A1, A2, A3 and the law of the fit",
-            "AMR": "a fit with A2 alone, or fs.Orbit.from_elements with AMRAT",
         },
         "FORMAT": dict.fromkeys(("A1", "A2", "A3"), "fs.Orbit.from_elements or from_state with A1, A2, A3"),
         "table": {},

@@ -26,10 +26,8 @@ from flybystab.catalogues.readers.conversion import (
     printed_sigmas,
     since_perihelion,
 )
-from flybystab.catalogues.readers.parameters import (
-    check_parameters,
-    looks_like_parameter,
-)
+from flybystab.catalogues.readers.nongravitational import nongravitational_columns
+from flybystab.catalogues.readers.parameters import check_parameters, looks_like_parameter
 from flybystab.errors import InvalidInput
 from flybystab.files import parse_json
 
@@ -47,7 +45,7 @@ _ELEMENTS = {
 }
 _COMETARY = ("q", "e", "i", "om", "w", "tp")
 _SIGMAS = {f"sigma_{c}": f"sigma_{mine}" for c, mine in _ELEMENTS.items()}
-_ACCELERATIONS = ("A1", "A2", "A3")
+_PARAMETERS = ("A1", "A2", "A3", "DT", "AMRAT")
 _SBDB = {
     "class": "orbit_class",
     "H": "H_mag",
@@ -57,7 +55,6 @@ _SBDB = {
     "condition_code": "condition_code",
     **_ELEMENTS,
     **_SIGMAS,
-    **{c: f"{c}_au_d2" for c in _ACCELERATIONS},
 }
 _NAMES = {"a": "a", "e": "e", "i": "i", "om": "node", "w": "peri", "ma": "M", "q": "q", "tp": "tp"}
 #: Columns in capitals that are no parameters of the force model.
@@ -97,8 +94,8 @@ def from_sbdb(row: Mapping[str, str], file: str) -> dict[str, str]:
         "I",
     )
     out |= _elements(row, file)
-    if any(row.get(c) for c in _ACCELERATIONS):
-        out["nongrav_law"] = "comet" if comet else "asteroid"
+    law = "comet" if comet else "asteroid"  # a query does not list the constants
+    out |= nongravitational_columns({c: row[c] for c in _PARAMETERS if row.get(c)}, comet, file, law=law)
     out |= _names(row, full, key)
     out["pha"] = {"True": "Y", "False": "N"}.get(row.get("pha", ""), row.get("pha", ""))
     taxonomy = row.get("spec_B") or row.get("spec_T")
@@ -230,11 +227,11 @@ def _elements(row: Mapping[str, str], file: str) -> dict[str, str]:
 
 
 def _covariance(row: Mapping[str, str], file: str) -> Covariance | None:
-    """Covariance where the catalogue row alone does not say it: 1-sigmas of q, tp, A1, A2, A3, or coarse digits.
+    """Covariance where the catalogue row alone does not say it: 1-sigmas of q, tp, A1, A2, A3, DT, or coarse digits.
 
     The printed digits count beside the 1-sigmas: the default of the query tool has four.
     """
-    pushes = [c for c in _ACCELERATIONS if row.get(c) and row.get(f"{c}_sigma")]
+    pushes = [c for c in _PARAMETERS if row.get(c) and row.get(f"{c}_sigma")]
     keplerian = _keplerian(row)
     columns = tuple(_ELEMENTS) if keplerian else _COMETARY
     if not all(row.get(c) for c in columns):

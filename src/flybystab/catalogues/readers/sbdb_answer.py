@@ -24,6 +24,7 @@ from flybystab.catalogues.readers.conversion import (
     perihelion_row,
     printed_covariance,
 )
+from flybystab.catalogues.readers.nongravitational import COLUMN_OF_PARAMETER, nongravitational_columns
 from flybystab.catalogues.readers.parameters import check_parameters
 from flybystab.catalogues.readers.sbdb import comet_orbit, thousandfold
 from flybystab.constants import G
@@ -36,12 +37,6 @@ if TYPE_CHECKING:
 
 _COLUMNS = dict(zip(("a", "e", "i", "om", "w", "ma"), COLUMN_OF.values(), strict=True))
 _LABELS = {"om": "node", "w": "peri"}
-_ACCELERATIONS = ("A1", "A2", "A3")
-#: Constants of the laws of distance, as JPL lists them.
-LAWS = {
-    "asteroid": {"ALN": 1.0, "NK": 0.0, "NM": 2.0, "R0": 1.0},
-    "comet": {"ALN": 0.1112620426, "NK": 4.6142, "NM": 2.15, "NN": 5.093, "R0": 2.808},
-}
 
 
 def from_sbdb_answer(text: str, file: str) -> tuple[dict[str, str], Covariance | None]:
@@ -79,10 +74,8 @@ def from_sbdb_answer(text: str, file: str) -> tuple[dict[str, str], Covariance |
     solution = str(orbit.get("orbit_id", ""))
     row |= {"frame": FRAME, "orbit_solution": f"JPL {solution}", "orbit_source": f"JPL SBDB ({file})"}
     row["condition_code"] = str(orbit.get("condition_code") or "")
-    pushes = {name: p for name, p in model.items() if name in _ACCELERATIONS}
-    row |= {f"{name}_au_d2": str(p["value"]) for name, p in pushes.items()}
-    if pushes:
-        row["nongrav_law"] = _law_of(model, comet, file)
+    pushes = {name: p for name, p in model.items() if name in COLUMN_OF_PARAMETER}
+    row |= nongravitational_columns({name: p["value"] for name, p in model.items()}, comet, file)
     covariance = _covariance(orbit, pushes, f"JPL SBDB, solution {solution} ({file})", file)
     return row, _with_digits(row, covariance)
 
@@ -172,22 +165,6 @@ def physical(items: Sequence[Mapping[str, Any]], file: str) -> dict[str, str]:
     return out
 
 
-def _law_of(model: Mapping[str, Mapping[str, Any]], comet: bool, file: str) -> str:
-    """Law of distance of A1, A2, A3: that of the constants listed, or of Marsden et al. (1973) for a comet."""
-    constants = {c for law in LAWS.values() for c in law}
-    given = {name: number(p["value"], name, file) for name, p in model.items() if name in constants}
-    if not given and comet:
-        return "comet"
-    for name, law in LAWS.items():
-        if given and all(given.get(c) == x for c, x in law.items()):
-            return name
-    raise InvalidInput(
-        "A1, A2, A3",
-        f"with the law {given or 'not given'} in {file}",
-        "the constants of an acceleration that falls as 1/r2, or of the water law of comets",
-    )
-
-
 def _covariance(
     orbit: Mapping[str, Any], pushes: Mapping[str, Any], source: str, file: str
 ) -> Covariance | None:
@@ -214,7 +191,7 @@ def _covariance(
         if isinstance(error, InvalidInput):
             raise
         raise InvalidInput(
-            "covariance", file, f"labels out of e, q, tp, node, peri, i, A1, A2, A3 ({error})"
+            "covariance", file, f"labels out of e, q, tp, node, peri, i, A1, A2, A3, DT, AMRAT ({error})"
         ) from None
 
 
