@@ -81,10 +81,10 @@ def _entry(name: str, elements: Mapping[str, Any], file: str) -> Entry:
     if elements.get("H") is not None:
         row["H_mag"] = str(elements["H"])
     keys = list(names)
-    given = {mine: elements[k] for k, mine in _PARAMETERS.items() if k in elements}
-    if len(given) > 1:  # A2 with AMR is no model of Find_Orb that fits both
-        check_parameters("find_orb", [f"{' and '.join(given)} together"], file)
-    row |= nongravitational_columns(given, False, file, law="asteroid")
+    pushes = {mine: elements[k] for k, mine in _PARAMETERS.items() if k in elements}
+    if len(pushes) > 1:  # A2 with AMR is no model of Find_Orb that fits both
+        check_parameters("find_orb", [f"{' and '.join(pushes)} together"], file)
+    row |= nongravitational_columns(pushes, False, file, law="asteroid")
     sigmas = [elements.get(f"{k} sigma") for k in keys]
     if any(s is None for s in sigmas):
         return row, None
