@@ -67,9 +67,9 @@ class SpinSample(Tabular):
         return len(self.spin_ratio)
 
     def __repr__(self) -> str:
-        low, high = np.nanmin(self.spin_ratio), np.nanmax(self.spin_ratio)
+        finite = self.spin_ratio[np.isfinite(self.spin_ratio)]
         pole = "known pole" if self.pole_known else "isotropic poles"
-        rate = f"spin rate x {low:.3g} to {high:.3g}"
+        rate = f"spin rate x {finite.min():.3g} to {finite.max():.3g}" if len(finite) else "no spin before"
         return f"<SpinSample {len(self)} attitudes, {pole}: {counted(self.verdict)}; {rate}>"
 
 

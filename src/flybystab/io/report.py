@@ -24,7 +24,18 @@ from flybystab.flybys.result import FlybyResult
 from flybystab.flybys.spin_sample import SpinSample
 from flybystab.io.grains_text import grains_lines
 from flybystab.io.surface_text import REPOSE, surface_rows
-from flybystab.io.text import MEANING, angle, contact, known, left_out, modelled
+from flybystab.io.text import (
+    MEANING,
+    angle,
+    contact,
+    extent,
+    friction_extent,
+    known,
+    left_out,
+    median,
+    modelled,
+    spin_change,
+)
 from flybystab.orbit.ephemeris import ephemeris
 from flybystab.plots.flyby import BLUE, flyby_panels
 from flybystab.plots.grains import grains_figure, grains_scene_plot
@@ -154,21 +165,21 @@ def _margin_rows(r: FlybyResult, s: SpinSample) -> Rows:
     """Nominal values, each with its range over the sampled attitudes where it depends on the attitude."""
     m = r.body.material
     phi = m.friction_angle.to_value(u.deg)
-    needed = s.max_required_friction_angle.to_value(u.deg)
+    needed, none = s.max_required_friction_angle.to_value(u.deg), "no friction angle suffices"
+    ratio = f"{r.spin_ratio:.4f}" if np.isfinite(r.spin_ratio) else spin_change(r)
+    turn = f"{r.pole_change.to_value(u.deg):.2f} deg" if np.isfinite(r.pole_change) else "not defined"
     rows = [
         ("friction angle of the material", f"{phi:g} deg (chosen, not measured)"),
         ("cohesion", f"{m.cohesion.to_value(u.Pa):g} Pa"),
         (
             "largest friction angle mobilised",
-            _nominal(angle(r.max_required_friction_angle), _range(needed, "deg", 2)),
+            _nominal(angle(r.max_required_friction_angle), extent(needed, 2, "deg", none)),
         ),
-        ("margin", _nominal(angle(r.margin), _range(phi - needed, "deg", 2))),
-        ("spin rate after / before", _nominal(f"{r.spin_ratio:.4f}", _range(s.spin_ratio, "", 2))),
+        ("margin", _nominal(angle(r.margin), extent(phi - needed, 2, "deg", none))),
+        ("spin rate after / before", _nominal(ratio, extent(s.spin_ratio, 2))),
         (
             "rotation of the spin axis",
-            _nominal(
-                f"{r.pole_change.to_value(u.deg):.2f} deg", _range(s.pole_change.to_value(u.deg), "deg", 1)
-            ),
+            _nominal(turn, extent(s.pole_change.to_value(u.deg), 1, "deg")),
         ),
         ("bound mass fraction", f"{r.bound_fraction:.1%}"),
         ("semi-axes after", " × ".join(f"{a:.4g}" for a in r.semi_axes.to_value(u.m)) + " m"),
@@ -192,26 +203,19 @@ def _nominal(value: str, extent: str) -> str:
     return f"{value} at the nominal attitude; {extent} over the sampled attitudes"
 
 
-def _range(values: np.ndarray, unit: str, digits: int) -> str:
-    finite = values[np.isfinite(values)]
-    if not len(finite):
-        return "none is enough"
-    text = f"{finite.min():.{digits}f} to {finite.max():.{digits}f} {unit}".rstrip()
-    return text if len(finite) == len(values) else f"{text} (none is enough at {len(values) - len(finite)})"
-
-
 def _sample_text(s: SpinSample) -> str:
-    low, mid, high = np.quantile(s.spin_ratio, [0.0, 0.5, 1.0])
-    turn = np.quantile(s.pole_change.to_value(u.deg), [0.0, 0.5, 1.0])
+    turn = s.pole_change.to_value(u.deg)
     known = (
         "the catalogued pole and random rotation phases"
         if s.pole_known
         else "an isotropic pole (unknown) and random rotation phases"
     )
+    if not np.any(s.verdict != "NOT IN EQUILIBRIUM"):
+        return f"{len(s)} attitudes with {known}: {friction_extent(s)}."
+    ratio = extent(s.spin_ratio, 2, missing="not defined (no spin before)")
     return (
-        f"{len(s)} attitudes with {known}: the spin rate changes by a factor of {low:.2f} to {high:.2f} (median "
-        f"{mid:.2f}) and the pole moves by {turn[0]:.1f} to {turn[2]:.1f} deg (median {turn[1]:.1f}); friction "
-        f"angles of {_range(s.max_required_friction_angle.to_value(u.deg), 'deg', 2)} are mobilised."
+        f"{len(s)} attitudes with {known}: spin rate after over before {ratio}{median(s.spin_ratio, 2)}; rotation of "
+        f"the pole {extent(turn, 1, 'deg')}{median(turn, 1)}; {friction_extent(s)}."
     )
 
 

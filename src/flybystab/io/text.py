@@ -134,9 +134,7 @@ def flyby_lines(r: FlybyResult) -> list[str]:
         out.append(
             "settled    no: the body still moves when the run ends, the verdict is that of one instant"
         )
-    out.append(
-        f"spin       rate x {r.spin_ratio:.3f}, axis rotates by {r.pole_change.to_value(u.deg):.2f} deg"
-    )
+    out.append(f"spin       {spin_change(r)}")
     if r.robust is not None:
         others = ", ".join(f"{k} {v}" for k, v in r.verdict_by_surface.items())
         word = "does not depend" if r.robust else "depends"
@@ -149,20 +147,62 @@ def flyby_lines(r: FlybyResult) -> list[str]:
     return out
 
 
+def extent(values: np.ndarray, digits: int, unit: str = "", missing: str = "not defined") -> str:
+    """Least and greatest finite value of a sample, as text; `missing` describes the others, which are counted."""
+    finite = values[np.isfinite(values)]
+    if not len(finite):
+        return missing
+    text = f"{finite.min():.{digits}f} to {finite.max():.{digits}f} {unit}".rstrip()
+    others = len(values) - len(finite)
+    return f"{text} ({missing} at {others} of {len(values)})" if others else text
+
+
+def median(values: np.ndarray, digits: int) -> str:
+    """Median of the finite values of a sample in brackets; empty if there are none."""
+    finite = values[np.isfinite(values)]
+    return f" (median {np.median(finite):.{digits}f})" if len(finite) else ""
+
+
+def friction_extent(s: SpinSample, digits: int = 2) -> str:
+    """Friction angles over a sample of attitudes: those mobilised, or those that equilibrium would need."""
+    needed = s.max_required_friction_angle.to_value(u.deg)
+    held = s.verdict != "NOT IN EQUILIBRIUM"
+    none = "no friction angle suffices"
+    if not held.any():
+        return f"not in equilibrium; friction angle needed: {extent(needed, digits, 'deg', none)}"
+    text = f"friction mobilised: {extent(needed[held], digits, 'deg', none)}"
+    out = len(held) - int(held.sum())
+    return text + (f"; not in equilibrium at {out} of {len(held)}" if out else "")
+
+
 def sample_lines(s: SpinSample) -> list[str]:
-    """Verdicts and ranges over the sampled attitudes."""
-    low, mid, high = np.quantile(s.spin_ratio, [0.0, 0.5, 1.0])
-    turn = np.quantile(s.pole_change.to_value(u.deg), [0.0, 0.5, 1.0])
-    phi = np.quantile(s.max_required_friction_angle.to_value(u.deg), [0.0, 1.0])
+    """Verdicts and ranges over the sampled attitudes; without spin changes if none of them is in equilibrium."""
+    turn = s.pole_change.to_value(u.deg)
     names, counts = np.unique(s.verdict, return_counts=True)
     pole = "catalogued pole, random phases" if s.pole_known else "unknown pole, random phases"
-    return [
+    out = [
         f"attitudes  {len(s)} ({pole}): "
-        + ", ".join(f"{n} x {k}" for k, n in zip(names, counts, strict=True)),
-        f"           spin rate x {low:.2f} to {high:.2f} (median {mid:.2f}), "
-        f"axis rotates by {turn[0]:.1f} to {turn[2]:.1f} deg (median {turn[1]:.1f})",
-        f"           friction mobilised {phi[0]:.2f} to {phi[1]:.2f} deg",
+        + ", ".join(f"{n} x {k}" for k, n in zip(names, counts, strict=True))
     ]
+    if np.any(s.verdict != "NOT IN EQUILIBRIUM"):
+        ratio = extent(s.spin_ratio, 2, missing="not defined (no spin before)")
+        axis = extent(turn, 1, "deg", "an undefined angle")
+        out.append(
+            f"           spin rate x {ratio}{median(s.spin_ratio, 2)}, axis rotates by {axis}{median(turn, 1)}"
+        )
+    return [*out, f"           {friction_extent(s)}"]
+
+
+def spin_change(r: FlybyResult) -> str:
+    """Spin after an encounter against that before it."""
+    if not math.isfinite(r.spin_ratio):
+        rate = r.spin.to_value(u.rad / u.h)
+        return (
+            f"none before, period {2.0 * math.pi / rate:.2f} h after"
+            if rate > 0.0
+            else "none before and after"
+        )
+    return f"rate x {r.spin_ratio:.3f}, axis rotates by {r.pole_change.to_value(u.deg):.2f} deg"
 
 
 def modelled(r: FlybyResult) -> dict[str, str]:
