@@ -4,6 +4,9 @@ python benchmarks/honesty.py scripted [--encounters N] [--bodies N] [--seed N]
     random hyperbolas and parabolas of six planets with J2, from grazing to distant; spheres, spheroids and
     triaxial bodies, exact and nearly so, at rest, slow, beyond the spin limit, tumbling about any axis; all yield
     surfaces, cohesion, brittle or not. Most friction angles are put where the bound only just decides.
+python benchmarks/honesty.py surfaces [--encounters N] [--bodies N] [--seed N]
+    piles of 35 deg without cohesion past the Earth, at 1.5 to 30 radii: how often the bound decides on each yield
+    surface, of the bodies that stay rigid in the dynamics, and by how much it exceeds the friction that they mobilise.
 python benchmarks/honesty.py real [--every N] [--seed N]
     passages of catalogued asteroids by six planets: the bound from distance and speed alone against the tide of the
     encounter that was followed among all bodies; samples by the bound against the same samples by the dynamics.
@@ -19,7 +22,7 @@ import astropy.units as u
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from flybystab.body.body import Material
+from flybystab.body.body import YIELD_SURFACES, Material
 from flybystab.catalogues.catalogue import catalogue
 from flybystab.constants import G
 from flybystab.core.dynamics.run import integrate
@@ -131,6 +134,48 @@ def scripted(args: argparse.Namespace) -> int:
     return int(c.false > 0)
 
 
+def surfaces(args: argparse.Namespace) -> int:
+    rng = np.random.default_rng(args.seed)
+    scenes = []
+    for _ in range(args.encounters):
+        q, v = 1.5 * 20.0 ** rng.random(), rng.uniform(0.0, 20.0)
+        enc = Encounter.hyperbolic("earth", q * planet("earth").radius * u.m, v * u.km / u.s)
+        axes = -np.sort(-rng.uniform(0.45, 1.0, (args.bodies, 3)), axis=1) * 1e3
+        omega = np.zeros((args.bodies, 3))
+        omega[:, 2] = 2.0 * np.pi / (3600.0 * rng.uniform(4.0, 12.0, args.bodies))
+        scenes.append((enc, axes, rng.uniform(1500, 2500, args.bodies), omega))
+    print(
+        "yield surface              in equilibrium  rigid  by the bound  excess of the bound: median, 90 % (deg)"
+    )
+    false = 0
+    for code, name in enumerate(YIELD_SURFACES):
+        counts, excess = np.zeros(3, dtype=int), []
+        for enc, axes, rho, omega in scenes:
+            n = len(rho)
+            phi, friction, verdict = (
+                np.full(n, np.radians(35.0)),
+                np.empty((n, 2)),
+                np.empty(n, dtype=np.int64),
+            )
+            size = tide_size(enc.tide, enc.t_start, enc.t_stop)
+            quick_margins(axes, rho, omega, phi, np.zeros(n), code, *size, friction, verdict)
+            for i in np.flatnonzero(verdict != NOT_IN_EQUILIBRIUM):
+                way = axes[i], rho[i], omega[i], np.eye(3), enc.t_start, enc.t_stop, enc.tide
+                run = integrate(*way, phi=phi[i], surface=code, tolerance=1e-8, unyielding=True)
+                rigid = run.max_friction <= phi[i]
+                counts += 1, rigid, verdict[i] == INTACT
+                false += bool(verdict[i] == INTACT and not rigid)
+                if rigid and np.isfinite(friction[i, 1]):
+                    excess.append(np.degrees(friction[i, 1] - run.max_friction))
+        mid, most = np.quantile(excess, [0.5, 0.9])
+        print(
+            f"{name:26s} {counts[0]:14d} {counts[1]:6d} {counts[2]:6d} {counts[2] / counts[1]:6.1%} {mid:17.2f} {most:8.2f}",
+            flush=True,
+        )
+    print(f"called INTACT, and not rigid in the dynamics: {false}")
+    return int(false > 0)
+
+
 def real(args: argparse.Namespace) -> int:
     wanted = settings("2026-01-01", "2050-01-01", planets=PLANETS, within=0.1 * u.au, samples=20)
     ratios, false, samples, dynamic = [], 0, 0, 0
@@ -162,13 +207,13 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("what", choices=("scripted", "real"))
+    parser.add_argument("what", choices=("scripted", "surfaces", "real"))
     parser.add_argument("--encounters", type=int, default=200)
     parser.add_argument("--bodies", type=int, default=80)
     parser.add_argument("--every", type=int, default=4, help="every Nth asteroid of the catalogue")
     parser.add_argument("--seed", type=int, default=0)
     args = parser.parse_args()
-    return scripted(args) if args.what == "scripted" else real(args)
+    return {"scripted": scripted, "surfaces": surfaces, "real": real}[args.what](args)
 
 
 if __name__ == "__main__":

@@ -23,6 +23,7 @@ TABLES = {
     "grains_map": "python benchmarks/grains_ellipsoid.py map --grains 150",
     "honesty": "python benchmarks/honesty.py scripted --encounters 300",
     "honesty_real": "python benchmarks/honesty.py real --every 4",
+    "honesty_surfaces": "python benchmarks/honesty.py surfaces --encounters 100 --bodies 20",
     "integrators": "python benchmarks/campaign.py integrators",
     "many": "flybystab bench many",
     "memory": "python benchmarks/screen.py memory",
@@ -52,7 +53,7 @@ TABLES = {
     "shapes_timing": "python benchmarks/shapes.py timing",
     "stability": "python benchmarks/stability.py",
     "stress": "python benchmarks/campaign.py stress",
-    "verdicts": "python benchmarks/campaign.py verdicts",
+    "verdicts": "python benchmarks/campaign.py verdicts 20000",
     "throughput": "python benchmarks/screen.py throughput",
     "tracks": "python benchmarks/encounters.py tracks",
 }

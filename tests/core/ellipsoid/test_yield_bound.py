@@ -7,17 +7,20 @@ import astropy.units as u
 import numpy as np
 import pytest
 
-from flybystab.body.body import Material
+from flybystab.body.body import YIELD_SURFACES, Material
 from flybystab.catalogues.catalogue import Asteroid
 from flybystab.constants import GM_EARTH, R_EARTH, G
-from flybystab.core.ellipsoid.rigid_stress import demand, rigid_stress
+from flybystab.core.ellipsoid.rigid_stress import demand, invariants, overload, rigid_stress
+from flybystab.core.ellipsoid.tide import components
 from flybystab.core.ellipsoid.yield_bound import (
     INTACT,
     NOT_IN_EQUILIBRIUM,
     UNDECIDED,
+    _holds,
     quick_margins,
     tide_size,
 )
+from flybystab.core.material.yield_surface import slope
 from flybystab.encounter.encounter import Encounter
 from flybystab.screening.draws import Attitudes, draws
 from flybystab.screening.encounters import passages
@@ -80,19 +83,54 @@ def test_samples_on_real_orbits_by_the_bound_and_by_the_dynamics():
             assert all(b >= x for b, x in zip(p.bounds(), size, strict=True))
 
 
-def test_the_bound_is_sharp_without_a_tide():
+@pytest.mark.parametrize("code", range(len(YIELD_SURFACES)))
+def test_the_bound_is_sharp_without_a_tide(code):
+    """Without a tide the bound on the friction angle is the one that the body needs, on every yield surface."""
     rng = np.random.default_rng(3)
     axes, rho, omega, phi, cohesion = honesty["bodies"](200, rng)
     omega = np.linalg.norm(omega, axis=1)[:, None] * np.array([0.0, 0.0, 1.0])
-    friction, verdict = judge(axes, rho, omega, phi, cohesion, 1, (0.0, 0.0))
+    friction, verdict = judge(axes, rho, omega, phi, cohesion, code, (0.0, 0.0))
     stress = np.empty(6)
     for i in range(len(rho)):
         rigid_stress(*axes[i] ** 2, rho[i], np.pi * G * rho[i], omega[i], np.zeros(6), stress)
-        need = demand(1, phi[i], cohesion[i], stress)[0]
+        need = demand(code, phi[i], cohesion[i], stress)[0]
         assert friction[i, 0] == pytest.approx(need, abs=1e-12) or need == np.inf
-        if verdict[i] == INTACT:  # the extension cone is its own least slope
+        if verdict[i] == INTACT:
             assert friction[i, 1] == pytest.approx(need, abs=1e-6)
         assert verdict[i] == (INTACT if need <= phi[i] else NOT_IN_EQUILIBRIUM)
+
+
+@pytest.mark.parametrize("code", range(len(YIELD_SURFACES)))
+def test_the_distance_of_a_stress_from_yield(code):
+    """No stress within the distance that the bound allows is beyond the yield surface; just outside one is.
+
+    The second holds where the yield function is as steep as anywhere: on cones and on Mohr-Coulomb at every stress.
+    """
+    rng = np.random.default_rng(code)
+    phi, cohesion = np.radians(35.0), 0.1
+    for _ in range(50):
+        stress = rng.normal(size=(3, 3))
+        stress = 0.1 * (stress + stress.T) - np.eye(3)
+        p, s, det = invariants(components(stress))
+        if not _holds(code, phi, cohesion, s, p, det, 0.0):
+            continue
+        low, high = 0.0, 10.0
+        for _ in range(60):
+            mid = 0.5 * (low + high)
+            low, high = (mid, high) if _holds(code, phi, cohesion, s, p, det, mid) else (low, mid)
+        for change in rng.normal(size=(500, 3, 3)):
+            change = change + change.T
+            moved = stress + low * change / np.linalg.norm(change)
+            assert overload(code, phi, cohesion, components(moved)) <= 1e-12
+        values, axes = np.linalg.eigh(stress)
+        if YIELD_SURFACES[code] == "mohr-coulomb":
+            steepest = axes @ np.diag([np.sin(phi) - 1.0, 0.0, np.sin(phi) + 1.0]) @ axes.T
+        else:
+            unit = (stress + p * np.eye(3)) / s
+            steepest = unit + slope(code, np.sin(phi), det) / 3.0 * np.eye(3)
+        moved = stress + 1.001 * low * steepest / np.linalg.norm(steepest)
+        if YIELD_SURFACES[code] != "matsuoka-nakai":
+            assert overload(code, phi, cohesion, components(moved)) > 0.0
 
 
 def test_prolate_bodies_are_decided_too():

@@ -1,4 +1,4 @@
-"""A quick margin: a bound on the friction that a passage can mobilise, whatever the attitude.
+"""Bound on the friction that a passage can mobilise, whatever the attitude.
 
 In principal axes the stress of the rigid body is ``T = 5 sigma/rho = H o (K_g + K_t + w^2 1 - w w)``, the
 entries of ``H`` being ``2 S_i S_j/(S_i + S_j)``, none above ``S_1``
@@ -13,11 +13,18 @@ tide of norm ``|K|`` changes ``T`` by at most ``S_1 |K|`` in any direction. It a
 Both bound the change of ``w w``. Where ``J_2`` is close to ``J_3`` the axis may turn far in the plane of the
 two short axes; then the stress turns with it, but for terms in ``S_2 - S_3``, and the smaller bound counts.
 
-If every stress within that distance ``d`` of the undisturbed one is inside the yield surface,
-``|s| + d sqrt(1 + k^2/3) <= k (p + c)`` with the least ``k``, the body cannot yield: INTACT is proved without
-integrating anything. Where the test fails nothing is said; the dynamics decides. The attitude, the phase of the
+If every stress within that distance ``d`` of the undisturbed one is inside the yield surface the body cannot yield:
+INTACT is proved without integrating anything. With the gauge ``gamma = sin(phi)/k`` the yield function
+
+    f = |s| gamma(theta) - p sin(phi) - Y cos(phi)
+
+is convex and isotropic, and its slope is at most ``G = sqrt(max(gamma^2 + gamma'^2) + sin^2(phi)/3)``. For a convex
+section ``gamma^2 + gamma'^2`` is largest where ``gamma`` is, at the least slope ``k`` (its derivative is ``2 gamma'
+(gamma + gamma'')``); on Mohr-Coulomb it is the same everywhere. So the test is ``f + G d <= 0``: on cones and on
+Mohr-Coulomb, where the slope of ``f`` is ``G`` at every stress, no weaker one would do for a change of the stress of
+norm ``d`` in any direction. Where the test fails nothing is said; the dynamics decides. The attitude, the phase of the
 spin, the sources of the tide and the material beyond first yield do not enter: the body is rigid until then.
-``python benchmarks/honesty.py`` attacks the bound with random bodies and passages.
+``python benchmarks/honesty.py`` tests the bound with random bodies and passages.
 
 A body whose stress is outside the yield surface far from any planet is not in equilibrium: that needs no
 dynamics either.
@@ -43,28 +50,30 @@ _LARGEST = 0.5 * np.pi * (1.0 - 1e-6)
 
 
 @kernel
-def _holds(code: int, phi: float, cohesion: float, s: float, p: float, d: float) -> bool:
-    """Whether every stress within `d` of one with deviator norm `s` and pressure `p` is admissible."""
+def _holds(code: int, phi: float, cohesion: float, s: float, p: float, det: float, d: float) -> bool:
+    """Whether every stress within `d` of one with deviator norm `s`, unit determinant `det`, pressure `p` is admissible."""
     sin = np.sin(phi)
-    k = least_slope(code, sin)
-    # k Y cot(phi), finite at phi = 0
-    kc = (k / sin if sin > 0.0 else slope_over_sine(code, 0.0, 0.0)) * cohesion * np.cos(phi)
-    return s + d * np.sqrt(1.0 + k * k / 3.0) <= k * p + kc
+    gamma = 1.0 / slope_over_sine(code, sin, det)
+    least_sin = max(sin, 1e-12)  # sin(phi)/k has a limit at phi = 0
+    most = least_sin / least_slope(code, least_sin)
+    return s * gamma + d * np.sqrt(most * most + sin * sin / 3.0) <= p * sin + cohesion * np.cos(phi)
 
 
 @kernel
-def _friction_bound(code: int, phi: float, cohesion: float, s: float, p: float, d: float) -> float:
+def _friction_bound(
+    code: int, phi: float, cohesion: float, s: float, p: float, det: float, d: float
+) -> float:
     """A friction angle (rad) at which `_holds`, at most `phi` if it holds there; inf where none was found."""
-    if _holds(code, 0.0, cohesion, s, p, d):
+    if _holds(code, 0.0, cohesion, s, p, det, d):
         return 0.0
     # In tension a larger angle is not better: cohesion counts for less.
-    high = phi if _holds(code, phi, cohesion, s, p, d) else _LARGEST
-    if not _holds(code, high, cohesion, s, p, d):
+    high = phi if _holds(code, phi, cohesion, s, p, det, d) else _LARGEST
+    if not _holds(code, high, cohesion, s, p, det, d):
         return np.inf
     low = 0.0
     for _ in range(60):
         mid = 0.5 * (low + high)
-        if _holds(code, mid, cohesion, s, p, d):
+        if _holds(code, mid, cohesion, s, p, det, d):
             high = mid
         else:
             low = mid
@@ -174,8 +183,8 @@ def quick_margins(
         spin[2] = np.sqrt(centre)
         rigid_stress(s1, s2, s3, rho[i], rate2, spin, none, stress)
         p, s, det = invariants(stress)
-        friction[i, 1] = _friction_bound(code, phi[i], cohesion[i], s, p, scale * d)
-        if _holds(code, phi[i], cohesion[i], s, p, scale * d):
+        friction[i, 1] = _friction_bound(code, phi[i], cohesion[i], s, p, det, scale * d)
+        if _holds(code, phi[i], cohesion[i], s, p, det, scale * d):
             verdict[i] = INTACT
         else:
             verdict[i] = UNDECIDED
