@@ -169,7 +169,8 @@ def surfaces(args: argparse.Namespace) -> int:
                     excess.append(np.degrees(friction[i, 1] - run.max_friction))
         mid, most = np.quantile(excess, [0.5, 0.9])
         print(
-            f"{name:26s} {counts[0]:14d} {counts[1]:6d} {counts[2]:6d} {counts[2] / counts[1]:6.1%} {mid:17.2f} {most:8.2f}",
+            f"{name:26s} {counts[0]:14d} {counts[1]:6d} {counts[2]:6d} {counts[2] / counts[1]:6.1%} {mid:17.2f} "
+            f"{most:8.2f}",
             flush=True,
         )
     print(f"called INTACT, and not rigid in the dynamics: {false}")

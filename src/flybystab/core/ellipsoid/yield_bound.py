@@ -51,7 +51,7 @@ _LARGEST = 0.5 * np.pi * (1.0 - 1e-6)
 
 @kernel
 def _holds(code: int, phi: float, cohesion: float, s: float, p: float, det: float, d: float) -> bool:
-    """Whether every stress within `d` of one with deviator norm `s`, unit determinant `det`, pressure `p` is admissible."""
+    """Whether every stress within `d` of one with the deviator norm `s`, its unit determinant and `p` is admissible."""
     sin = np.sin(phi)
     gamma = 1.0 / slope_over_sine(code, sin, det)
     least_sin = max(sin, 1e-12)  # sin(phi)/k has a limit at phi = 0
