@@ -54,17 +54,11 @@ def test_others_feel_all_of_them():
     assert without_itself(names, itself("vesta", 1e9), window) == tuple(names)
 
 
-def test_a_barycentric_state_with_de421_is_called_inaccurate():
-    need_ephemeris("de421")
+@pytest.mark.parametrize("name", ["de421", "de440"])
+def test_a_barycentric_state_is_not_called_inaccurate(recwarn, name):
+    """It is converted to the barycentre of the ephemeris in use (``test_barycentre.py``)."""
+    need_ephemeris(name)
     orbit = Orbit.from_state(EPOCH, [1.1, 0.3, 0.0] * u.au, [-5.0, 25.0, 3.0] * u.km / u.s, centre="ssb")
-    with pytest.warns(InaccurateOrbit, match="barycentre is 115 km"):
-        orbit.at(later(EPOCH, DAY), ephemeris="de421")
-    with pytest.warns(InaccurateOrbit, match="DE440"):
-        find_encounters(orbit, EPOCH, later(EPOCH, 10 * DAY), ephemeris="de421")
-
-
-def test_a_barycentric_state_with_de440_is_not(recwarn):
-    need_ephemeris("de440")
-    orbit = Orbit.from_state(EPOCH, [1.1, 0.3, 0.0] * u.au, [-5.0, 25.0, 3.0] * u.km / u.s, centre="ssb")
-    orbit.at(later(EPOCH, DAY), ephemeris="de440")
+    orbit.at(later(EPOCH, DAY), ephemeris=name)
+    find_encounters(orbit, EPOCH, later(EPOCH, 10 * DAY), ephemeris=name)
     assert not [w for w in recwarn if w.category is InaccurateOrbit]

@@ -22,8 +22,9 @@ from flybystab.encounter.from_trajectory import _track
 from flybystab.encounter.reach import usual_start
 from flybystab.errors import InvalidInput, MissingExtra, NoEncounter, OutOfSpan
 from flybystab.files import read_bytes
+from flybystab.orbit.barycentre import barycentre_in
 from flybystab.orbit.ephemeris import BODIES, Ephemeris
-from flybystab.orbit.orbit import _ephemeris, check_barycentre
+from flybystab.orbit.orbit import _ephemeris
 from flybystab.orbit.planets import Planet
 from flybystab.typing import Array
 
@@ -167,12 +168,11 @@ def _origin(
     if planet.name not in BODIES or planet.name == "sun":
         raise InvalidInput("planet", planet.name, f"one of {', '.join(BODIES[1:])}")
     window = _ephemeris(ephemeris).window(zero, low, high)
-    if where == "ssb":
-        check_barycentre(window)
 
     def origin(t: Array) -> Array:
         there = window.states(BODIES.index(planet.name), t)
-        return there if where == "ssb" else there - window.states(BODIES.index(where), t)
+        centre = barycentre_in(window, t) if where == "ssb" else window.states(BODIES.index(where), t)
+        return there - centre
 
     return origin, window.name
 

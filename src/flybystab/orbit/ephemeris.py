@@ -75,7 +75,7 @@ class Source:
     extra : str
         The extra of flybystab that installs the package.
     kuiper_belt : bool
-        Whether masses of the Kuiper belt are in its barycentre, as from DE430 on; they move it by 115 km.
+        Whether masses of the Kuiper belt are in its barycentre (:mod:`flybystab.orbit.barycentre`).
     """
 
     package: str

@@ -14,10 +14,11 @@ from astropy.units import Quantity
 
 from flybystab.constants import AU, DAY
 from flybystab.errors import FlybystabWarning, Impact, InaccurateOrbit, InvalidInput, UnknownName
+from flybystab.orbit.barycentre import barycentre_in, barycentre_of_de440
 from flybystab.orbit.closest_approach import first_contact
 from flybystab.orbit.covariance import Covariance
 from flybystab.orbit.elements import GM_SUN, ecliptic_to_icrf, state_from_elements
-from flybystab.orbit.ephemeris import BELT, BODIES, EPHEMERIDES, N_BODIES, Ephemeris, Window, ephemeris
+from flybystab.orbit.ephemeris import BELT, BODIES, N_BODIES, Ephemeris, Window, ephemeris
 from flybystab.orbit.forces import FORCES, NonGravitational, model
 from flybystab.orbit.ias15 import EPSILON, TIGHT, Flight
 from flybystab.orbit.planets import PLANETS
@@ -52,7 +53,7 @@ class Orbit:
     position, velocity : Quantity
         Shape (3,), ICRF axes, relative to `centre`.
     centre : str
-        ``"ssb"`` (barycentre of the solar system), ``"sun"``, ``"earth"`` or another body.
+        ``"ssb"`` (barycentre of the solar system of DE440), ``"sun"``, ``"earth"`` or another body.
     nongrav : NonGravitational
         A1, A2, A3, their dependence on distance, DT, and radiation pressure.
     name : str
@@ -168,6 +169,7 @@ class Orbit:
         *,
         DT: Quantity = _NO_DELAY,
         AMRAT: Quantity = _NO_AREA,
+        barycentre: str = "de440",
     ) -> Orbit:
         """Orbit from a state.
 
@@ -183,6 +185,9 @@ class Orbit:
             Axes: ICRF (equator) or ecliptic of J2000.
         A1, A2, A3, law, name, covariance, DT, AMRAT
             As in :meth:`from_elements`.
+        barycentre : str
+            For ``"ssb"``: the ephemeris to whose barycentre the state belongs. States of Horizons, ASSIST and layup
+            belong to DE440 or DE441; those of DE421 to DE438 differ by 115 km (:mod:`flybystab.orbit.barycentre`).
 
         Raises
         ------
@@ -199,8 +204,12 @@ class Orbit:
             r, v = ecliptic_to_icrf() @ r, ecliptic_to_icrf() @ v
         elif str(frame).upper() != "ICRF":
             raise UnknownName("frame", str(frame), [], known="(known: ICRF, ecliptic)")
+        when = _epoch(epoch)
+        if where == "ssb":
+            shift = barycentre_of_de440(str(barycentre).lower(), when, np.zeros(1))[0]
+            r, v = r - shift[:3], v - shift[3:]
         return cls(
-            _epoch(epoch),
+            when,
             r * u.m,
             v * u.m / u.s,
             where,
@@ -210,14 +219,12 @@ class Orbit:
         )
 
     def barycentric(self, window: Window) -> Array:
-        """State at the epoch relative to the barycentre of the solar system, shape (6,), m and m/s."""
+        """State at the epoch relative to the barycentre of the ephemeris of a window, shape (6,), m and m/s."""
         state = np.concatenate([self.position.to_value(u.m), self.velocity.to_value(u.m / u.s)])
+        t = np.array([seconds(self.epoch, window.epoch)])
         if self.centre == "ssb":
-            check_barycentre(window)
-            return state
-        return (
-            state + window.states(BODIES.index(self.centre), np.array([seconds(self.epoch, window.epoch)]))[0]
-        )
+            return state + barycentre_in(window, t)[0]
+        return state + window.states(BODIES.index(self.centre), t)[0]
 
     def flight(
         self, window: Window, forces: tuple[str, ...] | None = None, epsilon: float = EPSILON
@@ -243,7 +250,7 @@ class Orbit:
         time : Time
             Any scale; TDB is used.
         centre : str
-            ``"sun"``, ``"ssb"``, or a body of the ephemeris.
+            ``"sun"``, ``"ssb"`` (the barycentre of DE440 with any ephemeris), or a body of the ephemeris.
         ephemeris : str or Ephemeris, optional
             The best one installed by default.
 
@@ -274,8 +281,11 @@ class Orbit:
         state = self.barycentric(window)
         if t != 0.0:
             state = self._propagated(window, t)
-        if where != "ssb":
-            state = state - window.states(BODIES.index(where), np.array([t]))[0]
+        at = np.array([t])
+        state = (
+            state
+            - (barycentre_in(window, at) if where == "ssb" else window.states(BODIES.index(where), at))[0]
+        )
         return (state[:3] * u.m).to(u.km), (state[3:] * u.m / u.s).to(u.km / u.s)
 
     def _propagated(self, window: Window, t: float) -> Array:
@@ -445,18 +455,6 @@ def default_forces(orbit: Orbit, *bodies: str) -> tuple[str, ...]:
         or name in flat
         or (name == "non-gravitational" and orbit.nongrav.active)
     )
-
-
-def check_barycentre(window: Window) -> None:
-    """Warn of a barycentric state with an ephemeris whose barycentre differs from that of DE430 to DE441."""
-    source = EPHEMERIDES.get(window.name)
-    if source is not None and not source.kuiper_belt:
-        warnings.warn(
-            f"a barycentric state with {window.name.upper()}, whose barycentre is 115 km from that of DE430 to DE441 "
-            "(Horizons, ASSIST): take DE440, or give the state relative to the Sun",
-            InaccurateOrbit,
-            stacklevel=3,
-        )
 
 
 def massive_twin(window: Window, epoch: float, state: Array) -> str | None:

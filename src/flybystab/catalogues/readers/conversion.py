@@ -153,7 +153,7 @@ def rotated(state: Array, *, to_ecliptic: bool = False) -> Array:
 
 
 @lru_cache(maxsize=4096)
-def _centre_offset(jd: float, centre: str) -> tuple[float, ...]:
+def _centre_offset(jd: float, centre: str, barycentre: str) -> tuple[float, ...]:
     import astropy.units as u
     from astropy.time import Time
 
@@ -162,20 +162,27 @@ def _centre_offset(jd: float, centre: str) -> tuple[float, ...]:
     one = np.array([AU, 0.0, 0.0, 0.0, 0.0, 0.0])
     whole = np.floor(jd)
     orbit = Orbit.from_state(
-        Time(whole, jd - whole, format="jd", scale="tdb"), one[:3] * u.m, one[3:] * u.m / u.s, centre=centre
+        Time(whole, jd - whole, format="jd", scale="tdb"),
+        one[:3] * u.m,
+        one[3:] * u.m / u.s,
+        centre=centre,
+        barycentre=barycentre,
     )
     return tuple(float(x) for x in heliocentric(orbit) - one)
 
 
-def heliocentric_state(jd: float, state: Array, centre: str) -> Array:
-    """State (m, m/s, ICRF) relative to the Sun, from one relative to `centre` of :class:`flybystab.Orbit`.
+def heliocentric_state(jd: float, state: Array, centre: str, barycentre: str = "de440") -> Array:
+    """State (m, m/s, ICRF) relative to the Sun, from one relative to a centre.
 
-    Warns
-    -----
-    InaccurateOrbit
-        A barycentric state with an ephemeris of another barycentre (DE421).
+    Parameters
+    ----------
+    jd : float
+        Time, TDB.
+    state : ndarray, shape (6,)
+    centre, barycentre : str
+        As in :meth:`flybystab.Orbit.from_state`.
     """
-    return state if centre == "sun" else state + np.array(_centre_offset(jd, centre))
+    return state if centre == "sun" else state + np.array(_centre_offset(jd, centre, barycentre))
 
 
 #: GM of the solar system, m3/s2, behind barycentric elements: 2.96309274879932e-4 au3/d2, the sum of the masses of

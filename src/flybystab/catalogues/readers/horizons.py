@@ -81,7 +81,7 @@ def read_horizons(text: str, file: str) -> list[Entry]:
         scale = np.array([length] * 3 + [length / day] * 3)
         values = np.array([number(cells[c], c, file) for c in _VECTOR]) * scale
         state = rotated(values) if axes == "ecliptic" else values
-        row |= state_row(jd, heliocentric_state(jd, state, centre))
+        row |= state_row(jd, heliocentric_state(jd, state, centre, _barycentre(header)))
         texts = [cells[c] for c in _VECTOR]
         return [(row, _of_digits(jd, values, scale, texts, source))]
     if "EC" not in cells:
@@ -89,7 +89,7 @@ def read_horizons(text: str, file: str) -> list[Entry]:
     if axes != "ecliptic":
         raise InvalidInput("reference frame", axes, f"ecliptic of J2000 for elements in {file}")
     gm = _gm(header, length, day, centre, file)
-    return [_elements(jd, cells, row, length, centre, gm, source, file)]
+    return [_elements(jd, cells, row, length, centre, gm, source, file, _barycentre(header))]
 
 
 def _line(header: str, name: str) -> str:
@@ -114,6 +114,12 @@ def _centre(header: str, file: str) -> str:
             "centre", given, f"Sun (10) or Solar System Barycenter (0), body centre, in {file}"
         )
     return "sun" if found[1] == "10" else "ssb"
+
+
+def _barycentre(header: str) -> str:
+    """Ephemeris of the centre: DE441 since 2021, DE431 or DE405 before."""
+    found = re.search(r"^Center body name\s*:.*\{source: *DE-?0*(\d+)", header, re.MULTILINE)
+    return f"de{found[1]}" if found else "de441"
 
 
 def _axes(header: str, file: str) -> str:
@@ -180,6 +186,7 @@ def _elements(
     gm: float | None,
     source: str,
     file: str,
+    barycentre: str = "de441",
 ) -> Entry:
     au = length / AU  # times of perihelion are Julian dates in every system of units
     use = (
@@ -200,7 +207,7 @@ def _elements(
         values[5] -= jd
     in_au = [repr(values[0]), *texts[1:]] if au != 1.0 else texts
     if centre == "ssb":
-        row |= state_row(jd, heliocentric_state(jd, state_of(names, values, gm), "ssb"))
+        row |= state_row(jd, heliocentric_state(jd, state_of(names, values, gm), "ssb", barycentre))
     else:
         row |= elements_row(jd, names, in_au, values)
     return row, printed_covariance(jd, names, in_au, offset, source, gm)

@@ -22,6 +22,7 @@ from flybystab.constants import DAY, YEAR
 from flybystab.core.numerics.threads import in_order, worker_count
 from flybystab.errors import Impact, InvalidInput, NotConverged
 from flybystab.orbit.almanac import GRID, N_FAST, N_SLOW, SLOT
+from flybystab.orbit.barycentre import barycentre_in
 from flybystab.orbit.ephemeris import BELT, BODIES, N_BODIES, SUN, Ephemeris, Window
 from flybystab.orbit.forces import FORCES, LAW_SIZE
 from flybystab.orbit.observatories import geographic
@@ -30,7 +31,6 @@ from flybystab.orbit.orbit import (
     TWIN_SPEED,
     Orbit,
     _ephemeris,
-    check_barycentre,
     default_forces,
     later,
     seconds,
@@ -338,8 +338,9 @@ def _states(rows: list[tuple[str, Orbit]], window: Window, epochs: Array) -> Arr
     for i, (_, orbit) in enumerate(rows):
         out[i, :3] = orbit.position.to_value(u.m)
         out[i, 3:] = orbit.velocity.to_value(_SPEED)
-    if "ssb" in centres:
-        check_barycentre(window)
+    barycentric = centres == "ssb"
+    if barycentric.any():
+        out[barycentric] += barycentre_in(window, epochs[barycentric])
     for centre in set(centres) - {"ssb"}:
         where = centres == centre
         out[where] += window.states(BODIES.index(centre), epochs[where])
