@@ -10,9 +10,10 @@ from astropy.time import Time
 
 import flybystab as fs
 from flybystab.catalogues.catalogue import catalogue
-from flybystab.catalogues.readers.conversion import GM_TOTAL, covariance_of
+from flybystab.catalogues.readers.conversion import covariance_of
 from flybystab.constants import AU, DAY
 from flybystab.errors import InvalidInput
+from flybystab.orbit.elements import GM_TOTAL
 
 FILES = Path(__file__).parent / "files"
 AU_KM = AU / 1e3

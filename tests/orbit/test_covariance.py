@@ -1,5 +1,7 @@
 """Clones of an orbit: the distribution that was asked for, the epoch of the covariance, published errors."""
 
+from dataclasses import replace
+
 import astropy.units as u
 import numpy as np
 import pytest
@@ -7,7 +9,7 @@ from astropy.time import Time
 from scipy.stats import chi2
 
 from flybystab.catalogues.catalogue import Asteroid
-from flybystab.errors import InvalidInput, UnitMismatch
+from flybystab.errors import InvalidInput, UnitMismatch, UnknownName
 from flybystab.orbit.covariance import SETS, Covariance
 from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.search.encounter_finder import find_encounters
@@ -68,6 +70,79 @@ def test_states_deviate_by_the_derivative_times_the_deviation(kind):
     linear = (x - covariance.values) @ jacobian.T
     size = np.array([1.0] * 3 + [2e-7] * 3)
     assert np.abs((states - linear) * size).max() < 1e-4 * np.abs(linear * size).max()
+
+
+def as_elements(kind, values):
+    """Arguments of Orbit.from_elements from values in the units of UNITS."""
+    at = dict(zip(SETS[kind], (v * x for v, x in zip(values, UNITS[kind], strict=True)), strict=True))
+    if kind == "cometary":
+        at["Tp"] = EPOCH + at.pop("tp")
+    return at
+
+
+@pytest.mark.parametrize("kind", ["cometary", "keplerian"])
+@pytest.mark.parametrize("centre", ["sun", "ssb"])
+@pytest.mark.parametrize("frame", ["ecliptic", "ICRF"])
+def test_states_of_a_covariance_are_those_of_orbits_with_its_frame_and_centre(kind, centre, frame):
+    matrix = np.diag((1e-8 * np.abs(VALUES[kind])) ** 2)
+    made = Covariance.in_units(
+        EPOCH, SETS[kind], VALUES[kind], matrix, UNITS[kind], frame=frame, centre=centre
+    )
+    orbit = Orbit.from_elements(EPOCH, **as_elements(kind, VALUES[kind]), frame=frame, centre=centre)
+    state = [*orbit.position.to_value(u.m), *orbit.velocity.to_value(u.m / u.s)]
+    np.testing.assert_allclose(made.states(made.values[None, :])[0], state, rtol=1e-11, atol=1e-6)
+    others = [
+        Covariance.in_units(EPOCH, SETS[kind], VALUES[kind], matrix, UNITS[kind], frame=f, centre=c)
+        for f in ("ecliptic", "ICRF") for c in ("sun", "ssb") if (f, c) != (frame, centre)
+    ]  # fmt: skip
+    for other in others:
+        assert not np.allclose(other.states(made.values[None, :])[0], state, rtol=1e-5)
+
+
+@pytest.mark.parametrize("kind", SETS)
+@pytest.mark.parametrize("centre", ["sun", "ssb"])
+@pytest.mark.parametrize("frame", ["ecliptic", "ICRF"])
+def test_sigma_points_have_the_covariance_of_the_state(kind, centre, frame):
+    """The columns of the sigma points, turned to the frame by hand, against a covariance converted as a whole."""
+    plain = random_covariance(kind)
+    made = replace(plain, frame=frame, centre=centre)
+    orbit = replace(apophis(), epoch=EPOCH, centre=centre, covariance=made)
+    pairs = orbit.sigma_points()
+    assert all(x.centre == centre for pair in pairs for x in pair)
+    columns = np.array(
+        [[*(p.position - m.position).to_value(u.m), *(p.velocity - m.velocity).to_value(u.m / u.s)] for p, m in pairs]
+    ).T / 2.0  # fmt: skip
+    state = made.as_state()
+    assert (state.frame, state.centre, state.elements) == ("ICRF", centre, "cartesian")
+    size = np.sqrt(np.outer(np.diag(state.matrix), np.diag(state.matrix)))
+    np.testing.assert_allclose(columns @ columns.T / size, state.matrix / size, atol=2e-6)
+    # The same numbers in the other frame are the same points turned.
+    other = replace(made, frame="ICRF" if frame == "ecliptic" else "ecliptic").as_state()
+    c, s = np.cos(np.radians(84381.448 / 3600)), np.sin(np.radians(84381.448 / 3600))
+    turn = np.kron(np.eye(2), np.array([[1, 0, 0], [0, c, -s], [0, s, c]]))
+    if frame == "ecliptic":
+        turn = turn.T
+    np.testing.assert_allclose(turn @ state.matrix @ turn.T / size, other.matrix / size, atol=2e-6)
+
+
+def test_estimated_parameters_stay_in_the_covariance_of_the_state():
+    names = (*SETS["keplerian"], "A2")
+    half = (
+        np.random.default_rng(4).normal(size=(7, 7))
+        * (1e-8 * np.array([2e11, 0.3, 0.1, 0.2, 0.3, 0.7, 1e-12]))[:, None]
+    )
+    values = np.array([1.3 * 1.495978707e11, 0.3, 0.1, 0.2, 0.3, 0.7, -5e-13])
+    state = Covariance(EPOCH, names, values, half @ half.T).as_state()
+    assert state.names == (*SETS["cartesian"], "A2")
+    assert state.values[-1] == values[-1]
+    assert state.sigma[-1] == pytest.approx(np.linalg.norm(half[-1]))
+
+
+def test_unknown_frames_and_centres_are_refused():
+    with pytest.raises(UnknownName, match="ecliptic"):
+        replace(random_covariance("keplerian"), frame="galactic")
+    with pytest.raises(UnknownName, match="ssb"):
+        replace(random_covariance("keplerian"), centre="vulcan")
 
 
 def test_keplerian_and_cometary_elements_are_the_same_state():

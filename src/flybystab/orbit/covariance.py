@@ -8,7 +8,7 @@ linearisation, so that the clones are centred on the orbit.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import astropy.units as u
@@ -16,15 +16,15 @@ import numpy as np
 from astropy.time import Time
 from numpy.typing import NDArray
 
-from flybystab.errors import InvalidInput
-from flybystab.orbit.elements import GM_SUN, state_from_elements
+from flybystab.errors import InvalidInput, UnknownName
+from flybystab.orbit.elements import ecliptic_to_icrf, gm_of, state_in_plane
+from flybystab.orbit.planets import PLANETS
 from flybystab.typing import Array
 from flybystab.units import to_si
 
-#: The sets of elements: cometary (JPL), Keplerian (NEOCC and catalogues), equinoctial (NEODyS), or a state with ICRF
-#: axes. ``tp`` is the time of perihelion less the epoch; ``h, k = e sin, e cos`` of the longitude of perihelion,
-#: ``P, Q = tan(i/2) sin, cos`` of the node, ``L`` the mean longitude (Broucke & Cefola 1972; where they
-#: are p and q).
+#: The sets of elements: cometary (JPL), Keplerian (NEOCC and catalogues), equinoctial (NEODyS), or a state. ``tp`` is
+#: the time of perihelion less the epoch; ``h, k = e sin, e cos`` of the longitude of perihelion, ``P, Q = tan(i/2)
+#: sin, cos`` of the node, ``L`` the mean longitude (Broucke & Cefola 1972, where they are p and q).
 SETS: Mapping[str, tuple[str, ...]] = {
     "cometary": ("e", "q", "tp", "node", "peri", "i"),
     "keplerian": ("a", "e", "i", "node", "peri", "M"),
@@ -47,7 +47,7 @@ _ROUNDING = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Covariance:
-    """Mean and covariance of the elements of an orbit, SI units, heliocentric, ecliptic J2000.
+    """Mean and covariance of the elements of an orbit, SI units; by default heliocentric.
 
     Attributes
     ----------
@@ -55,7 +55,6 @@ class Covariance:
         Epoch of the elements, TDB.
     names : tuple of str
         The parameters: one of the sets of :data:`SETS`, in any order, and the estimated ones of :data:`PUSHES`.
-        A cartesian state has ICRF axes.
     values : ndarray, shape (n,)
         Mean; m, s, rad, m/s, m/s2, m2/kg.
     matrix : ndarray, shape (n, n)
@@ -67,6 +66,11 @@ class Covariance:
         be wrong by a large factor, mostly too large.
     caveat : str
         Note on a covariance that is not a published one; "without correlations" by default.
+    frame : {"ecliptic", "ICRF"}
+        Plane of the elements, or axes of the state, J2000. Elements refer to the ecliptic by default, a state to the
+        ICRF.
+    centre : str
+        ``"sun"``, ``"ssb"`` or a body of the ephemeris: that of the elements.
     """
 
     epoch: Time
@@ -76,8 +80,16 @@ class Covariance:
     source: str = ""
     correlated: bool = True
     caveat: str = ""
+    frame: str = ""
+    centre: str = "sun"
 
     def __post_init__(self) -> None:
+        if not self.frame:
+            object.__setattr__(self, "frame", "ICRF" if "x" in self.names else "ecliptic")
+        if self.frame not in ("ecliptic", "ICRF"):
+            raise UnknownName("frame", self.frame, [], known="(known: ICRF, ecliptic)")
+        if self.centre != "ssb" and self.centre not in PLANETS:
+            raise UnknownName("centre", self.centre, [], known=f"(known: ssb, {', '.join(PLANETS)})")
         if not (self.correlated or self.caveat):
             object.__setattr__(self, "caveat", "without correlations")
         n = len(self.names)
@@ -115,8 +127,12 @@ class Covariance:
         units: Sequence[u.UnitBase],
         source: str = "",
         correlated: bool = True,
+        frame: str = "",
+        centre: str = "sun",
     ) -> Covariance:
         """From numbers in the units of a publication, one unit a parameter (``tp``: time less the epoch).
+
+        Frame and centre as in the attributes.
 
         Raises
         ------
@@ -136,6 +152,8 @@ class Covariance:
             np.asarray(matrix, dtype=float) * np.outer(factor, factor),
             source,
             correlated,
+            frame=frame,
+            centre=centre,
         )
 
     @property
@@ -208,10 +226,19 @@ class Covariance:
         return np.asarray(((a > 0.0) & (e >= 0.0) & (e < 1.0)) | ((a < 0.0) & (e > 1.0)))
 
     def states(self, parameters: Array) -> Array:
-        """States, shape (m, 6), m and m/s, ICRF axes (heliocentric, or as given), of parameters (m, n)."""
+        """States, shape (m, 6), m and m/s, ICRF axes, relative to the centre, of parameters (m, n)."""
+        states = self._in_frame(parameters)
+        if self.frame == "ICRF":
+            return states
+        turn = ecliptic_to_icrf()
+        return np.array([np.concatenate([turn @ x[:3], turn @ x[3:]]) for x in states])
+
+    def _in_frame(self, parameters: Array) -> Array:
+        """States with the axes of the covariance."""
         if self.elements == "cartesian":
             order = [self.names.index(n) for n in SETS["cartesian"]]
             return np.array(parameters[:, order])
+        gm = gm_of(self.centre)
         if self.elements == "equinoctial":
             e, i, node, peri, mean = keplerian_angles(
                 *(self._column(parameters, n) for n in ("h", "k", "P", "Q", "L"))
@@ -224,9 +251,35 @@ class Covariance:
         else:
             a = self._column(parameters, "a")
             q = a * (1.0 - e)
-            since = mean * np.sqrt(np.abs(a) ** 3 / GM_SUN)
+            since = mean * np.sqrt(np.abs(a) ** 3 / gm)
         columns = zip(q, e, i, node, peri, since, strict=True)
-        return np.array([state_from_elements(*row) for row in columns])
+        return np.array([state_in_plane(*row, gm=gm) for row in columns])
+
+    def as_state(self) -> Covariance:
+        """The covariance of the state with ICRF axes relative to the same centre, to first order.
+
+        The Jacobian is that of central differences over a hundredth of a sigma. The heliocentric state has the same
+        covariance: the position of a centre has no error here.
+        """
+        n = len(self.names)
+        extra = tuple(name for name in PUSHES if name in self.names)
+        step = np.maximum(1e-2 * self.sigma, 1e-7 * np.abs(self.values))
+        step[step == 0.0] = 1e-9
+        ways = np.diag(step)
+        difference = self.states(self.values + ways) - self.states(self.values - ways)
+        jacobian = np.zeros((6 + len(extra), n))
+        jacobian[:6] = (difference / (2.0 * step[:, None])).T
+        for k, name in enumerate(extra):
+            jacobian[6 + k, self.names.index(name)] = 1.0
+        matrix = jacobian @ self.matrix @ jacobian.T
+        mean = np.concatenate([self.states(self.values[None, :])[0], jacobian[6:] @ self.values])
+        return replace(
+            self,
+            names=(*SETS["cartesian"], *extra),
+            values=mean,
+            matrix=0.5 * (matrix + matrix.T),
+            frame="ICRF",
+        )
 
     def pushes(self, parameters: Array) -> Array:
         """A1, A2, A3 (m/s2), DT (s), AMRAT (m2/kg) less their means, shape (m, 5); zero if not estimated."""

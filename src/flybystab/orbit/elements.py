@@ -2,15 +2,26 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
-from flybystab.constants import OBLIQUITY_J2000
+from flybystab.constants import AU, DAY, OBLIQUITY_J2000
+from flybystab.errors import InvalidInput
 from flybystab.orbit.kepler import states_at_times, time_at_anomaly
 from flybystab.orbit.planets import PLANETS
 from flybystab.typing import Array
 
 #: Sun's GM behind the osculating elements of JPL (DE440/441), m3/s2.
 GM_SUN = PLANETS["sun"].gm
+#: GM of the solar system, m3/s2, behind barycentric elements: 2.96309274879932e-4 au3/d2, the sum of the masses of
+#: DE440 with systems of satellites and 16 asteroids (``gm_total`` of Sorcha).
+GM_TOTAL = 2.9630927487993194e-04 * AU**3 / DAY**2
+
+
+def gm_of(centre: str) -> float:
+    """GM behind the elements about a centre, m3/s2: that of the body, or of the solar system for ``"ssb"``."""
+    return GM_TOTAL if centre == "ssb" else PLANETS[centre].gm
 
 
 def ecliptic_to_icrf() -> Array:
@@ -37,13 +48,65 @@ def state_from_elements(
     gm : float
         GM of the Sun that the elements were made with, m3/s2.
     """
+    state = state_in_plane(q, e, i, node, peri, since, gm)
+    turn = ecliptic_to_icrf()
+    return np.concatenate([turn @ state[:3], turn @ state[3:]])
+
+
+def state_in_plane(
+    q: float, e: float, i: float, node: float, peri: float, since: float, gm: float = GM_SUN
+) -> Array:
+    """State with the axes of the plane to which the elements of :func:`state_from_elements` refer, shape (6,)."""
     x, y, vx, vy = states_at_times(gm, q, e - 1.0, np.array([since]))[0]
     cn, sn, ci, si = np.cos(node), np.sin(node), np.cos(i), np.sin(i)
     cw, sw = np.cos(peri), np.sin(peri)
     p = np.array([cn * cw - sn * sw * ci, sn * cw + cn * sw * ci, sw * si])
     w = np.array([-cn * sw - sn * cw * ci, -sn * sw + cn * cw * ci, cw * si])
-    turn = ecliptic_to_icrf()
-    return np.concatenate([turn @ (x * p + y * w), turn @ (vx * p + vy * w)])
+    return np.concatenate([x * p + y * w, vx * p + vy * w])
+
+
+def perihelion_of(
+    given: Mapping[str, float | None], gm: float
+) -> tuple[float, float, float, float, float, float]:
+    """q, e, i, node, peri and the time since periapsis (m, rad, s) of any set of elements that defines an orbit.
+
+    Parameters
+    ----------
+    given : mapping of str to float or None
+        ``a`` or ``q`` (m), ``e``, ``i``, ``node``, ``peri`` (rad), ``M`` (rad) or ``since`` (s); None if not given.
+    gm : float
+        m3/s2.
+
+    Raises
+    ------
+    InvalidInput
+        Elements are missing, given twice, or contradict each other.
+    """
+    at = {name: value for name, value in given.items() if value is not None}
+    named = ", ".join("Tp" if n == "since" else n for n in at)
+    missing = [n for n in ("e", "i", "node", "peri") if n not in at]
+    if missing:
+        raise InvalidInput("elements", named or "none", f"also {', '.join(missing)}")
+    for one, other, shown in (("a", "q", "q"), ("M", "since", "Tp")):
+        if one in at and other in at:
+            raise InvalidInput("elements", named, f"{one} or {shown}, not both")
+        if one not in at and other not in at:
+            raise InvalidInput("elements", named, f"also {one} or {shown}")
+    e = at["e"]
+    if e == 1.0 and not ("q" in at and "since" in at):
+        raise InvalidInput("elements", named, "q and Tp for a parabola (e = 1), which has neither a nor M")
+    if "a" in at:
+        a = at["a"]
+        if a == 0.0 or e < 0.0 or (a > 0.0) != (e < 1.0):
+            raise InvalidInput("e", e, f"below 1 for a > 0, above 1 for a < 0 (a = {a:g} m)")
+        q = a * (1.0 - e)
+    else:
+        q = at["q"]
+        if q <= 0.0 or e < 0.0:
+            raise InvalidInput("q, e", f"{q:g} m, {e:g}", "q above 0 and e of 0 or more")
+        a = q / (1.0 - e) if e != 1.0 else np.inf
+    since = at["since"] if "since" in at else at["M"] * np.sqrt(abs(a) ** 3 / gm)
+    return q, e, at["i"], at["node"], at["peri"], float(since)
 
 
 def elements_from_state(state: Array, gm: float = GM_SUN) -> tuple[float, float, float, float, float, float]:

@@ -17,7 +17,14 @@ from flybystab.errors import FlybystabWarning, Impact, InaccurateOrbit, InvalidI
 from flybystab.orbit.barycentre import barycentre_in, barycentre_of_de440
 from flybystab.orbit.closest_approach import first_contact
 from flybystab.orbit.covariance import Covariance
-from flybystab.orbit.elements import GM_SUN, ecliptic_to_icrf, state_from_elements
+from flybystab.orbit.elements import (
+    GM_SUN,
+    ecliptic_to_icrf,
+    gm_of,
+    perihelion_of,
+    state_from_elements,
+    state_in_plane,
+)
 from flybystab.orbit.ephemeris import BELT, BODIES, N_BODIES, Ephemeris, Window, ephemeris
 from flybystab.orbit.forces import FORCES, NonGravitational, model
 from flybystab.orbit.ias15 import EPSILON, TIGHT, Flight
@@ -74,12 +81,12 @@ class Orbit:
     def from_elements(
         cls,
         epoch: Time,
-        a: Quantity,
-        e: float,
-        i: Quantity,
-        node: Quantity,
-        peri: Quantity,
-        M: Quantity,
+        a: Quantity | None = None,
+        e: float | None = None,
+        i: Quantity | None = None,
+        node: Quantity | None = None,
+        peri: Quantity | None = None,
+        M: Quantity | None = None,
         A1: Quantity = _ZERO,
         A2: Quantity = _ZERO,
         A3: Quantity = _ZERO,
@@ -87,10 +94,18 @@ class Orbit:
         name: str = "",
         covariance: Covariance | None = None,
         *,
+        q: Quantity | None = None,
+        Tp: Time | None = None,
+        centre: str = "sun",
+        frame: str = "ecliptic",
+        gm: Quantity | None = None,
+        barycentre: str = "de440",
         DT: Quantity = _NO_DELAY,
         AMRAT: Quantity = _NO_AREA,
     ) -> Orbit:
-        """Orbit from heliocentric osculating elements, J2000 ecliptic and equinox (as JPL gives them).
+        """Orbit from osculating elements: heliocentric, J2000 ecliptic and equinox (as JPL gives them) by default.
+
+        Needed are e, i, node, peri, one of a and q, and one of M and Tp; q and Tp for a parabola.
 
         Parameters
         ----------
@@ -100,6 +115,18 @@ class Orbit:
             Semi-major axis and eccentricity: positive and below one, or negative and above one.
         i, node, peri, M : Quantity
             Inclination, longitude of the node, argument of perihelion, mean anomaly.
+        q : Quantity
+            Perihelion distance, in place of a.
+        Tp : Time
+            Time of perihelion, in place of M.
+        centre : str
+            ``"sun"``, ``"ssb"`` (barycentre of the solar system), or a body of the ephemeris.
+        frame : {"ecliptic", "ICRF"}
+            Plane of the elements: ecliptic or equator, of J2000.
+        gm : Quantity, optional
+            GM behind the elements; by default that of the centre, for ``"ssb"`` that of the solar system.
+        barycentre : str
+            As in :meth:`from_state`.
         A1, A2, A3 : Quantity
             Radial, transverse and normal non-gravitational acceleration at 1 au; a plain 0 means none.
         law : {"asteroid", "comet"} or sequence of five floats
@@ -118,12 +145,13 @@ class Orbit:
         ------
         UnitMismatch, InvalidInput, UnknownName
         """
-        axis = to_si(a, u.m, "a", low=-_FARTHEST, high=_FARTHEST)
-        ecc = to_si(e, u.dimensionless_unscaled, "e", low=0.0)
-        angles = [
-            to_si(v, u.rad, n)
-            for v, n in ((_angle(i), "i"), (_angle(node), "node"), (_angle(peri), "peri"), (_angle(M), "M"))
-        ]
+        given: dict[str, float | None] = {
+            "a": None if a is None else to_si(a, u.m, "a", low=-_FARTHEST, high=_FARTHEST),
+            "q": None if q is None else to_si(q, u.m, "q", low=0.0, high=_FARTHEST),
+            "e": None if e is None else to_si(e, u.dimensionless_unscaled, "e", low=0.0),
+        }
+        for value, n in ((i, "i"), (node, "node"), (peri, "peri"), (M, "M")):
+            given[n] = None if value is None else to_si(_angle(value), u.rad, n)
         push = _nongrav(A1, A2, A3, law, DT, AMRAT)
         if isinstance(epoch, Time) and epoch.scale == "utc" and np.all(epoch.jd * 2.0 % 1.0 == 0.0):
             warnings.warn(
@@ -132,7 +160,31 @@ class Orbit:
                 FlybystabWarning,
                 stacklevel=2,
             )
-        return cls._from_si_elements(_epoch(epoch), (axis, ecc, *angles), push, name, covariance)
+        when, where, axes = _epoch(epoch), _centre(centre), _frame(frame)
+        if Tp is not None:
+            checked_time(Tp, "Tp")
+            given["since"] = seconds(when, Tp)
+        strength = gm_of(where) if gm is None else to_si(gm, u.m**3 / u.s**2, "gm", low=0.0, open_low=True)
+        elements = perihelion_of(given, strength)
+        of = state_from_elements if axes == "ecliptic" else state_in_plane
+        return cls._at(when, of(*elements, strength), where, barycentre, push, name, covariance)
+
+    @classmethod
+    def _at(
+        cls,
+        epoch: Time,
+        state: Array,
+        centre: str,
+        barycentre: str,
+        nongrav: NonGravitational,
+        name: str,
+        covariance: Covariance | None,
+    ) -> Orbit:
+        """Orbit from a state (m, m/s, ICRF) relative to a centre, or to the barycentre of an ephemeris."""
+        if centre == "ssb":
+            state = state - barycentre_of_de440(str(barycentre).lower(), epoch, np.zeros(1))[0]
+        r, v = Quantity(state[:3], u.m, copy=False), Quantity(state[3:], _SPEED, copy=False)
+        return cls(epoch, r, v, centre, nongrav, name, covariance)
 
     @classmethod
     def _from_si_elements(
@@ -197,26 +249,11 @@ class Orbit:
         v = to_si(velocity, u.m / u.s, "velocity", shape=(3,))
         if not np.any(r):
             raise InvalidInput("position", position, "a place away from the centre")
-        where = str(centre).lower()
-        if where not in ("ssb", *BODIES):
-            raise UnknownName("centre", str(centre), [], known=f"(known: ssb, {', '.join(BODIES)})")
-        if str(frame).lower() == "ecliptic":
+        where = _centre(centre)
+        if _frame(frame) == "ecliptic":
             r, v = ecliptic_to_icrf() @ r, ecliptic_to_icrf() @ v
-        elif str(frame).upper() != "ICRF":
-            raise UnknownName("frame", str(frame), [], known="(known: ICRF, ecliptic)")
-        when = _epoch(epoch)
-        if where == "ssb":
-            shift = barycentre_of_de440(str(barycentre).lower(), when, np.zeros(1))[0]
-            r, v = r - shift[:3], v - shift[3:]
-        return cls(
-            when,
-            r * u.m,
-            v * u.m / u.s,
-            where,
-            _nongrav(A1, A2, A3, law, DT, AMRAT),
-            name,
-            covariance,
-        )
+        push = _nongrav(A1, A2, A3, law, DT, AMRAT)
+        return cls._at(_epoch(epoch), np.concatenate([r, v]), where, barycentre, push, name, covariance)
 
     def barycentric(self, window: Window) -> Array:
         """State at the epoch relative to the barycentre of the ephemeris of a window, shape (6,), m and m/s."""
@@ -272,9 +309,7 @@ class Orbit:
             The two integrations differ by more than 1 km at `time`, as after a close passage that amplifies
             rounding errors. Errors of the elements and of the force model are not included.
         """
-        where = str(centre).lower()
-        if where not in ("ssb", *BODIES):
-            raise UnknownName("centre", str(centre), [], known=f"(known: ssb, {', '.join(BODIES)})")
+        where = _centre(centre)
         eph = _ephemeris(ephemeris)
         t = seconds(_epoch(time), self.epoch)
         window = eph.window(self.epoch, min(t, 0.0), max(t, 0.0))
@@ -500,6 +535,19 @@ def _ephemeris(name: str | Ephemeris | None) -> Ephemeris:
 def _epoch(epoch: Any) -> Time:
     checked_time(epoch, "epoch")
     return epoch.tdb
+
+
+def _centre(centre: Any) -> str:
+    where = str(centre).lower()
+    if where not in ("ssb", *BODIES):
+        raise UnknownName("centre", str(centre), [], known=f"(known: ssb, {', '.join(BODIES)})")
+    return where
+
+
+def _frame(frame: Any) -> str:
+    if str(frame).lower() not in ("icrf", "ecliptic"):
+        raise UnknownName("frame", str(frame), [], known="(known: ICRF, ecliptic)")
+    return str(frame).lower()
 
 
 def _count(n: int) -> int:

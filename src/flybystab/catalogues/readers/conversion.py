@@ -185,11 +185,6 @@ def heliocentric_state(jd: float, state: Array, centre: str, barycentre: str = "
     return state if centre == "sun" else state + np.array(_centre_offset(jd, centre, barycentre))
 
 
-#: GM of the solar system, m3/s2, behind barycentric elements: 2.96309274879932e-4 au3/d2, the sum of the masses of
-#: DE440 with systems of satellites and 16 asteroids (``gm_total`` of Sorcha).
-GM_TOTAL = 2.9630927487993194e-04 * AU**3 / DAY**2
-
-
 def state_of(names: Sequence[str], values: Sequence[float] | Array, gm: float | None = None) -> Array:
     """State (m, m/s, ICRF axes) of elements of the ecliptic in au, au/d, days and degrees.
 

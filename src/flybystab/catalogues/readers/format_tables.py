@@ -20,7 +20,6 @@ from flybystab.catalogues.readers import reader
 from flybystab.catalogues.readers.conversion import (
     CARTESIAN,
     COMETARY,
-    GM_TOTAL,
     KEPLERIAN,
     MJD,
     cartesian_covariance,
@@ -35,6 +34,7 @@ from flybystab.catalogues.readers.conversion import (
 from flybystab.catalogues.readers.parameters import check_parameters, looks_like_parameter
 from flybystab.errors import InvalidInput
 from flybystab.files import csv_rows
+from flybystab.orbit.elements import GM_TOTAL
 
 if TYPE_CHECKING:
     from flybystab.catalogues.readers import Entry

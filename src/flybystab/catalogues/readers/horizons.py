@@ -17,7 +17,6 @@ from flybystab.catalogues.designations import is_comet, name_columns
 from flybystab.catalogues.readers import reader
 from flybystab.catalogues.readers.conversion import (
     CARTESIAN,
-    GM_TOTAL,
     decimals_of,
     elements_row,
     heliocentric_state,
@@ -32,6 +31,7 @@ from flybystab.catalogues.readers.parameters import check_parameters, looks_like
 from flybystab.constants import AU, DAY
 from flybystab.errors import InvalidInput
 from flybystab.files import parse_json
+from flybystab.orbit.elements import GM_TOTAL
 
 if TYPE_CHECKING:
     from flybystab.catalogues.readers import Entry
