@@ -252,8 +252,8 @@ class Covariance:
             a = self._column(parameters, "a")
             q = a * (1.0 - e)
             since = mean * np.sqrt(np.abs(a) ** 3 / gm)
-        columns = zip(q, e, i, node, peri, since, strict=True)
-        return np.array([state_in_plane(*row, gm=gm) for row in columns])
+        rows = zip(q, e, i, node, peri, since, strict=True)
+        return np.array([state_in_plane(p, x, y, z, w, t, gm) for p, x, y, z, w, t in rows])
 
     def as_state(self) -> Covariance:
         """The covariance of the state with ICRF axes relative to the same centre, to first order.
