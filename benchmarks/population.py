@@ -141,18 +141,18 @@ def nbody(years=3000.0, particles=200, within=0.1):
     sim.units = ("day", "AU", "Msun")
     sim.add(m=1.0)
     names = ("mercury", "venus", "earth", "mars", "jupiter", "saturn", "uranus", "neptune")
+    from flybystab.constants import AU
     from flybystab.orbit.elements import GM_SUN
     from flybystab.orbit.planets import planet
-    from flybystab.population.mean_orbits import MEAN_ORBITS
 
     for name in names:
-        a, e, inc = MEAN_ORBITS[name]
+        body = planet(name)
         angles = rng.uniform(0, 2 * np.pi, 3)
         sim.add(
-            m=planet(name).gm / GM_SUN,
-            a=a,
-            e=e,
-            inc=np.radians(inc),
+            m=body.gm / GM_SUN,
+            a=body.orbit_radius / AU,
+            e=body.orbit_eccentricity,
+            inc=body.orbit_inclination,
             Omega=angles[0],
             omega=angles[1],
             M=angles[2],

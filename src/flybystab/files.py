@@ -9,7 +9,7 @@ names the limit::
     for row in csv_rows(text, "catalogue file", path):
         ...
 
-The module lies below every package that reads files and imports nothing but the errors.
+The module lies below every package that reads files and imports nothing but the errors. `replace_file` writes one.
 """
 
 from __future__ import annotations
@@ -18,8 +18,10 @@ import csv
 import gzip
 import io
 import json
+import os
 import re
 import stat
+import tempfile
 import tomllib
 import zlib
 from collections.abc import Iterator
@@ -44,6 +46,27 @@ _DIGITS = re.compile(rf"[0-9_]{{{DIGIT_LIMIT + 1},}}")
 _STRING = re.compile(r'"""[\s\S]*?"""|\'\'\'[\s\S]*?\'\'\'|"(?:[^"\\\n]|\\.)*"|\'[^\'\n]*\'|#[^\n]*')
 _JSON_STRING = re.compile(r'"(?:[^"\\]|\\.)*"')
 _KEY = re.compile(rf"(?<![\w-])(?:[\w-]++|~)(?:[ \t]*+\.[ \t]*+(?:[\w-]++|~)){{{DEPTH_LIMIT},}}")
+
+
+def replace_file(path: str | Path, data: bytes) -> Path:
+    """Write a file through a temporary one beside it: readers see the old content or the new one; returns the path.
+
+    Raises
+    ------
+    OSError
+        The file cannot be written; nothing of it is left.
+    """
+    out = Path(path)
+    number, part = tempfile.mkstemp(dir=out.parent, prefix=f".{out.name}.", suffix=".part")
+    try:
+        with os.fdopen(number, "wb") as stream:
+            stream.write(data)
+        os.chmod(part, 0o644)
+        os.replace(part, out)
+    except BaseException:
+        os.unlink(part)
+        raise
+    return out
 
 
 def read_bytes(path: str | Path, what: str, limit: int = TEXT_LIMIT, kind: str = "file") -> bytes:

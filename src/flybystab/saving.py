@@ -9,9 +9,8 @@ from __future__ import annotations
 import io
 import json
 import math
-import os
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields, is_dataclass
 from importlib import import_module
 from pathlib import Path
@@ -22,7 +21,7 @@ from astropy.time import Time
 from astropy.units import Quantity, Unit, UnitBase, km
 
 from flybystab.errors import FlybystabError, InvalidInput, MissingExtra
-from flybystab.files import parse_json, read_bytes, read_text
+from flybystab.files import parse_json, read_bytes, read_text, replace_file
 
 #: Columns by name.
 Columns = dict[str, Any]
@@ -162,6 +161,11 @@ def csv_cell(value: Any) -> str:
     return value
 
 
+def csv_text(names: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:
+    """A CSV file: the names of the columns, then the rows."""
+    return "".join(",".join(map(csv_cell, row)) + "\n" for row in (names, *rows))
+
+
 def save_columns(
     path: str | Path, columns: Mapping[str, Any], meta: Mapping[str, Any], overwrite: bool
 ) -> Path:
@@ -188,15 +192,7 @@ def written(
         raise InvalidInput("path", str(path), "a file that does not exist, or overwrite=True")
     data = writers[out.suffix](*content)
     try:
-        number, part = tempfile.mkstemp(dir=out.parent, prefix=f".{out.name}.", suffix=".part")
-        try:
-            with os.fdopen(number, "wb") as stream:
-                stream.write(data)
-            os.chmod(part, 0o644)
-            os.replace(part, out)
-        except BaseException:
-            os.unlink(part)
-            raise
+        replace_file(out, data)
     except OSError as error:
         raise InvalidInput("path", str(path), f"a file that can be written ({error.strerror})") from None
     return out
@@ -322,9 +318,7 @@ def _read_json(path: Path) -> tuple[Columns, dict[str, Any]]:
 
 def _csv(columns: Mapping[str, Any], meta: Mapping[str, Any]) -> bytes:
     parts = flat(columns)
-    lines = [",".join(map(csv_cell, parts))]
-    lines += [",".join(map(csv_cell, row)) for row in zip(*(v.tolist() for v in parts.values()), strict=True)]
-    return ("\n".join(lines) + "\n").encode()
+    return csv_text(parts, zip(*(v.tolist() for v in parts.values()), strict=True)).encode()
 
 
 def _netcdf(columns: Mapping[str, Any], meta: Mapping[str, Any]) -> bytes:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import hashlib
+import io
 import json
 import os
-import tempfile
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from flybystab.core.grains.simulation import Simulation
+from flybystab.files import replace_file
 from flybystab.typing import Array
 
 #: Changes with the recipe, so that piles made by an older one are not taken for new ones.
@@ -56,9 +57,9 @@ def stored_pile(inputs: dict[str, Any], make: Callable[[], Simulation]) -> dict[
     arrays = arrays_of(make())
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=path.parent, suffix=".part", delete=False) as file:
-            np.savez(file, **arrays)  # type: ignore[arg-type]
-        os.replace(file.name, path)
+        content = io.BytesIO()
+        np.savez(content, **arrays)  # type: ignore[arg-type]
+        replace_file(path, content.getvalue())
     except OSError:  # without a cache the pile is made anew at every use
         pass
     return arrays

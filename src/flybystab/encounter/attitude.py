@@ -24,6 +24,40 @@ def periapsis_axes(encounter: Encounter) -> Array:
     return encounter.periapsis_axes
 
 
+def about_z(angle: float) -> Array:
+    """Matrix of the rotation by `angle` (rad) about z."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
+def rotation_rates(y: Array, moments: Array, torque: Array | None = None) -> Array:
+    """Time derivative of the rotation of a rigid body.
+
+    Parameters
+    ----------
+    y : ndarray (7,)
+        Quaternion, scalar first, body axes -> inertial frame; then the spin along the principal axes, rad/s.
+    moments : ndarray (3,)
+        Principal moments of inertia over the mass, m2.
+    torque : ndarray (3,), optional
+        Torque over the mass along the principal axes, m2/s2.
+
+    Returns
+    -------
+    ndarray (7,)
+        ``q' = q (0, w)/2`` and Euler's equations ``I w' = N - w x I w``.
+    """
+    (a, b, c, d), w = y[:4], y[4:]
+    euler = np.cross(moments * w, w) if torque is None else torque - np.cross(w, moments * w)
+    turn = [
+        -b * w[0] - c * w[1] - d * w[2],
+        a * w[0] + c * w[2] - d * w[1],
+        a * w[1] + d * w[0] - b * w[2],
+        a * w[2] + b * w[1] - c * w[0],
+    ]
+    return np.concatenate([0.5 * np.array(turn), euler / moments])
+
+
 def attitude_matrix(attitude: Any) -> Array:
     """Rotation matrix (3, 3), checked, of a matrix or scipy Rotation; the identity for None."""
     if attitude is None:

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from flybystab.body.body import Body
-from flybystab.encounter.attitude import attitude_matrix
+from flybystab.encounter.attitude import attitude_matrix, rotation_rates
 from flybystab.encounter.encounter import Encounter
 from flybystab.typing import Array
 
@@ -50,14 +50,14 @@ def attitude_at_start(body: Body, encounter: Encounter, at_periapsis: Any) -> Ar
     if np.count_nonzero(omega) == 1:
         turned = Rotation.from_rotvec(omega * span)
     else:
-
-        def rates(_: float, y: Array) -> Array:
-            q, w = y[:4], y[4:]
-            # scalar last, as scipy has it: q' = q (w, 0)/2
-            vector = 0.5 * (q[3] * w + np.cross(q[:3], w))
-            return np.concatenate([vector, [-0.5 * q[:3] @ w], np.cross(moments * w, w) / moments])
-
-        start = np.concatenate([[0.0, 0.0, 0.0, 1.0], omega])
-        found = solve_ivp(rates, (0.0, span), start, method="DOP853", rtol=_TOLERANCE, atol=_TOLERANCE * size)
-        turned = Rotation.from_quat(found.y[:4, -1])
+        start = np.concatenate([[1.0, 0.0, 0.0, 0.0], omega])
+        found = solve_ivp(
+            lambda _, y: rotation_rates(y, moments),
+            (0.0, span),
+            start,
+            method="DOP853",
+            rtol=_TOLERANCE,
+            atol=_TOLERANCE * size,
+        )
+        turned = Rotation.from_quat(found.y[:4, -1], scalar_first=True)
     return target @ turned.as_matrix().T

@@ -14,7 +14,7 @@ from astropy.time import Time
 from astropy.units import Quantity
 
 from flybystab.core.dynamics.ground import Ground
-from flybystab.core.ellipsoid.tide import TidePanels, tide_panels
+from flybystab.core.ellipsoid.tide import TidePanels, tensor, tide_at, tide_panels
 from flybystab.encounter.reach import SETTLE, far_enough
 from flybystab.errors import InvalidInput
 from flybystab.orbit.ephemeris import BODIES, Ephemeris
@@ -206,6 +206,12 @@ class Encounter:
         return Ground(
             way.tau, way.start, way.width, self.planet.impact_distance, self.height, 1.0, way.coefficients
         )
+
+    def tidal_tensor(self, t: float) -> Array:
+        """Tidal tensor, frame of the encounter, (3, 3), 1/s2, at `t` seconds from closest approach."""
+        six, panels = np.empty(6), self.tide
+        tide_at(panels.tau, panels.start, panels.width, panels.coefficients, t, six)
+        return tensor(six)
 
     @cached_property
     def periapsis_axes(self) -> Array:

@@ -21,7 +21,6 @@ from scipy.integrate import DOP853
 
 from flybystab.body.body import Body
 from flybystab.constants import G
-from flybystab.core.ellipsoid.tide import tensor, tide_at
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput, NotConverged
 from flybystab.tabular import Tabular
@@ -150,17 +149,9 @@ def binary_flyby(
         plane_change=np.rad2deg(np.arccos(np.clip(cosine, -1.0, 1.0))) * lost * u.deg,
         closest=closest * a * u.m,
         fate=fate,
-        tide_at_start=float(np.linalg.norm(_tide(encounter, encounter.t_start)) * unit**2),
+        tide_at_start=float(np.linalg.norm(encounter.tidal_tensor(encounter.t_start)) * unit**2),
         seed=int(seed),
     )
-
-
-def _tide(encounter: Encounter, t: float) -> Array:
-    """Tidal tensor (3, 3), 1/s2."""
-    six = np.empty(6)
-    panels = encounter.tide
-    tide_at(panels.tau, panels.start, panels.width, panels.coefficients, t, six)
-    return tensor(six)
 
 
 def _frames(normal: Quantity | Array | None, n: int, rng: np.random.Generator) -> Array:
@@ -217,7 +208,7 @@ def _carried(
         out = np.empty_like(y)
         out[:, :3] = y[:, 3:]
         r2 = np.sum(x * x, axis=1)
-        out[:, 3:] = -x / (r2 * np.sqrt(r2))[:, None] + x @ (_tide(encounter, time * unit) * scale)
+        out[:, 3:] = -x / (r2 * np.sqrt(r2))[:, None] + x @ (encounter.tidal_tensor(time * unit) * scale)
         out[~moving] = 0.0
         return out.ravel()
 

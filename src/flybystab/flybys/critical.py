@@ -13,6 +13,7 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.body.body import DENSITY_RANGE, Body
+from flybystab.encounter.attitude import about_z
 from flybystab.encounter.attitude_at_periapsis import attitude_at_start
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput, UnknownName
@@ -185,7 +186,7 @@ def critical(
         """Whether the outcome is worse than accepted, for one value for each of the given phases."""
         scenes = [parameter.apply(body, encounter, float(x)) for x in values]
         turns = [
-            attitude_at_start(b, e, np.asarray(base) @ _about_z(float(a)))
+            attitude_at_start(b, e, np.asarray(base) @ about_z(float(a)))
             for (b, e), a in zip(scenes, angle[rows], strict=True)
         ]
         table = flyby_many([b for b, _ in scenes], [e for _, e in scenes], turns, workers=workers)
@@ -231,8 +232,3 @@ def _worst(outcome: str) -> int:
         near = get_close_matches(str(outcome), accepted, cutoff=0.4)
         raise UnknownName("outcome", str(outcome), near, f"(known: {', '.join(accepted)})")
     return SEVERITY.index(str(outcome))
-
-
-def _about_z(angle: float) -> Array:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

@@ -11,7 +11,7 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.body.body import Body
-from flybystab.encounter.attitude import periapsis_axes
+from flybystab.encounter.attitude import about_z, periapsis_axes
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
 from flybystab.flybys.flyby_many import flyby_many
@@ -116,7 +116,7 @@ def outcome_map(
         raise InvalidInput("phases", phases, "at least one phase")
     where = planet(on)
     flip = np.diag([1.0, -1.0, -1.0]) if retrograde else np.eye(3)
-    turns = [_about_z(np.pi * k / phases) @ flip for k in range(phases)]
+    turns = [about_z(np.pi * k / phases) @ flip for k in range(phases)]
     encounters = [Encounter.hyperbolic(where, x * u.m, y * u.m / u.s) for x in q for y in v]
     every = [e for e in encounters for _ in turns]
     table = flyby_many(
@@ -235,8 +235,3 @@ def target_map(
         verdict=np.asarray(table.verdict).reshape(shape),
         max_required_friction_angle=table.max_required_friction_angle.reshape(shape),
     )
-
-
-def _about_z(angle: float) -> Array:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])

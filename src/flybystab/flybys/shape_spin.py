@@ -20,9 +20,8 @@ from scipy.spatial.transform import Rotation
 from flybystab.body.body import Body, check_settled
 from flybystab.body.shape import Shape
 from flybystab.catalogues.tumbling import free_spin, precession_period
-from flybystab.core.ellipsoid.tide import COMPONENTS, tide_at
 from flybystab.core.polyhedron.moments import octupole_torque, quadrupole_torque
-from flybystab.encounter.attitude import attitude_matrix, periapsis_axes
+from flybystab.encounter.attitude import attitude_matrix, periapsis_axes, rotation_rates
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput, NotConverged
 from flybystab.flybys.surface_change import check_shape
@@ -209,11 +208,7 @@ class _Motion:
 
     def torques(self, t: float, turned: Array) -> tuple[Array, Array]:
         """Torques of second and third moments over the mass, principal axes, m2/s2."""
-        panels, six = self.encounter.tide, np.empty(6)
-        tide_at(panels.tau, panels.start, panels.width, panels.coefficients, t, six)
-        k = np.empty((3, 3))
-        for value, (i, j) in zip(six, COMPONENTS, strict=True):
-            k[i, j] = k[j, i] = value
+        k = self.encounter.tidal_tensor(t)
         planet = -turned.T @ self.encounter.positions(np.array([t]))[0]
         return (
             quadrupole_torque(self.second, turned.T @ k @ turned),
@@ -227,22 +222,10 @@ class _Motion:
         largest = [0.0, 0.0]
 
         def rate(t: float, y: Array) -> Array:
-            w = y[4:]
             two, three = self.torques(t, _matrix(y))
             largest[0] = max(largest[0], float(np.linalg.norm(two)))
             largest[1] = max(largest[1], float(np.linalg.norm(three)))
-            torque = two + three if octupole else two
-            spin = (torque - np.cross(w, self.moments * w)) / self.moments
-            a, b, c, d = y[:4]
-            turn = 0.5 * np.array(
-                [
-                    -b * w[0] - c * w[1] - d * w[2],
-                    a * w[0] + c * w[2] - d * w[1],
-                    a * w[1] + d * w[0] - b * w[2],
-                    a * w[2] + b * w[1] - c * w[0],
-                ]
-            )
-            return np.concatenate([turn, spin])
+            return rotation_rates(y, self.moments, two + three if octupole else two)
 
         e = self.encounter
         scale = float(np.linalg.norm(first[4:])) or 1.0 / e.tide.tau

@@ -13,6 +13,7 @@ from flybystab.body.body import Body
 from flybystab.body.roche_lobe import RocheLobe, roche_lobe
 from flybystab.body.shape import Shape
 from flybystab.body.surface_history import SurfaceHistory, shape_history
+from flybystab.core.ellipsoid.tide import tensor
 from flybystab.encounter.encounter import Encounter
 from flybystab.flybys.inputs import FlybyInputs
 from flybystab.flybys.rigid_course import Course, rigid_course
@@ -86,8 +87,7 @@ def lobe_history(body: Body, encounter: Encounter, attitude: Any = None, *, shap
 
 
 def _lobe(shape: Shape, course: Course, row: int) -> RocheLobe:
-    xx, yy, zz, xy, xz, yz = course.tide.value[row]
-    tide = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) / u.s**2
+    tide = tensor(course.tide.value[row]) / u.s**2
     return roche_lobe(shape, course.body.with_(spin=course.spin[row]), tide)
 
 

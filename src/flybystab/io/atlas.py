@@ -6,8 +6,6 @@ is complete without scripts; the script adds search, filters and sorting. Templa
 
 from __future__ import annotations
 
-import csv
-import io
 import json
 import math
 import re
@@ -27,6 +25,7 @@ from flybystab.errors import InvalidInput
 from flybystab.flybys.document import plain, table_document
 from flybystab.flybys.verdict import Verdict
 from flybystab.io.text import MEANING
+from flybystab.saving import csv_text
 from flybystab.screening.columns import VERDICTS, share_of
 from flybystab.screening.results import read_results
 from flybystab.screening.tables import write_table
@@ -327,14 +326,7 @@ def _forces(text: str) -> list[tuple[str, str]]:
 
 
 def _csv(rows: list[dict[str, Any]]) -> str:
-    """Rows as CSV; text is quoted, so that spreadsheets read no formulas."""
-    stream = io.StringIO()
-    writer = csv.DictWriter(
-        stream,
-        fieldnames=list(dict.fromkeys(k for row in rows for k in row)),
-        quoting=csv.QUOTE_NONNUMERIC,
-        restval="",
-    )
-    writer.writeheader()
-    writer.writerows({k: "" if v is None else v for k, v in row.items()} for row in rows)
-    return stream.getvalue()
+    """Rows as CSV; a missing value is empty."""
+    names = list(dict.fromkeys(k for row in rows for k in row))
+    cells = ([row.get(k) for k in names] for row in rows)
+    return csv_text(names, (["" if x is None else x for x in values] for values in cells))

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import base64
 import io
-import os
 import platform
 import sys
 from datetime import UTC, datetime
@@ -20,6 +19,7 @@ from astropy.table import Row
 from flybystab._version import __version__
 from flybystab.body.surface_history import SurfaceHistory
 from flybystab.catalogues.asteroid import Asteroid
+from flybystab.files import replace_file
 from flybystab.flybys.result import FlybyResult
 from flybystab.flybys.spin_sample import SpinSample
 from flybystab.io.grains_text import grains_lines
@@ -103,11 +103,7 @@ def report(
             "grains_scene": None if result.grains is None else _grains_scene(result),
         },
     )
-    target = Path(path)
-    part = target.with_name(target.name + ".part")
-    part.write_text(page, encoding="utf-8")
-    os.replace(part, target)
-    return target
+    return replace_file(path, page.encode())
 
 
 def _template() -> jinja2.Template:

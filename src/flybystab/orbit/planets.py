@@ -14,6 +14,8 @@ J3 and J4 of the Earth: DE440.
 J2: Mercury: Mazarico et al. 2014; Venus: Konopliv et al. 1999; Earth, Moon, Sun: DE440; Mars: Konopliv et
 al. 2016; Jupiter: Iess et al. 2018; Saturn: Iess et al. 2019; Uranus: Jacobson 2014; Neptune: Jacobson
 2009. Each is scaled to the radius of the table.
+Mean orbits: Simon et al. 1994 (semi-major axes); Standish & Williams, "Approximate positions of the planets", JPL
+(eccentricities and inclinations at J2000, valid 1800-2050).
 Atmosphere: Earth: Karman line (FAI); Venus, Mars, Jupiter: entry interfaces of the Pioneer Venus
 probes (200 km), of the Mars landers (125 km) and of the Galileo probe (450 km above 1 bar). Saturn,
 Uranus and Neptune have none agreed: the 1-bar radius counts.
@@ -62,6 +64,8 @@ class Planet:
         Whether it is a source of the 1PN terms of its own (:mod:`flybystab.orbit.relativity`).
     j3, j4 : float
         Third and fourth zonal harmonic for `radius`, dimensionless; zero: not modelled.
+    orbit_eccentricity, orbit_inclination : float
+        Of the mean orbit around the Sun (Moon: that of the Earth); inclination to the ecliptic of J2000, rad.
     """
 
     name: str
@@ -76,6 +80,8 @@ class Planet:
     relativity: bool = False
     j3: float = 0.0
     j4: float = 0.0
+    orbit_eccentricity: float = 0.0
+    orbit_inclination: float = 0.0
 
     @property
     def impact_distance(self) -> float:
@@ -135,6 +141,7 @@ def _body(
     j4: float = 0.0,
 ) -> Planet:
     """One entry of the table: GM in km3/s2, lengths in km, pole (ra, dec) in deg, radius of the orbit in au."""
+    eccentricity, inclination = _MEAN_ORBIT.get(name, (0.0, 0.0))
     return Planet(
         name,
         gm * 1e9,
@@ -148,8 +155,24 @@ def _body(
         relativity,
         j3,
         j4,
+        eccentricity,
+        float(np.radians(inclination)),
     )
 
+
+#: Eccentricity and inclination to the ecliptic of J2000 (deg) of the mean orbits.
+_MEAN_ORBIT = {
+    "mercury": (0.20563593, 7.00497902),
+    "venus": (0.00677672, 3.39467605),
+    "earth": (0.01671123, 0.0),
+    "moon": (0.01671123, 0.0),
+    "mars": (0.09339410, 1.84969142),
+    "jupiter": (0.04838624, 1.30439695),
+    "saturn": (0.05386179, 2.48599187),
+    "uranus": (0.04725744, 0.77263783),
+    "neptune": (0.00859048, 1.77004347),
+    "pluto": (0.24882730, 17.14001206),
+}
 
 _TABLE = (
     _body("sun", 132712440041.279419, 695700.0, 2.1961e-7, (286.13, 63.87), 0.0, 10, 0.0, (0, 10), True),

@@ -18,7 +18,6 @@ from flybystab.errors import InvalidInput
 from flybystab.orbit.elements import GM_SUN, elements_from_state
 from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.planets import Planet, planet
-from flybystab.population.mean_orbits import mean_orbit
 from flybystab.population.wetherill import NODES_R, NODES_S, rate_and_moments, rate_at_speeds, speed_sums
 from flybystab.typing import Array
 from flybystab.units import to_si, whole
@@ -159,7 +158,7 @@ def encounter_rates(
     limit = to_si(distance, u.m, "periapsis", low=0.0, open_low=True)
     elements, weight = _elements(orbits), _weight(orbits)
     if planet_orbit is None:
-        target = mean_orbit(body.name)
+        target = _mean_orbit(body)
     else:
         a, e, i = planet_orbit
         target = np.array(
@@ -178,6 +177,16 @@ def encounter_rates(
 
     list(in_order(part, range(0, len(elements), BLOCK), threads))
     return _rates(body, limit, np.ones(len(elements)) if weight is None else weight, elements, target, sums)
+
+
+def _mean_orbit(body: Planet) -> Array:
+    """Semi-major axis (m), eccentricity and inclination (rad) of today's mean orbit of a planet.
+
+    Over a million years eccentricities and inclinations vary, those of the Earth up to about 0.06 and 4 deg.
+    """
+    if not body.orbit_radius > 0.0:
+        raise InvalidInput("planet", body.name, "a body that orbits the Sun")
+    return np.array([body.orbit_radius, body.orbit_eccentricity, body.orbit_inclination])
 
 
 def _rates(

@@ -13,6 +13,7 @@ from scipy.spatial.transform import Rotation
 from flybystab.body.body import Body, Material
 from flybystab.body.equilibrium import equilibrium
 from flybystab.catalogues.asteroid import Asteroid
+from flybystab.catalogues.magnitude import diameter_of, magnitude_of
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import FlybystabError, InvalidInput
 from flybystab.flybys.flyby import flyby
@@ -140,18 +141,18 @@ def _diameters(plan: Plan, orbits: NDArray[np.int64], rng: np.random.Generator) 
         row = int(orbits[np.flatnonzero(~np.isfinite(magnitude))[0]])
         raise InvalidInput("diameter", None, f"a diameter, or H of every orbit (row {row} has none)")
     albedo = plan.priors.albedo.quantile(rng.random(len(orbits)))
-    return 1.329e6 / np.sqrt(albedo) * 10.0 ** (-magnitude / 5.0)
+    return np.asarray(diameter_of(magnitude, albedo))
 
 
 def _bodies(plan: Plan, diameter: Array, seed: int) -> list[Body]:
     """Drawn bodies of given diameters (m) that are in equilibrium in isolation."""
-    magnitude = 5.0 * np.log10(1.329e6 / (diameter * np.sqrt(ALBEDO)))
+    magnitude = np.asarray(magnitude_of(diameter, ALBEDO))
     group = np.round(magnitude).astype(int)
     found: list[Body | None] = [None] * len(diameter)
     for value in np.unique(group):
         rows = np.flatnonzero(group == value)
         size = float(np.exp(np.mean(np.log(diameter[rows]))))
-        middle = 5.0 * np.log10(1.329e6 / (size * np.sqrt(ALBEDO)))
+        middle = float(magnitude_of(size, ALBEDO))
         model = Asteroid(
             {"name": "sample", "diameter_m": f"{size!r}", "H_mag": f"{middle:.4f}"}, file="population"
         )

@@ -19,6 +19,7 @@ from flybystab.body.body import DENSITY_RANGE, Body, Material
 from flybystab.catalogues.asteroid import Asteroid, identity
 from flybystab.catalogues.catalogue import catalogue
 from flybystab.catalogues.lightcurves import periods_like
+from flybystab.catalogues.magnitude import diameter_of
 from flybystab.catalogues.record import SHAPE
 from flybystab.catalogues.tumbling import attitude_matrix, free_spin, isotropic_direction
 from flybystab.errors import InvalidInput
@@ -176,7 +177,7 @@ def _draws(asteroid: Asteroid, x: Array, population: Population, *, keep: bool) 
         size = np.full(n, 2.0 * float(np.prod(asteroid.semi_axes.value)) ** (1 / 3))
     elif asteroid.knows("H_mag"):
         albedo = population.albedo.quantile(x[:, _ALBEDO])
-        size = 1.329e6 / np.sqrt(albedo) * 10.0 ** (-value("H_mag") / 5.0)
+        size = diameter_of(value("H_mag"), albedo)
         drawn.append("diameter (from H and albedo)")
     else:
         raise InvalidInput(
