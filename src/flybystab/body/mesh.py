@@ -6,7 +6,6 @@ from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from flybystab.errors import InvalidInput
 from flybystab.typing import Array
@@ -82,6 +81,8 @@ def self_intersections(vertices: Array, facets: Integers) -> Integers:
     Candidate pairs are those whose bounding spheres meet. Facets that share a vertex are left out, so that two
     facets folded onto each other along an edge are not found.
     """
+    from scipy.spatial import cKDTree
+
     corners = vertices[facets]
     centre = corners.mean(axis=1)
     radius = np.linalg.norm(corners - centre[:, None], axis=2).max(axis=1)

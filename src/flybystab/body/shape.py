@@ -11,7 +11,6 @@ import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
 from numpy.typing import NDArray
-from scipy.spatial import ConvexHull
 
 from flybystab.body.mesh import MassProperties, edges_of, mass_properties, self_intersections
 from flybystab.body.shape_files import read_mesh, write_vtk
@@ -365,6 +364,8 @@ def _principal_axes(second: Array) -> Array:
 
 def _sphere(facets: int) -> tuple[Array, Integers]:
     """Unit vectors of a Fibonacci lattice and the triangles of their convex hull, about `facets` of them."""
+    from scipy.spatial import ConvexHull
+
     count = whole(facets, "facets", 20) // 2 + 2
     i = np.arange(count) + 0.5
     z = 1.0 - 2.0 * i / count

@@ -20,6 +20,7 @@ from flybystab.catalogues.record import BODILY, ORBIT, ORBIT_SI, ORBITAL, PERIHE
 from flybystab.catalogues.tumbling import attitude_matrix, ecliptic_direction, free_spin, tumbling_state
 from flybystab.constants import DAY
 from flybystab.errors import InvalidInput
+from flybystab.typing import Array
 from flybystab.units import to_si
 
 if TYPE_CHECKING:
@@ -354,9 +355,18 @@ class Asteroid(Record):
         if not self.tumbles:
             period = self.quantity("spin_period_h")
             return Body(semi_axes=self.semi_axes, density=density, spin_period=period, material=material)
-        moments, momentum, j = self._tumbling
-        spin = free_spin(moments, momentum, j, np.array([phase]))[0][0]
+        spin = self.angular_velocities(np.array([phase]))[0]
         return Body(semi_axes=self.semi_axes, density=density, spin=spin * u.rad / u.s, material=material)
+
+    def angular_velocities(self, phase: Array) -> Array:
+        """Angular velocities along the body axes, rad/s, shape (n, 3), at phases of the rotation, shape (n,).
+
+        Those of a body that does not tumble are all the same.
+        """
+        if self.tumbles:
+            moments, momentum, j = self._tumbling
+            return free_spin(moments, momentum, j, phase)[0]
+        return np.tile(self.body_with().omega, (len(phase), 1))
 
     @cached_property
     def _tumbling(self) -> tuple[np.ndarray, float, float]:

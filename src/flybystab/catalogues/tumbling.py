@@ -15,8 +15,6 @@ periods (``P_psi`` and ``P_phi``); with the inertia ratios they fix ``L`` and ``
 from __future__ import annotations
 
 import numpy as np
-from scipy.optimize import brentq
-from scipy.special import ellipj, ellipk
 
 from flybystab.constants import OBLIQUITY_J2000
 from flybystab.errors import InvalidInput, UnknownName
@@ -46,6 +44,8 @@ def free_spin(moments: Array, momentum: float, j: float, phase: Array) -> tuple[
     period : float
         s.
     """
+    from scipy.special import ellipj, ellipk
+
     j1, j2, j3 = (float(x) for x in moments)
     a1 = momentum * np.sqrt((j3 - j) / (j * j1 * (j3 - j1)))
     a3 = momentum * np.sqrt((j - j1) / (j * j3 * (j3 - j1)))
@@ -98,6 +98,8 @@ def tumbling_state(
     InvalidInput
         The two periods are not possible for these moments of inertia.
     """
+    from scipy.optimize import brentq
+
     if mode not in MODES:
         raise UnknownName("tumbling mode", mode, list(MODES))
     j1, j2, j3 = (float(x) for x in moments)
@@ -133,38 +135,62 @@ def ecliptic_direction(longitude: float, latitude: float) -> Array:
 
 
 def _basis(direction: Array) -> Array:
-    """Rotation whose third column is `direction` (a unit vector)."""
-    helper = np.eye(3)[int(np.argmin(np.abs(direction)))]
+    """Rotations, shape (n, 3, 3), whose third column is the unit vector `direction`, shape (n, 3)."""
+    helper = np.eye(3)[np.argmin(np.abs(direction), axis=1)]
     first = np.cross(helper, direction)
-    first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(direction, first), direction], axis=1)
+    first /= np.linalg.norm(first, axis=1)[:, None]
+    return np.stack([first, np.cross(direction, first), direction], axis=2)
 
 
 def attitude_matrix(momentum: Array, pole: Array, angle: float) -> Array:
-    """Rotation from body axes to the frame of `pole`.
+    """Rotation from body axes to the frame of `pole`; one row of :func:`attitude_matrices`."""
+    return attitude_matrices(momentum, np.asarray(pole, dtype=float)[None], np.array([angle]))[0]
+
+
+def attitude_matrices(momentum: Array, pole: Array, angle: Array) -> Array:
+    """Rotations from body axes to the frame of `pole`.
 
     Parameters
     ----------
-    momentum : ndarray (3,)
+    momentum : ndarray (3,) or (n, 3)
         Angular momentum along the body's axes, any length; ``(0, 0, 1)`` for rotation about the short axis.
-    pole : ndarray (3,)
+    pole : ndarray (3,) or (n, 3)
         Its direction in the outer frame, any length.
-    angle : float
+    angle : ndarray (n,)
         Turn about the pole, rad: together with `momentum` and `pole` it fixes the attitude.
 
     Returns
     -------
-    ndarray (3, 3)
+    ndarray (n, 3, 3)
         ``Q`` with ``Q @ momentum`` along `pole`.
     """
-    c, s = np.cos(angle), np.sin(angle)
-    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    inner = _basis(np.asarray(momentum, dtype=float) / np.linalg.norm(momentum))
-    return _basis(np.asarray(pole, dtype=float) / np.linalg.norm(pole)) @ turn @ inner.T
+    n = len(angle)
+    inner, outer = (np.broadcast_to(np.asarray(v, dtype=float), (n, 3)) for v in (momentum, pole))
+    turn = np.zeros((n, 3, 3))
+    turn[:, 0, 0] = turn[:, 1, 1] = np.cos(angle)
+    turn[:, 1, 0] = np.sin(angle)
+    turn[:, 0, 1] = -turn[:, 1, 0]
+    turn[:, 2, 2] = 1.0
+    bases = [_basis(v / np.linalg.norm(v, axis=1)[:, None]) for v in (outer, inner)]
+    return np.asarray(bases[0] @ turn @ np.swapaxes(bases[1], 1, 2))
+
+
+def isotropic_directions(uniform: Array) -> Array:
+    """Unit vectors, shape (n, 3), uniform on the sphere, from uniform numbers in [0, 1), shape (n, 2)."""
+    z = 2.0 * uniform[:, 0] - 1.0
+    rho = np.sqrt(1.0 - z * z)
+    longitude = 2.0 * np.pi * uniform[:, 1]
+    return np.stack([rho * np.cos(longitude), rho * np.sin(longitude), z], axis=1)
+
+
+def isotropic_rotations(turn: Array, uniform: Array) -> Array:
+    """Rotations, shape (n, 3, 3), uniform over all rotations: isotropic third columns, turned by ``2 pi turn[n]``."""
+    frame = _basis(isotropic_directions(uniform))
+    c, s = np.cos(2.0 * np.pi * turn)[:, None], np.sin(2.0 * np.pi * turn)[:, None]
+    x, y = frame[:, :, 0], frame[:, :, 1]
+    return np.stack([c * x + s * y, c * y - s * x, frame[:, :, 2]], axis=2)
 
 
 def isotropic_direction(uniform: Array) -> Array:
     """Unit vector uniform on the sphere from two uniform numbers in [0, 1)."""
-    z = 2.0 * uniform[0] - 1.0
-    rho = np.sqrt(1.0 - z * z)
-    return np.array([rho * np.cos(2 * np.pi * uniform[1]), rho * np.sin(2 * np.pi * uniform[1]), z])
+    return isotropic_directions(np.asarray(uniform)[None])[0]

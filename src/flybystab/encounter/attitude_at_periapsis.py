@@ -5,8 +5,6 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.integrate import solve_ivp
-from scipy.spatial.transform import Rotation
 
 from flybystab.body.body import Body
 from flybystab.encounter.attitude import attitude_matrix, rotation_rates
@@ -39,6 +37,9 @@ def attitude_at_start(body: Body, encounter: Encounter, at_periapsis: Any) -> Ar
     the attitude at the start is ``A Q(t)^T``. The tide changes the rotation on the way, so that the true attitude at
     closest approach differs somewhat.
     """
+    from scipy.integrate import solve_ivp
+    from scipy.spatial.transform import Rotation
+
     target = attitude_matrix(at_periapsis)
     span = -encounter.t_start
     omega = np.asarray(body.omega, dtype=float)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import astropy.units as u
 import numpy as np
+from astropy.units import Quantity
 
 from flybystab.core.ellipsoid.tide import tide_panels
 from flybystab.encounter.encounter import Encounter
@@ -14,6 +15,8 @@ from flybystab.encounter.tide_sources import planet_tide
 from flybystab.orbit.kepler import states_at_times, time_at_distance
 from flybystab.orbit.planets import PLANETS, Planet
 from flybystab.typing import Array
+
+_KM_S = u.km / u.s
 
 
 @dataclass(frozen=True)
@@ -66,10 +69,10 @@ def scripted(
     return cls(
         planet=body,
         time=None,
-        distance=(q * u.m).to(u.km),
-        v_inf=(v * u.m / u.s).to(u.km / u.s),
-        v_periapsis=(speed * u.m / u.s).to(u.km / u.s),
-        start_distance=(start * u.m).to(u.km),
+        distance=Quantity(q * 1e-3, u.km),
+        v_inf=Quantity(v * 1e-3, _KM_S),
+        v_periapsis=Quantity(speed * 1e-3, _KM_S),
+        start_distance=Quantity(start * 1e-3, u.km),
         impact=level is not None,
         impact_level=level,
         impact_time=entry,

@@ -9,7 +9,7 @@ import astropy.units as u
 import numpy as np
 from numpy.typing import NDArray
 
-from flybystab.body.body import Body
+from flybystab.body.body import Body, Material
 from flybystab.core.dynamics import verdict_row as kernels
 from flybystab.core.dynamics.ground import Ground, no_ground
 from flybystab.core.dynamics.run import REGIMES, event_log, unpacked_history
@@ -144,10 +144,44 @@ def records(
     rows["surface"] = [m.surface_code for m in materials]
     rows["brittle"] = [m.brittle for m in materials]
     rows["encounter"] = [place[id(e)] for e in encounters]
-    return rows, _encounters(list(met.values()), max(float(b.axes[0]) for b in bodies))
+    return rows, encounter_records(list(met.values()), max(float(b.axes[0]) for b in bodies))
 
 
-def _encounters(met: Sequence[Encounter], longest: float) -> Encounters:
+def body_rows(
+    axes: Array,
+    rho: Array,
+    omega: Array,
+    attitude: Array,
+    phi: Array,
+    cohesion: Array,
+    material: Material,
+    encounter: NDArray[np.int64] | int = 0,
+) -> NDArray[Any]:
+    """Records of n bodies (BODY) from arrays in SI units.
+
+    Parameters
+    ----------
+    axes, omega : ndarray (n, 3)
+        Semi-axes, longest first, m; angular velocities along them, rad/s.
+    rho, phi, cohesion : ndarray (n,)
+        kg/m3, rad, Pa.
+    attitude : ndarray (n, 3, 3)
+        Body axes -> frame of the encounter.
+    material : Material
+        Yield surface, dilatancy and brittleness.
+    encounter : ndarray (n,) or int
+        Numbers of the encounters.
+    """
+    rows = np.empty(len(axes), BODY)
+    rows["axes"], rows["rho"], rows["omega"], rows["attitude"] = axes, rho, omega, attitude
+    rows["phi"], rows["cohesion"], rows["encounter"] = phi, cohesion, encounter
+    rows["dilatancy"], rows["surface"], rows["brittle"] = (
+        material.dilatancy, material.surface_code, material.brittle,
+    )  # fmt: skip
+    return rows
+
+
+def encounter_records(met: Sequence[Encounter], longest: float) -> Encounters:
     """Records of encounters of bodies with semi-axes up to `longest` (m)."""
     grounds = [ground_near(e, longest) for e in met]
     first_tide, tides = _joined([e.tide.coefficients for e in met])

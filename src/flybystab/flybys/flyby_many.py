@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.body.body import Body, check_settled
-from flybystab.core.dynamics.verdict_row import OUTCOME
+from flybystab.core.dynamics.verdict_row import OUTCOME, Encounters
 from flybystab.core.dynamics.workspace import Limits
 from flybystab.core.numerics.threads import in_order, worker_count
 from flybystab.core.verdict_codes import FAILED
@@ -21,6 +21,7 @@ from flybystab.flybys.batch import (
     MAX_STEPS,
     TOLERANCE,
     axis_ratio,
+    encounter_records,
     failure_of,
     output_buffers,
     records,
@@ -30,6 +31,7 @@ from flybystab.flybys.batch import (
 from flybystab.flybys.rigid_course import check_tension
 from flybystab.flybys.table import FlybyTable
 from flybystab.flybys.verdict import Verdict, verdict_of
+from flybystab.typing import Array
 
 T = TypeVar("T")
 
@@ -86,15 +88,56 @@ def flyby_many(
             check_tension(bodies[i], encounters[i], None if attitudes is None else attitudes[i])
         except NotModelled as reason:
             failures[i] = str(reason)
-    rows = np.flatnonzero(failures == "")
-    phi = np.array([b.material.phi for b in bodies], dtype=float)
-    out = np.empty(n, OUTCOME)
+    if not n:
+        return _table(np.empty(0, OUTCOME), np.zeros(0), [], failures, tolerance)
+    rows, met = records(bodies, rotations, encounters)
+    out = _outcomes(rows, met, np.flatnonzero(failures == ""), tolerance, max_axis_ratio, threads)
+    return _table(out, rows["phi"], encounters, failures, tolerance)
+
+
+def follow_rows(
+    rows: NDArray[Any],
+    encounters: Sequence[Encounter],
+    *,
+    tolerance: float = TOLERANCE,
+    workers: int | None = None,
+) -> FlybyTable:
+    """`flyby_many` for bodies that exist as records only (:func:`flybystab.flybys.batch.body_rows`).
+
+    Parameters
+    ----------
+    rows : ndarray of BODY (n,)
+        Attitudes in the frame of the encounter. The bodies are settled and without a tension cut-off.
+    encounters : sequence of Encounter
+        Those that the rows refer to.
+    tolerance, workers
+        As in :func:`flyby_many`.
+    """
+    tolerance, threads = step_tolerance(tolerance), worker_count(workers)
+    failures = np.full(len(rows), "", dtype=object)
+    if not len(rows):
+        return _table(np.empty(0, OUTCOME), np.zeros(0), [], failures, tolerance)
+    met = encounter_records(encounters, float(rows["axes"].max()))
+    out = _outcomes(rows, met, np.arange(len(rows)), tolerance, 6.0, threads)
+    return _table(out, rows["phi"], [encounters[k] for k in rows["encounter"]], failures, tolerance)
+
+
+def _outcomes(
+    bodies: NDArray[Any],
+    encounters: Encounters,
+    rows: NDArray[np.int64],
+    tolerance: float,
+    max_axis_ratio: float,
+    threads: int,
+) -> NDArray[Any]:
+    """Outcomes (OUTCOME) of the bodies in `rows`, as not computed for the others."""
+    out = np.empty(len(bodies), OUTCOME)
     _fail(out)
-    inputs = records(bodies, rotations, encounters) if n else ()
     limits = Limits(tolerance, max_axis_ratio, MAX_STEPS)
 
     def part(indices: NDArray[np.int64]) -> None:
-        verdict_rows(indices, *inputs, limits, True, output_buffers(0, 0)._replace(outcomes=out))
+        output = output_buffers(0, 0)._replace(outcomes=out)
+        verdict_rows(indices, bodies, encounters, limits, True, output)
 
     if threads == 1 or len(rows) < 2:
         if len(rows):
@@ -102,6 +145,17 @@ def flyby_many(
     else:  # rows that flow take longer: more parts than threads
         parts = min(len(rows), 16 * threads)
         list(in_order(part, [rows[k::parts].copy() for k in range(parts)], threads))
+    return out
+
+
+def _table(
+    out: NDArray[Any],
+    phi: Array,
+    encounters: Sequence[Encounter],
+    failures: NDArray[np.object_],
+    tolerance: float,
+) -> FlybyTable:
+    """The outcomes as a table; completes the reasons of failures."""
     found = [verdict_of(int(row["verdict"]), row["bound_fraction"]) for row in out]
     names = np.array(["FAILED" if v is None else str(v) for v in found], dtype="U20")
     for lost in map(int, np.flatnonzero(names == "FAILED")):

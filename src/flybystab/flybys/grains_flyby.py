@@ -15,11 +15,10 @@ import time as clock
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import astropy.units as u
 import numpy as np
-from astropy.table import QTable, vstack
 from astropy.units import Quantity
 from numpy.typing import NDArray
 
@@ -39,6 +38,9 @@ from flybystab.flybys.result import FlybyResult
 from flybystab.flybys.verdict import Verdict, classed, letter_of
 from flybystab.typing import Array
 from flybystab.units import brief
+
+if TYPE_CHECKING:
+    from astropy.table import QTable
 
 #: Piles whose distribution is a result.
 SEEDS = 8
@@ -329,6 +331,8 @@ def grains_flyby(
         f"until clumps had not changed for {QUIET:g} dynamical times, {low:.1f} to {high:.1f} h after closest approach"
         + (f"; in {unsettled} runs they still did" if unsettled else ""),
     )
+    from astropy.table import vstack
+
     return GrainsOutcome(runs, vstack(tables), modelled, (clock.perf_counter() - begun) * u.s)
 
 
@@ -534,6 +538,8 @@ def _fragments(sim: Simulation, pile: PileState) -> tuple[QTable, NDArray[np.int
 
     def column(values: list[Array]) -> Array:
         return np.array(values).reshape(n, 3)
+
+    from astropy.table import QTable
 
     table = QTable(
         {

@@ -107,7 +107,7 @@ def refresh_distance(
     share = to_si(area, u.dimensionless_unscaled, "area", low=0.0, high=1.0, open_low=True, open_high=True)
     if repose is None and rise is None:
         rise = 2.0 * u.deg
-    rotations = spin_states(body, whole(attitudes, "attitudes", 1), seed)[1]
+    rotations = spin_states(body, whole(attitudes, "attitudes", 1), seed).rotations
 
     def shares(radii: float) -> Array:
         encounter = Encounter.hyperbolic(home, radii * home.radius * u.m, v_inf)

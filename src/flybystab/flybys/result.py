@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 
 import astropy.units as u
 import numpy as np
-from astropy.table import QTable
 from astropy.units import Quantity
 
 from flybystab.body.body import Body
@@ -31,6 +30,8 @@ from flybystab.typing import Array
 from flybystab.units import brief
 
 if TYPE_CHECKING:
+    from astropy.table import QTable
+
     from flybystab.flybys.grains_flyby import GrainsOutcome
 
 #: Columns of a result as a table of one row; those that are None are left out.

@@ -100,7 +100,8 @@ def spin_forecast(
     if not isinstance(encounter, Encounter) or encounter.impact:
         raise InvalidInput("encounter", encounter, "an Encounter without an impact")
     known = not isinstance(asteroid, Body) and asteroid.pole is not None and encounter.frame == "ICRF"
-    bodies, rotations = spin_states(asteroid, n, seed, use_pole=known)
+    states = spin_states(asteroid, n, seed, use_pole=known)
+    bodies, rotations = states.bodies(), states.rotations
     frame = periapsis_axes(encounter)
     tilt = _tilt(rotations[0] @ (_moments(bodies[0]) * bodies[0].omega), to_si(turned, u.rad, "turned"))
     after: list[RotationState] = []

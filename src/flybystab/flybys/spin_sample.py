@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import astropy.units as u
 import numpy as np
@@ -11,11 +11,12 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.body.body import Body, Material
+from flybystab.catalogues.tumbling import attitude_matrices, isotropic_directions, isotropic_rotations
 from flybystab.encounter.attitude import periapsis_axes
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
-from flybystab.flybys.batch import TOLERANCE
-from flybystab.flybys.flyby_many import flyby_many
+from flybystab.flybys.batch import TOLERANCE, body_rows
+from flybystab.flybys.flyby_many import flyby_many, follow_rows
 from flybystab.tabular import Tabular
 from flybystab.typing import Array
 from flybystab.units import counted, whole
@@ -31,8 +32,8 @@ class SpinStates(Protocol):
     def body_with(self, material: Material | None = None, *, phase: float = 0.0) -> Body:
         """The body at a phase of its rotation."""
 
-    def attitude(self, angle: Quantity, *, phase: float = 0.0, pole: Any = None) -> Array:
-        """Body axes -> ICRF."""
+    def angular_velocities(self, phase: Array) -> Array:
+        """Angular velocities (n, 3) along the body axes, rad/s, at phases (n,) of the rotation."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,25 +113,61 @@ def spin_sample(
     if not isinstance(asteroid, Body) and not hasattr(asteroid, "pole"):
         raise InvalidInput("asteroid", asteroid, "an Asteroid or a Body")
     known = not isinstance(asteroid, Body) and asteroid.pole is not None and encounter.frame == "ICRF"
-    bodies, rotations = spin_states(asteroid, n, seed, material, use_pole=known)
-    frame = periapsis_axes(encounter)
-    attitudes = [frame @ rotation for rotation in rotations]
-    table = flyby_many(bodies, [encounter] * n, attitudes, tolerance=tolerance, workers=workers)
+    states = spin_states(asteroid, n, seed, material, use_pole=known)
+    attitudes = periapsis_axes(encounter) @ states.rotations
+    if states.body.material.cut_off:
+        bodies, turns = states.bodies(), list(attitudes)
+        table = flyby_many(bodies, [encounter] * n, turns, tolerance=tolerance, workers=workers)
+    else:
+        table = follow_rows(states.rows(), [encounter], tolerance=tolerance, workers=workers)
     return SpinSample(
         spin_ratio=table.spin_ratio,
         pole_change=table.pole_change,
         max_required_friction_angle=table.max_required_friction_angle,
         verdict=table.verdict,
-        attitude=np.array(attitudes),
+        attitude=attitudes,
         pole_known=known,
         seed=seed,
     )
 
 
+class SpinSampleStates(NamedTuple):
+    """Spin states of one body.
+
+    Attributes
+    ----------
+    body : Body
+        Shape, density and material of all.
+    omega : ndarray (n, 3)
+        Angular velocities along the body axes, rad/s.
+    rotations : ndarray (n, 3, 3)
+        Body axes -> ICRF.
+    """
+
+    body: Body
+    omega: Array
+    rotations: Array
+
+    def rows(self) -> NDArray[Any]:
+        """Records of the bodies in encounters of frame ICRF, all in the first encounter."""
+        b = self.body
+        n = len(self.omega)
+        return body_rows(
+            np.tile(b.axes, (n, 1)), np.full(n, b.rho), self.omega, self.rotations,
+            np.full(n, b.material.phi), np.full(n, b.material.c_pa), b.material,
+        )  # fmt: skip
+
+    def bodies(self) -> list[Body]:
+        """The same as bodies."""
+        if (self.omega == self.body.omega).all():
+            return [self.body] * len(self.omega)
+        return [self.body.with_(spin=omega * u.rad / u.s) for omega in self.omega]
+
+
 def spin_states(
     asteroid: SpinStates | Body, n: int, seed: int, material: Material | None = None, *, use_pole: bool = True
-) -> tuple[list[Body], list[Array]]:
-    """Bodies and rotations, body axes -> ICRF, at `n` phases: uniform about the pole, isotropic without one.
+) -> SpinSampleStates:
+    """Spin states at `n` phases: uniform about the pole, isotropic without one.
 
     Parameters
     ----------
@@ -142,33 +179,15 @@ def spin_states(
     n, seed = whole(n, "n", 1), whole(seed, "seed", 0)
     if not isinstance(asteroid, Body) and not hasattr(asteroid, "body_with"):
         raise InvalidInput("asteroid", asteroid, "a flybystab.Asteroid or a flybystab.Body")
-    bodies, rotations = [], []
-    for turn, phase, height, longitude in np.random.default_rng(seed).random((n, 4)):
-        if isinstance(asteroid, Body):
-            bodies.append(asteroid if material is None else asteroid.with_(material=material))
-            rotations.append(_isotropic(turn, height, longitude))
-        else:
-            bodies.append(asteroid.body_with(material, phase=float(phase)))
-            pole = asteroid.pole if use_pole else None
-            if pole is None:
-                pole = _direction(height, longitude)
-            rotations.append(asteroid.attitude(2.0 * np.pi * turn * u.rad, phase=float(phase), pole=pole))
-    return bodies, rotations
-
-
-def _direction(height: float, longitude: float) -> Array:
-    """Unit vector, isotropic for two uniform numbers."""
-    z = 2.0 * height - 1.0
-    r = np.sqrt(1.0 - z * z)
-    return np.array([r * np.cos(2.0 * np.pi * longitude), r * np.sin(2.0 * np.pi * longitude), z])
-
-
-def _isotropic(turn: float, height: float, longitude: float) -> Array:
-    """Rotation matrix, uniform over all rotations: an isotropic third column and a uniform turn about it."""
-    z = _direction(height, longitude)
-    helper = np.eye(3)[int(np.argmin(np.abs(z)))]
-    x = np.cross(helper, z)
-    x /= np.linalg.norm(x)
-    y = np.cross(z, x)
-    c, s = np.cos(2.0 * np.pi * turn), np.sin(2.0 * np.pi * turn)
-    return np.stack([c * x + s * y, c * y - s * x, z], axis=1)
+    turn, phase, height, longitude = np.random.default_rng(seed).random((n, 4)).T
+    directions = np.stack([height, longitude], axis=1)
+    if isinstance(asteroid, Body):
+        body = asteroid if material is None else asteroid.with_(material=material)
+        return SpinSampleStates(body, np.tile(body.omega, (n, 1)), isotropic_rotations(turn, directions))
+    body = asteroid.body_with(material)
+    omega = asteroid.angular_velocities(phase)
+    squares = body.axes**2
+    momentum = (squares.sum() - squares) * omega
+    pole = asteroid.pole if use_pole else None
+    poles = isotropic_directions(directions) if pole is None else pole
+    return SpinSampleStates(body, omega, attitude_matrices(momentum, poles, 2.0 * np.pi * turn))

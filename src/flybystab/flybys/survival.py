@@ -9,17 +9,19 @@ import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
 from numpy.typing import NDArray
-from scipy.stats import binomtest
 
 from flybystab.body.body import Body, Material, refuse_cut_off
 from flybystab.core.ellipsoid.yield_bound import INTACT, quick_margins
+from flybystab.encounter.attitude import attitude_matrix
 from flybystab.encounter.distribution import EncounterDistribution
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
-from flybystab.flybys.flyby_many import flyby_many
-from flybystab.flybys.spin_sample import SpinStates, spin_states
+from flybystab.flybys.flyby_many import follow_rows
+from flybystab.flybys.spin_sample import SpinSampleStates, SpinStates, spin_states
 from flybystab.flybys.verdict import Verdict
+from flybystab.orbit.planets import Planet
 from flybystab.tabular import Tabular
+from flybystab.typing import Array
 from flybystab.units import counted
 
 #: Verdicts that leave one body with all of its mass.
@@ -60,6 +62,8 @@ class Survival(Tabular):
         Clones and attitudes are drawn together, so that the samples are independent and the interval is that
         of a binomial law. Samples that failed count against it at the lower end and for it at the upper.
         """
+        from scipy.stats import binomtest
+
         wanted = np.isin(self.verdict, [str(v) for v in (verdicts or SURVIVES)])
         lost = int(np.count_nonzero(self.verdict == "FAILED"))
         k, n = int(wanted.sum()), len(self)
@@ -116,62 +120,67 @@ def survival(
     if not isinstance(distribution, EncounterDistribution):
         raise InvalidInput("distribution", distribution, "what fs.encounter_distribution gives")
     n = len(distribution)
-    bodies, rotations = spin_states(body, n, seed, material)
-    if bodies:
-        refuse_cut_off(bodies[0].material, "survival")
+    states = spin_states(body, n, seed, material)
+    refuse_cut_off(states.body.material, "survival")
+    rotations = states.rotations
     if attitude is not None:
         matrix = np.asarray(attitude, dtype=float)
         if matrix.shape != (3, 3):
             raise InvalidInput("attitude", attitude, "a (3, 3) rotation matrix, body axes to ICRF")
-        rotations = [matrix] * n
+        rotations = np.tile(attitude_matrix(matrix), (n, 1, 1))
     verdict = np.full(n, str(Verdict.INTACT), dtype="U20")
     verdict[distribution.impact] = str(Verdict.IMPACT)
     margin = np.full(n, np.nan)
     failure = np.full(n, "", dtype="U200")
     rows = np.flatnonzero(distribution.found & ~distribution.impact)
-    speeds = np.nan_to_num(distribution.v_inf)
+    speeds = np.nan_to_num(distribution.v_inf.to_value(u.m / u.s))
+    distances = distribution.distance.to_value(u.m)
     bounded = np.zeros(n, dtype=bool)
     if quick:
-        for k in map(int, rows):
-            least = _bound(bodies[k], distribution, k, float(speeds[k].to_value(u.m / u.s)))
-            bounded[k] = least is not None
-            margin[k] = np.nan if least is None else least
+        margin[rows] = _bounds(states, distribution.planet, rows, distances, speeds)
+        bounded[rows] = np.isfinite(margin[rows])
         rows = rows[~bounded[rows]]
-    turns = [_periapsis_axes(distribution, int(k)) @ rotations[k] for k in rows]
+    bodies = states._replace(rotations=_periapsis_axes(distribution) @ rotations).rows()[rows]
+    bodies["encounter"] = np.arange(len(rows))
     encounters = [
-        Encounter.hyperbolic(distribution.planet, distribution.distance[k], speeds[k]) for k in rows
+        Encounter.hyperbolic(distribution.planet, distances[k] * u.m, speeds[k] * u.m / u.s) for k in rows
     ]
-    table = flyby_many([bodies[k] for k in rows], encounters, turns, tolerance=tolerance, workers=workers)
+    table = follow_rows(bodies, encounters, tolerance=tolerance, workers=workers)
     verdict[rows], margin[rows], failure[rows] = table.verdict, table.margin.to_value(u.deg), table.failure
     return Survival(verdict, distribution.found, margin * u.deg, failure, bounded)
 
 
-def _bound(body: Body, distribution: EncounterDistribution, k: int, speed: float) -> float | None:
-    """Least margin (deg) of a body on the two-body path of clone `k` at any attitude; None where it may yield or touch.
+def _bounds(
+    states: SpinSampleStates, planet: Planet, clones: NDArray[np.int64], distances: Array, speeds: Array
+) -> Array:
+    """Least margins (deg) on the two-body paths of clones at any attitude; nan where the body may yield or touch.
 
     The tide of a point mass has the norm ``sqrt6 GM/r^3``; its integral over a whole hyperbola of semi-latus rectum
     p and angular momentum h is ``sqrt6 GM 2 (nu + e sin nu)/(h p)``, nu the true anomaly of the asymptote.
     """
-    planet, q = distribution.planet, float(distribution.distance[k].to_value(u.m))
-    if q - planet.impact_distance < body.axes[0]:
-        return None
-    e = 1.0 + q * speed * speed / planet.gm
+    q, m = distances[clones], states.body.material
+    e = 1.0 + q * speeds[clones] ** 2 / planet.gm
     p = q * (1.0 + e)
     nu = np.arccos(-1.0 / e)
     norm = 1.001 * np.sqrt(6.0) * planet.gm
-    m = body.material
+    peak = norm / q**3
+    integral = norm * 2.0 * (nu + e * np.sin(nu)) / (np.sqrt(planet.gm * p) * p)
+    axes, rho = states.body.axes[None].copy(), np.array([states.body.rho])
+    phi, cohesion, code = np.array([m.phi]), np.array([m.c_pa]), m.surface_code
     friction, verdict = np.empty((1, 2)), np.zeros(1, dtype=np.int64)
-    quick_margins(
-        body.axes[None], np.array([body.rho]), body.omega[None], np.array([m.phi]), np.array([m.c_pa]),
-        m.surface_code, norm / q**3, norm * 2.0 * (nu + e * np.sin(nu)) / (np.sqrt(planet.gm * p) * p),
-        friction, verdict,
-    )  # fmt: skip
-    return float(np.rad2deg(m.phi - friction[0, 1])) if verdict[0] == INTACT else None
+    out = np.full(len(clones), np.nan)
+    for i in map(int, np.flatnonzero(q - planet.impact_distance >= states.body.axes[0])):
+        omega = states.omega[clones[i] : clones[i] + 1]
+        quick_margins(axes, rho, omega, phi, cohesion, code, peak[i], integral[i], friction, verdict)
+        if verdict[0] == INTACT:
+            out[i] = np.rad2deg(m.phi - friction[0, 1])
+    return out
 
 
-def _periapsis_axes(distribution: EncounterDistribution, k: int) -> NDArray[np.float64]:
-    """Rotation, ICRF -> x to the asteroid at closest approach, z along the orbital angular momentum."""
-    r, v = distribution.position[k].value, distribution.velocity[k].value
-    h = np.cross(r, v)
-    x, z = r / np.linalg.norm(r), h / np.linalg.norm(h)
-    return np.stack([x, np.cross(z, x), z])
+def _periapsis_axes(distribution: EncounterDistribution) -> Array:
+    """Rotations (n, 3, 3), ICRF -> x to the asteroid at closest approach, z along the orbital angular momentum."""
+    r, v = distribution.position.value, distribution.velocity.value
+    with np.errstate(invalid="ignore"):  # clones that do not come near
+        h = np.cross(r, v)
+        x, z = (a / np.linalg.norm(a, axis=1)[:, None] for a in (r, h))
+    return np.stack([x, np.cross(z, x), z], axis=1)

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import astropy.units as u
 import numpy as np
-from astropy.coordinates import EarthLocation
 from astropy.time import Time
 
 from flybystab.constants import AU, R_EARTH
@@ -66,6 +65,8 @@ def observer(text: str) -> Observer | None:
     InvalidInput
         Numbers out of range.
     """
+    from astropy.coordinates import EarthLocation
+
     parts = text.split(",")
     if len(parts) == 1:
         code = text.strip().upper()

@@ -10,10 +10,11 @@ from __future__ import annotations
 import hashlib
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import astropy.units as u
 import numpy as np
+from numpy.typing import NDArray
 
 from flybystab.body.body import DENSITY_RANGE, Body, Material
 from flybystab.catalogues.asteroid import Asteroid, identity
@@ -21,8 +22,9 @@ from flybystab.catalogues.catalogue import catalogue
 from flybystab.catalogues.lightcurves import periods_like
 from flybystab.catalogues.magnitude import diameter_of
 from flybystab.catalogues.record import SHAPE
-from flybystab.catalogues.tumbling import attitude_matrix, free_spin, isotropic_direction
+from flybystab.catalogues.tumbling import attitude_matrices, isotropic_directions
 from flybystab.errors import InvalidInput
+from flybystab.flybys.batch import body_rows
 from flybystab.screening.distributions import truncated_normal
 from flybystab.screening.priors import Population
 from flybystab.typing import Array
@@ -75,6 +77,21 @@ class Draws(NamedTuple):
         arrays = {name: getattr(self, name)[first:last] for name in self._fields if name != "drawn"}
         return self._replace(**arrays)
 
+    def rows(self, samples: NDArray[np.int64], attitudes: Array, material: Material) -> NDArray[Any]:
+        """Records of samples in one encounter, with rotations (n, 3, 3), body axes -> frame of the encounter.
+
+        Raises
+        ------
+        InvalidInput
+            For a density that no asteroid has.
+        """
+        rho = self.rho[samples]
+        for i in samples[~((DENSITY_RANGE[0] <= rho) & (rho <= DENSITY_RANGE[1]))]:
+            self.body(int(i), material)  # raises
+        return body_rows(
+            self.axes[samples], rho, self.omega[samples], attitudes, self.phi[samples], self.cohesion[samples], material
+        )  # fmt: skip
+
     def body(self, i: int, material: Material) -> Body:
         """Sample `i` as a body; friction and cohesion are the sample's, the rest is of `material`."""
         return Body(
@@ -90,11 +107,6 @@ class Draws(NamedTuple):
 #: Columns of uniform numbers behind a draw.
 _SIZE, _SHAPE, _FLAT, _THIRD, _DENSITY, _PERIOD, _FRICTION, _COHESION, _PHASE, _ALBEDO = range(10)
 _WIDTH = 12
-
-
-def _tumbling_rates(asteroid: Asteroid, phase: Array) -> Array:
-    moments, momentum, j = asteroid._tumbling
-    return free_spin(moments, momentum, j, phase)[0]
 
 
 def nominal(asteroid: Asteroid, material: Material, population: Population | None = None) -> Draws:
@@ -230,7 +242,7 @@ def _draws(asteroid: Asteroid, x: Array, population: Population, *, keep: bool) 
     # Spin
     phase = x[:, _PHASE] if not keep else np.zeros(n)
     if tumbles:
-        omega = _tumbling_rates(asteroid, phase)
+        omega = asteroid.angular_velocities(phase)
         period = 2.0 * np.pi / np.linalg.norm(omega, axis=1)
     else:
         if known("spin_period_h"):
@@ -268,13 +280,20 @@ class Attitudes:
         """Attitudes of samples `first` to ``last - 1``."""
         return Attitudes(self.asteroid, self.draws.part(first, last), self.uniform[first:last])
 
-    def pole(self, i: int) -> Array:
-        """Direction of the angular momentum of sample `i`, ICRF."""
+    def matrices(self, samples: NDArray[np.int64]) -> Array:
+        """Rotations of samples, body axes -> ICRF, shape (n, 3, 3)."""
+        s = self.draws.axes[samples] ** 2
+        momentum = (s.sum(axis=1)[:, None] - s) * self.draws.omega[samples]
+        return attitude_matrices(momentum, self.poles[samples], 2.0 * np.pi * self.uniform[samples, 2])
+
+    @property
+    def poles(self) -> Array:
+        """Directions of the angular momentum of the samples, ICRF, shape (n, 3)."""
         known = self.asteroid.pole
-        return isotropic_direction(self.uniform[i, :2]) if known is None else known
+        if known is None:
+            return isotropic_directions(self.uniform[:, :2])
+        return np.tile(known, (len(self.uniform), 1))
 
     def matrix(self, i: int) -> Array:
         """Rotation of sample `i`, body axes -> ICRF."""
-        s = self.draws.axes[i] ** 2
-        momentum = (s.sum() - s) * self.draws.omega[i]
-        return attitude_matrix(momentum, self.pole(i), 2.0 * np.pi * float(self.uniform[i, 2]))
+        return self.matrices(np.array([i]))[0]

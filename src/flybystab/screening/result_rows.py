@@ -125,9 +125,9 @@ def _rise(most: float, rest: float) -> float:
 
 def sample_rows(passage: Passage, attitudes: Attitudes, result: SampleVerdicts) -> Iterator[Row]:
     """Rows of the samples of one encounter."""
-    draw = attitudes.draws
+    draw, poles = attitudes.draws, attitudes.poles
     for i in range(len(draw.rho)):
-        pole = attitudes.pole(i)
+        pole = poles[i]
         yield {
             "asteroid": passage.asteroid.name,
             "planet": passage.planet,

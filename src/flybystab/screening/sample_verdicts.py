@@ -9,14 +9,12 @@ from typing import Any
 import astropy.units as u
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import binomtest, rankdata
 
 from flybystab.body.body import Material
 from flybystab.core.ellipsoid.yield_bound import INTACT, UNDECIDED, quick_margins
-from flybystab.encounter.attitude import periapsis_axes
 from flybystab.errors import FlybystabError
 from flybystab.flybys.flyby import LOOSER
-from flybystab.flybys.flyby_many import flyby_many
+from flybystab.flybys.flyby_many import follow_rows
 from flybystab.flybys.verdict import Verdict
 from flybystab.screening.draws import Attitudes, Draws
 from flybystab.screening.encounters import Passage
@@ -184,16 +182,15 @@ def sample_verdicts(
             out.error[i] = failure
     elif todo:
         encounter = passage.meet()
-        frame = periapsis_axes(encounter)
-        bodies = [draw.body(i, material) for i in todo]
-        turns = [frame @ attitudes.matrix(i) for i in todo]
-        table = flyby_many(bodies, [encounter] * len(todo), turns, tolerance=tolerance, workers=1)
+        some = np.array(todo)
+        rows = draw.rows(some, attitudes.matrices(some), material)
+        table = follow_rows(rows, [encounter], tolerance=tolerance, workers=1)
         for k, i in enumerate(todo):
             out.error[i] = str(table.failure[k])
             out.verdict[i] = "" if out.error[i] else str(table.verdict[k])
             out.margin[i] = np.radians(table.margin[k].to_value(u.deg))
         if measure and dynamic[0] and not out.error[0]:
-            looser = flyby_many(bodies[:1], [encounter], turns[:1], tolerance=LOOSER * tolerance, workers=1)
+            looser = follow_rows(rows[:1], [encounter], tolerance=LOOSER * tolerance, workers=1)
             pair = [t.max_required_friction_angle[0].to_value(u.deg) for t in (looser, table)]
             out.numerical = 0.0 if pair[0] == pair[1] else float(abs(pair[0] - pair[1]))
     return out
@@ -220,12 +217,16 @@ def wilson(successes: int, trials: int) -> tuple[float, float]:
     """Wilson score interval of a probability at 95 % confidence (`scipy.stats.binomtest`); (0, 1) without trials."""
     if trials == 0:
         return 0.0, 1.0
+    from scipy.stats import binomtest
+
     interval = binomtest(successes, trials).proportion_ci(confidence_level=0.95, method="wilson")
     return float(interval.low), float(interval.high)
 
 
 def contributors(inputs: dict[str, Array], outcome: Array, most: int = 3) -> str:
     """Inputs with the strongest Spearman rank correlation with the outcome."""
+    from scipy.stats import rankdata
+
     good = np.isfinite(outcome)
     if good.sum() < 8 or np.ptp(outcome[good]) == 0.0:
         return ""
