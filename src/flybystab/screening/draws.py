@@ -126,7 +126,7 @@ def free_rotation(asteroid: Asteroid, draw: Draws, phases: int = 720) -> Draws:
     """The catalogue body, a draw of one, at equally spaced phases of its free rotation; itself unless it tumbles."""
     if not asteroid.tumbles:
         return draw
-    omega = _tumbling_rates(asteroid, np.arange(phases) / phases)
+    omega = asteroid.angular_velocities(np.arange(phases) / phases)
     axes, rho, phi, cohesion = (
         np.repeat(x, phases, axis=0) for x in (draw.axes, draw.rho, draw.phi, draw.cohesion)
     )
