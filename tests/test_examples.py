@@ -1,5 +1,6 @@
 """Every example runs, and one number of each is held against what it must be."""
 
+import re
 import runpy
 from pathlib import Path
 
@@ -7,6 +8,8 @@ import astropy.units as u
 import numpy as np
 import pytest
 from astropy.table import QTable
+
+from flybystab.cli.main import main
 
 EXAMPLES = Path(__file__).resolve().parents[1] / "examples"
 
@@ -145,3 +148,18 @@ def test_apophis_forecast(monkeypatch, tmp_path):
 def test_shape_slopes():
     """Published for shapes with relief at 1.29 g/cm3: up to 4 deg; a sphere 1.73 deg."""
     assert 1.73 < ran("shape_slopes.py")["largest"] < 4.5
+
+
+def test_obj_to_map(monkeypatch, tmp_path):
+    """The map of the example, and that of the command it names."""
+    monkeypatch.chdir(tmp_path)
+    names = ran("obj_to_map.py")
+    history = names["history"]
+    assert (tmp_path / "slopes.png").read_bytes()[:4] == b"\x89PNG"
+    # the tide of Apophis' perigee tilts gravity by (3/2) GM/d^3 over (4/3) pi G rho, 0.9 deg at 2.6 g/cm3
+    change = (history.extremes.greatest - history.extremes.least).max().to_value(u.deg)
+    assert 0.5 < change < 3.0
+    (command,) = re.findall(r"``flybystab (.*?)``", names["__doc__"])
+    words = command.replace("examples/", f"{EXAMPLES}/").replace("slopes.png", "shell.png").split()
+    assert main(words) == 0
+    assert (tmp_path / "shell.png").read_bytes()[:4] == b"\x89PNG"

@@ -1,6 +1,7 @@
 """Polyhedral shapes: mass properties, checks, files and gravity against closed forms and a second implementation."""
 
 import gzip
+import re
 
 import astropy.units as u
 import numpy as np
@@ -93,9 +94,10 @@ def test_body_of_a_shape():
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (lambda v, f: (v, f[1:]), "open edge"),
-        (lambda v, f: (v, np.vstack([f[:1, ::-1], f[1:]])), "turned over"),
-        (lambda v, f: (v, np.vstack([f, f[:1]])), "more meet"),
+        # without facet 0 its neighbours 1, 5 and 11 are open: 0, 4 and 10 of those left
+        (lambda v, f: (v, f[1:]), r"numbers 0, 4, 10 \(from 0\).*open edge"),
+        (lambda v, f: (v, np.vstack([f[:1, ::-1], f[1:]])), r"numbers 0.*turned over"),
+        (lambda v, f: (v, np.vstack([f, f[:1]])), r"numbers 0.*more meet"),
         (lambda v, f: (v * [1, 1, 0], f), "a solid body"),
         (lambda v, f: (v, f + 1), "numbered from 0 to 7"),
         (lambda v, f: (v[:, :2], f), "shape"),
@@ -118,8 +120,14 @@ def test_self_intersection_is_found_and_named():
     points = sphere.vertices.value.copy()
     k = int(np.argmax(points[:, 0]))
     points[k] = [-3.0, 0.0, 0.0]  # pulled through the opposite side
-    with pytest.raises(InvalidInput, match="do not intersect"):
+    with pytest.raises(InvalidInput, match="do not intersect") as refused:
         fs.Shape(points * u.m, sphere.facets)
+    named = {int(x) for x in re.search(r"numbers ([\d, ]+)", str(refused.value))[1].split(",") if x.strip()}
+    # the facets about the vertex pierce others: those named are among the two groups
+    about = set(np.flatnonzero((sphere.facets == k).any(axis=1)).tolist())
+    assert named & about
+    opposite = set(np.flatnonzero(sphere.centroids.value[:, 0] < 0.0).tolist())
+    assert named <= about | opposite
 
 
 def test_units_are_needed():

@@ -135,6 +135,21 @@ def test_screening_of_a_shape_in_the_shell(capsys, model, tmp_path):
     assert "one asteroid" in run(capsys, *words)[2]
 
 
+def test_bounds_on_the_material_of_a_shape(capsys, model):
+    """The equivalent ellipsoid of the shape is longer than a sphere of its volume and needs more friction."""
+    span = ("--from", "2029-04-01", "--to", "2029-05-01", "--within", "0.001", "--attitudes", "2", "--json")
+    status, out, err = run(capsys, "infer", "Apophis", *span, "--shape", model)
+    assert status == 0, err
+    shaped = fs.Asteroid.from_catalogue("Apophis").with_shape(SHAPE)
+    expected = fs.infer(shaped, attitudes=2)["friction_equilibrium"].to_value(u.deg)
+    got = [row["friction_equilibrium_deg"] for row in json.loads(out)["rows"]]
+    assert got == pytest.approx(expected, abs=1e-3)
+    plain = fs.infer(fs.Asteroid.from_catalogue("Apophis"), attitudes=2)["friction_equilibrium"].to_value(
+        u.deg
+    )
+    assert np.abs(expected - plain).max() > 0.01
+
+
 def test_units_of_shapes_are_lengths(model):
     with pytest.raises(UnitMismatch, match="unit of length"):
         fs.Shape.read(model, unit=u.s)

@@ -1,5 +1,9 @@
 """Rates of verdicts: budgets against encounter rates, limits of strong material, sampling errors that hold."""
 
+import signal
+import subprocess
+import sys
+
 import astropy.units as u
 import numpy as np
 import pytest
@@ -116,6 +120,46 @@ def test_a_run_is_resumed_from_its_journal_and_gives_the_same(tmp_path, earth):
     for name in earth.samples.colnames:
         assert np.array_equal(np.asarray(again.samples[name]), np.asarray(earth.samples[name]))
     assert sampled_encounters.ENDS  # the module that processes import
+
+
+CHILD = """
+import sys
+import numpy as np
+from astropy.table import QTable
+import flybystab as fs
+rng = np.random.default_rng(1)
+orbits = QTable({"a": rng.uniform(0.9, 2.5, 50), "e": rng.uniform(0.3, 0.7, 50), "i": rng.uniform(2, 30, 50)})
+def report(done, total):
+    print(done, flush=True)
+    if done == 3:
+        sys.stdin.read()  # waits for its end
+fs.disruption_rates(orbits, ["earth"], samples=160, seed=4, journal=sys.argv[1], progress=report)
+"""
+
+
+def test_a_run_that_was_killed_is_resumed(tmp_path, earth):
+    """SIGKILL after three of eight strata: the rest is computed, and the result is that of an undisturbed run."""
+    path = tmp_path / "rates.journal"
+    child = subprocess.Popen(
+        [sys.executable, "-c", CHILD, str(path)], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    )
+    assert [child.stdout.readline().strip() for _ in range(3)] == ["1", "2", "3"]
+    child.kill()
+    child.communicate()
+    assert child.returncode == -signal.SIGKILL
+    counts = []
+    again = fs.disruption_rates(
+        ORBITS,
+        ["earth"],
+        samples=160,
+        seed=4,
+        journal=path,
+        progress=lambda done, total: counts.append(done),
+    )
+    assert counts == [4, 5, 6, 7, 8]
+    assert not path.exists()
+    for name in earth.samples.colnames:
+        assert np.array_equal(np.asarray(again.samples[name]), np.asarray(earth.samples[name]))
 
 
 def test_processes_give_the_same(earth):

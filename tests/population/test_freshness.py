@@ -1,5 +1,7 @@
 """Probability of a fresh surface."""
 
+from dataclasses import replace
+
 import astropy.units as u
 import numpy as np
 import pytest
@@ -48,3 +50,22 @@ def test_apophis_before_and_after_2029():
     assert after.probability == 1.0
     with pytest.raises(InvalidInput, match="distances"):
         freshness(APOPHIS, {})
+
+
+def test_an_encounter_counts_with_the_share_of_the_orbits_that_have_it():
+    """The distance in 2029 of clones spreads by about 1 km: a limit at their median has half of them inside."""
+    orbit = APOPHIS.orbit
+    spread = fs.encounter_distribution(orbit, "earth", Time("2029-04-13", scale="tdb"), n=24, seed=3)
+    limit = {"earth": np.median(spread.distance.to_value(u.km)) * u.km}
+    options = {"now": Time("2030-01-01", scale="tdb"), "span": 5 * u.yr, "weathering": 1e4 * u.yr}
+    found = freshness(APOPHIS, limit, clones=24, seed=3, **options)
+    assert found.share_followed == 0.5
+    assert len(np.unique(found.followed["index"])) == 12
+    beyond = 1 - np.exp(-found.rate.to_value(1 / u.yr) * (1e4 - 5))
+    assert found.probability == pytest.approx(0.5 + 0.5 * beyond, rel=1e-9)
+    inside = {"earth": limit["earth"] + 30 * u.km}
+    assert freshness(APOPHIS, inside, clones=6, **options).probability == 1.0
+    body = fs.Body([200, 170, 150] * u.m, 2000 * u.kg / u.m**3, 5 * u.h)
+    bare = fs.Asteroid(orbit=replace(orbit, covariance=None), body=body)
+    with pytest.raises(InvalidInput, match="covariance"):
+        freshness(bare, limit, clones=6, **options)

@@ -16,6 +16,7 @@ from flybystab.cli.common import (
     span_arguments,
     tdb,
 )
+from flybystab.cli.shape_options import shape_arguments
 
 HELP = "bounds on friction, cohesion and density from the encounters that an asteroid survived"
 EXAMPLE = "flybystab infer Toutatis --output toutatis.png"
@@ -36,6 +37,7 @@ def arguments(sub: argparse.ArgumentParser) -> None:
     sub.add_argument("--seed", type=int, default=0, help="random seed of the attitudes (0)")
     material_arguments(sub)
     body_arguments(sub)
+    shape_arguments(sub)
     figure_argument(sub)
 
 

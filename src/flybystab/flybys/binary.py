@@ -1,12 +1,12 @@
-"""Binary asteroids in encounters: change of the mutual orbit, escape and collision of the companion.
+"""Binary asteroids in encounters: mutual orbit, escape, collision, and the spin of the companion.
 
-Primary and companion are point masses. Their separation ``d`` obeys
+Primary and companion are point masses unless a figure is given (:mod:`flybystab.flybys.binary_figures`): an oblate
+primary, and an ellipsoid as companion, whose rotation is then followed. The separation ``d`` of point masses obeys
 
     d'' = -G (m1 + m2) d/|d|^3 + K(t) d,
 
 ``K`` the tidal tensor of the encounter (planets, Moon, Sun and J2, as for the body). Terms of the next order are
-smaller by ``|d|/R``, ``R`` the distance from the planet: 1e-4 for kilometres at some planetary radii. The oblateness of
-the primary and the rotation of the companion are left out.
+smaller by ``|d|/R``, ``R`` the distance from the planet: 1e-4 for kilometres at some planetary radii.
 """
 
 from __future__ import annotations
@@ -23,6 +23,8 @@ from flybystab.body.body import Body
 from flybystab.constants import G
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput, NotConverged
+from flybystab.flybys.binary_figures import Figures, averaged, rotation_matrices, synchronous
+from flybystab.flybys.binary_figures import rates as figured
 from flybystab.tabular import Tabular
 from flybystab.typing import Array
 from flybystab.units import counted, to_si, whole
@@ -50,6 +52,14 @@ class BinarySample(Tabular):
         Least distance of the two during the encounter.
     fate : ndarray of str (n,)
         ``bound``, ``escape`` or ``collision``.
+    spin_ratio : ndarray (n,)
+        Effective spin rate of the companion (twice its energy over its angular momentum) after over before; nan for a
+        point mass and after a collision.
+    wobble : Quantity (n,)
+        Angle between the angular momentum of the companion and its axis of greatest inertia afterwards; zero for
+        principal rotation, about 90 deg in the long-axis mode; nan as `spin_ratio`.
+    obliquity : Quantity (n,)
+        Angle between the angular momenta of the companion and of the mutual orbit afterwards; nan as `spin_ratio`.
     tide_at_start : float
         Tide at the start of the encounter over ``G (m1 + m2)/a^3``: what is left out of the time before.
     seed : int
@@ -60,6 +70,9 @@ class BinarySample(Tabular):
     plane_change: Quantity
     closest: Quantity
     fate: NDArray[np.str_]
+    spin_ratio: Array
+    wobble: Quantity
+    obliquity: Quantity
     tide_at_start: float
     seed: int
 
@@ -81,7 +94,9 @@ def binary_flyby(
     encounter: Encounter,
     semi_major_axis: Quantity,
     *,
-    mass_ratio: float = 0.01,
+    mass_ratio: float | None = None,
+    companion: Body | None = None,
+    oblate: bool = False,
     eccentricity: float = 0.0,
     normal: Quantity | Array | None = None,
     samples: int = 64,
@@ -99,7 +114,14 @@ def binary_flyby(
     semi_major_axis, eccentricity
         Of the mutual orbit before the encounter.
     mass_ratio : float
-        Mass of the companion over that of the primary; it has the density of the primary.
+        Mass of the companion over that of the primary, 0.01 by default; it has the density of the primary. Not with
+        `companion`.
+    companion : Body, optional
+        An ellipsoid in synchronous rotation: its longest axis points to the primary at the start, and it turns about
+        its shortest axis, which is normal to the orbit, with the mean motion. Its own spin is not used.
+    oblate : bool
+        Whether the figure of the primary acts on the orbit, averaged about its shortest axis, which is normal to the
+        orbit at the start.
     normal : array_like (3,), optional
         Direction of the orbital angular momentum in the frame of the encounter; isotropic by default.
     samples, seed : int
@@ -118,11 +140,11 @@ def binary_flyby(
     if not isinstance(encounter, Encounter) or encounter.impact:
         raise InvalidInput("encounter", encounter, "a flybystab.Encounter whose path clears the planet")
     a = to_si(semi_major_axis, u.m, "semi_major_axis", low=0.0, open_low=True)
-    ratio = to_si(mass_ratio, u.dimensionless_unscaled, "mass_ratio", low=0.0, high=1.0)
+    ratio, second_radius = _companion(primary, companion, mass_ratio)
     e = to_si(eccentricity, u.dimensionless_unscaled, "eccentricity", low=0.0, high=1.0, open_high=True)
     n = whole(samples, "samples", 1)
     mass = float(primary.mass.to_value(u.kg)) * (1.0 + ratio)
-    contact = float(primary.mean_radius.to_value(u.m)) * (1.0 + np.cbrt(ratio))
+    contact = float(primary.mean_radius.to_value(u.m)) + second_radius
     if a * (1.0 - e) <= contact:
         raise InvalidInput(
             "semi_major_axis", semi_major_axis, f"a mutual orbit clear of contact at {contact:.4g} m"
@@ -134,8 +156,20 @@ def binary_flyby(
     unit = np.sqrt(a**3 / (G * mass))
     state = _states(e, mean_anomaly, frames)
     before = np.cross(state[:, :3], state[:, 3:])
-    state, closest, collided = _carried(state, encounter, unit, contact / a)
-    x, v = state[:, :3], state[:, 3:]
+    figures = None
+    if companion is not None or oblate:
+        pole = frames[:, :, 2]
+        figures = Figures(
+            averaged(primary.axes / a, pole) if oblate else np.zeros((n, 3, 3)),
+            np.full(3, second_radius**2 / a**2 / 5.0)
+            if companion is None
+            else companion.axes**2 / a**2 / 5.0,
+            1.0 / (1.0 + ratio),
+        )
+        state = np.concatenate([state, *synchronous(frames, state, 1.0)], axis=1)
+    first = state
+    state, closest, collided = _carried(state, encounter, unit, contact / a, figures)
+    x, v = state[:, :3], state[:, 3:6]
     after = np.cross(x, v)
     r = np.linalg.norm(x, axis=1)
     energy = 0.5 * np.sum(v * v, axis=1) - 1.0 / r
@@ -143,14 +177,57 @@ def binary_flyby(
     fate = np.where(collided, COLLISION, np.where(energy < 0.0, BOUND, ESCAPE))
     cosine = np.sum(before * after, axis=1) / (np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1))
     lost = np.where(collided, np.nan, 1.0)
+    spin_ratio, wobble, obliquity = np.full((3, n), np.nan)
+    if companion is not None and figures is not None:
+        spin_ratio, wobble, obliquity = _rotation(first, state, after, figures) * lost
     return BinarySample(
         semi_major_axis=-0.5 / energy * a * lost * u.m,
         eccentricity=np.linalg.norm(vector, axis=1) * lost,
         plane_change=np.rad2deg(np.arccos(np.clip(cosine, -1.0, 1.0))) * lost * u.deg,
         closest=closest * a * u.m,
         fate=fate,
+        spin_ratio=spin_ratio,
+        wobble=np.rad2deg(wobble) * u.deg,
+        obliquity=np.rad2deg(obliquity) * u.deg,
         tide_at_start=float(np.linalg.norm(encounter.tidal_tensor(encounter.t_start)) * unit**2),
         seed=int(seed),
+    )
+
+
+def _companion(primary: Body, companion: Body | None, mass_ratio: float | None) -> tuple[float, float]:
+    """Mass ratio and mean radius (m) of the companion."""
+    radius = float(primary.mean_radius.to_value(u.m))
+    if companion is None:
+        given = 0.01 if mass_ratio is None else mass_ratio
+        ratio = to_si(given, u.dimensionless_unscaled, "mass_ratio", low=0.0, high=1.0)
+        return ratio, radius * float(np.cbrt(ratio))
+    if not isinstance(companion, Body):
+        raise InvalidInput("companion", companion, "a flybystab.Body")
+    if mass_ratio is not None:
+        raise InvalidInput("mass_ratio", mass_ratio, "none with a companion: it follows from the two bodies")
+    ratio = float((companion.mass / primary.mass).to_value(u.one))
+    if ratio > 1.0:
+        raise InvalidInput("companion", companion, "a body that is not heavier than the primary")
+    return ratio, float(companion.mean_radius.to_value(u.m))
+
+
+def _rotation(first: Array, last: Array, orbital: Array, figures: Figures) -> Array:
+    """Ratio of the effective spin rates, wobble and obliquity (rad) of the companions, (3, n)."""
+    moments = figures.companion.sum() - figures.companion
+    momentum = last[:, 10:] * moments
+    size = np.linalg.norm(momentum, axis=1)
+    effective = [
+        np.sum(y[:, 10:] ** 2 * moments, axis=1) / np.linalg.norm(y[:, 10:] * moments, axis=1)
+        for y in (first, last)
+    ]
+    outside = np.einsum("nij,nj->ni", rotation_matrices(last[:, 6:10]), momentum)
+    across = np.linalg.norm(np.cross(outside, orbital), axis=1)
+    return np.array(
+        [
+            effective[1] / effective[0],
+            np.arccos(np.clip(np.abs(momentum[:, 2]) / size, 0.0, 1.0)),
+            np.arctan2(across, np.sum(outside * orbital, axis=1)),
+        ]
     )
 
 
@@ -190,25 +267,30 @@ def _states(e: float, mean_anomaly: Array, frames: Array) -> Array:
 
 
 def _carried(
-    state: Array, encounter: Encounter, unit: float, contact: float
+    state: Array, encounter: Encounter, unit: float, contact: float, figures: Figures | None = None
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
     """Integrate all members together; returns states at the end, least distances, and which of them touched.
 
     A member that touches stays where it is: the others go on from there.
     """
-    n = len(state)
+    n, width = state.shape
     moving = np.ones(n, dtype=bool)
     closest = np.linalg.norm(state[:, :3], axis=1)
     t, stop = encounter.t_start / unit, encounter.t_stop / unit
     scale = unit**2
 
     def rates(time: float, flat: Array) -> Array:
-        y = flat.reshape(n, 6)
+        y = flat.reshape(n, width)
+        tide = encounter.tidal_tensor(time * unit) * scale
+        if figures is not None:
+            out = figured(y, tide, figures)
+            out[~moving] = 0.0
+            return out.ravel()
         x = y[:, :3]
         out = np.empty_like(y)
         out[:, :3] = y[:, 3:]
         r2 = np.sum(x * x, axis=1)
-        out[:, 3:] = -x / (r2 * np.sqrt(r2))[:, None] + x @ (encounter.tidal_tensor(time * unit) * scale)
+        out[:, 3:] = -x / (r2 * np.sqrt(r2))[:, None] + x @ tide
         out[~moving] = 0.0
         return out.ravel()
 
@@ -224,11 +306,11 @@ def _carried(
                 raise NotConverged(f"mutual orbit of the binary: {message or 'too many steps'}")
             dense = solver.dense_output()
             times = solver.t_old + _CHECKS * (solver.t - solver.t_old)
-            distance = np.linalg.norm(dense(times).reshape(n, 6, -1)[:, :3], axis=1)
+            distance = np.linalg.norm(dense(times).reshape(n, width, -1)[:, :3], axis=1)
             closest[moving] = np.minimum(closest[moving], distance.min(axis=1)[moving])
             now = moving & (distance.min(axis=1) <= contact)
             if now.any():
                 moving &= ~now
                 touched = True
         t, y = solver.t, solver.y
-    return y.reshape(n, 6), closest, ~moving
+    return y.reshape(n, width), closest, ~moving

@@ -22,7 +22,7 @@ from flybystab.errors import InvalidInput
 from flybystab.orbit.search.encounter_finder import find_encounters
 from flybystab.population.rates import encounter_rates
 from flybystab.typing import Array
-from flybystab.units import checked_time, to_si
+from flybystab.units import checked_time, to_si, whole
 
 #: Weathering time by default, yr.
 WEATHERING = 1e6 * u.yr
@@ -41,13 +41,19 @@ class Freshness:
     span : Quantity
         Time before `now` over which encounters were followed, yr.
     followed : QTable
-        The refreshing encounters in that time.
+        The refreshing encounters in that time; ``index`` is the number of the clone.
+    share_followed : float
+        Share of the possible orbits with such an encounter younger than the weathering time: 0 or 1 without clones.
+    clones : int
+        Number of possible orbits; zero for the nominal orbit alone.
     """
 
     probability: float
     rate: Quantity
     span: Quantity
     followed: QTable
+    share_followed: float = 0.0
+    clones: int = 0
 
     def __repr__(self) -> str:
         return (
@@ -89,6 +95,8 @@ def freshness(
     weathering: Quantity = WEATHERING,
     now: Time | None = None,
     span: Quantity = 100.0 * u.yr,
+    clones: int = 0,
+    seed: int = 0,
 ) -> Freshness:
     """Probability that the surface of an asteroid is fresh.
 
@@ -102,8 +110,13 @@ def freshness(
     now : Time, optional
         Epoch of the elements by default.
     span : Quantity
-        Time over which the nominal orbit is followed back. The ephemeris must cover it, and the orbit should be known
-        over it: choose it shorter for a poor orbit.
+        Time over which the orbit is followed back. The ephemeris must cover it. Without clones the nominal orbit should
+        be known over it: choose it shorter for a poor orbit.
+    clones : int
+        Number of orbits drawn from the covariance and followed back instead of the nominal one: the probability is the
+        mean over them, so that an encounter counts with the share of the orbits that have it.
+    seed : int
+        Of the clones.
 
     Returns
     -------
@@ -124,13 +137,18 @@ def freshness(
     aged = to_si(weathering, u.yr, "weathering", low=0.0, open_low=True)
     names = list(distances)
     limits = [to_si(distances[n], u.m, f"distances[{n!r}]", low=0.0, open_low=True) for n in names]
-    table = find_encounters(asteroid, end - years * u.yr, end, planets=names, within=np.array(limits) * u.m)
+    count = whole(clones, "clones", 0)
+    orbits = list(asteroid.orbit.clones(count, seed)) if count else [asteroid.orbit]
+    table = find_encounters(orbits, end - years * u.yr, end, planets=names, within=np.array(limits) * u.m)
     table = table[table["planet"] != "sun"]
-    ages = (end - table["time"]).to_value(u.yr) if len(table) else np.zeros(0)
+    age = (end - table["time"]).to_value(u.yr) if len(table) else np.zeros(0)
+    number = np.asarray(table["index"], dtype=int)
+    ages = [age[number == k] for k in range(len(orbits))]
     rates = [
         float(encounter_rates([asteroid], n, periapsis=q * u.m).rate[0].to_value(1 / u.yr))
         for n, q in zip(names, limits, strict=True)
     ]
     total = float(np.sum(rates))
-    probability = fresh_probability([ages], years, total, aged)
-    return Freshness(probability, total / u.yr, years * u.yr, table)
+    probability = fresh_probability(ages, years, total, aged)
+    share = float(np.mean([np.any(a <= aged) for a in ages]))
+    return Freshness(probability, total / u.yr, years * u.yr, table, share, count)
