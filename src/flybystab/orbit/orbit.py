@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import astropy.units as u
@@ -16,7 +16,7 @@ from flybystab.constants import AU, DAY
 from flybystab.errors import FlybystabWarning, Impact, InaccurateOrbit, InvalidInput, UnknownName
 from flybystab.orbit.barycentre import barycentre_in, barycentre_of_de440
 from flybystab.orbit.closest_approach import first_contact
-from flybystab.orbit.covariance import Covariance
+from flybystab.orbit.covariance import PUSHES, Covariance
 from flybystab.orbit.elements import (
     GM_SUN,
     ecliptic_to_icrf,
@@ -29,6 +29,7 @@ from flybystab.orbit.ephemeris import BELT, BODIES, N_BODIES, Ephemeris, Window,
 from flybystab.orbit.forces import FORCES, NonGravitational, model
 from flybystab.orbit.ias15 import EPSILON, TIGHT, Flight
 from flybystab.orbit.planets import PLANETS
+from flybystab.orbit.state_transition import StateTransition, derivatives
 from flybystab.typing import Array
 from flybystab.units import brief, checked_time, to_si, whole
 
@@ -342,6 +343,88 @@ class Orbit:
                 stacklevel=3,
             )
         return flight.state
+
+    def state_transition(self, time: Time, ephemeris: str | Ephemeris | None = None) -> StateTransition:
+        """Derivatives of the state at another time by the state at the epoch and the non-gravitational parameters.
+
+        The variational equations are integrated with the orbit and all its forces, twice, with tolerances a factor of
+        100 apart (:mod:`flybystab.orbit.state_transition`).
+
+        Parameters
+        ----------
+        time : Time
+            Any scale; TDB is used.
+        ephemeris : str or Ephemeris, optional
+            The best one installed by default.
+
+        Returns
+        -------
+        StateTransition
+            With the attributes `matrix`, `parameters` and `error`.
+
+        Raises
+        ------
+        OutOfSpan
+            The ephemeris does not cover the epoch or the time.
+        Impact
+            The asteroid hits the Sun, a planet or the Moon on the way.
+        """
+        eph = _ephemeris(ephemeris)
+        t = seconds(_epoch(time), self.epoch)
+        window = eph.window(self.epoch, min(t, 0.0), max(t, 0.0))
+        if t != 0.0:
+            self._propagated(window, t)
+        forces = without_itself(default_forces(self, *BODIES), self, window)
+        found, error = derivatives(
+            model(window, forces, self.nongrav),
+            self.nongrav.row,
+            0.0,
+            self.barycentric(window),
+            window.states(BODIES.index("sun"), np.zeros(1))[0],
+            t,
+        )
+        return StateTransition(self.epoch.tdb, later(self.epoch, t), found[:, :6], found[:, 6:], error)
+
+    def covariance_at(self, time: Time, ephemeris: str | Ephemeris | None = None) -> Covariance:
+        """Covariance of the heliocentric state at another time, to first order.
+
+        Right where one sigma is small against the scale on which the forces change; after a close encounter compare
+        with :meth:`clones`.
+
+        Parameters
+        ----------
+        time, ephemeris
+            As in :meth:`state_transition`.
+
+        Returns
+        -------
+        Covariance
+            Of x, y, z, vx, vy, vz (ICRF) and of the non-gravitational parameters that were estimated.
+
+        Raises
+        ------
+        InvalidInput
+            The orbit has no covariance.
+        OutOfSpan, Impact
+        """
+        known = self._known("a covariance at another time").as_state()
+        there = deviated(self, known.epoch, np.zeros((1, 6)), np.zeros((1, len(PUSHES))), "", ephemeris)[0]
+        change = there.state_transition(time, ephemeris)
+        extra = [name for name in PUSHES if name in known.names]
+        full = np.eye(6 + len(extra))
+        full[:6, :6] = change.matrix
+        full[:6, 6:] = change.parameters[:, [PUSHES.index(name) for name in extra]]
+        matrix = full @ known.matrix @ full.T
+        r, v = there.at(time, "sun", ephemeris)
+        mean = np.concatenate([r.to_value(u.m), v.to_value(_SPEED), known.values[6:]])
+        return replace(
+            known,
+            epoch=change.time,
+            values=mean,
+            matrix=0.5 * (matrix + matrix.T),
+            centre="sun",
+            frame="ICRF",
+        )
 
     def to_skyfield(self, centre: str = "sun", ephemeris: str | Ephemeris | None = None) -> OrbitVector:
         """Position as a vector function of skyfield, with all forces.
