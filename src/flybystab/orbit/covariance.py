@@ -41,6 +41,8 @@ _SI: Mapping[str, u.UnitBase] = (
     | dict.fromkeys(PUSHES[:3], u.m / u.s**2)
     | {"e": u.dimensionless_unscaled, "tp": u.s, "DT": u.s, "AMRAT": u.m**2 / u.kg}
 )
+#: Caveat of a covariance by the printed digits of an orbit, which says nothing of the error of the orbit itself.
+DIGITS = "by the digits of its elements"
 #: Largest negative eigenvalue of the correlation matrix that is attributed to rounding of the published digits.
 _ROUNDING = 1e-6
 
@@ -160,6 +162,11 @@ class Covariance:
     def sigma(self) -> Array:
         """1-sigma of each parameter, SI, shape (n,)."""
         return np.sqrt(np.diag(self.matrix))
+
+    @property
+    def digits_alone(self) -> bool:
+        """Whether it holds the rounding of printed elements alone: the error of the orbit is not known then."""
+        return self.caveat == DIGITS
 
     @property
     def elements(self) -> str:

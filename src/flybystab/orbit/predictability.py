@@ -35,7 +35,7 @@ class Predictability(StrEnum):
     ``determined``: below a tenth of the closest distance. ``uncertain``: below the distance itself: there is such an
     encounter, but its digits are not reliable. ``one of many``: as large as the distance or larger, or the encounter
     does not happen on the displaced orbit: it is one of many possible. ``unknown``: no error of the orbit is known,
-    and a shift of a metre and the error of the model stay below a tenth of the distance.
+    and a shift of a metre (or that of its printed digits) and the error of the model are below a tenth of the distance.
     """
 
     DETERMINED = "determined"
@@ -74,7 +74,8 @@ class Deviations:
     label : str
         Description.
     known : bool
-        False where the orbit has no covariance: a shift of one metre away from the Sun takes the place of sigma.
+        False where the orbit has no covariance, so that a shift of one metre away from the Sun takes the place of
+        sigma, or one by its printed digits alone.
     scale : float
         Factor from the points to one sigma or one metre.
     """
@@ -108,4 +109,4 @@ def deviations_of(orbit: Orbit, ephemeris: str | Ephemeris | None = None) -> Dev
     found = [covariance.deviations(covariance.values + sign * covariance.factor.T) for sign in (1.0, -1.0)]
     states, pushes = (np.array(x) for x in zip(*found, strict=True))
     label = "one sigma in the direction least known" + (f", {covariance.caveat}" if covariance.caveat else "")
-    return Deviations(there, states, pushes, label)
+    return Deviations(there, states, pushes, label, not covariance.digits_alone)

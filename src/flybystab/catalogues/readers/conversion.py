@@ -343,7 +343,9 @@ def printed_covariance(
     sigma = printed_sigmas(names, texts)
     if _displacement(names, values, sigma) < _NEGLIGIBLE:
         return None
-    what, caveat = f"digits of {source}", "by the digits of its elements"
+    from flybystab.orbit.covariance import DIGITS
+
+    what, caveat = f"digits of {source}", DIGITS
     if gm is not None or "x" in names:
         matrix = np.diag(sigma**2)
         return cartesian_covariance(jd, names, values, matrix, what, gm=gm, correlated=False, caveat=caveat)

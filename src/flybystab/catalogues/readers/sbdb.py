@@ -30,6 +30,7 @@ from flybystab.catalogues.readers.nongravitational import nongravitational_colum
 from flybystab.catalogues.readers.parameters import check_parameters, looks_like_parameter
 from flybystab.errors import InvalidInput
 from flybystab.files import parse_json
+from flybystab.orbit.covariance import DIGITS
 
 if TYPE_CHECKING:
     from flybystab.catalogues.readers import Entry
@@ -255,7 +256,9 @@ def _covariance(row: Mapping[str, str], file: str) -> Covariance | None:
     what = "1-sigmas" if digits is None else "printed digits and 1-sigmas"
     label = f"{what} without correlations, {source}"
     found = covariance_of(jd, [*names, *pushes], values, np.diag(sigma**2), label, file, correlated=False)
-    return found if digits is None else replace(found, caveat="by the digits of its elements")
+    if not all(sigmas):  # 1-sigmas of A1, A2, A3 say nothing of the elements
+        return replace(found, caveat=DIGITS)
+    return found if digits is None else replace(found, caveat="by the digits and 1-sigmas of its elements")
 
 
 def thousandfold(text: str, name: str, file: str) -> str:

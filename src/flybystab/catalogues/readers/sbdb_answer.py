@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -89,7 +90,9 @@ def _with_digits(row: Mapping[str, str], covariance: Covariance | None) -> Covar
     if digits is None or covariance is None:
         return covariance
     states, _ = covariance.deviations(covariance.values + covariance.factor.T)
-    return covariance if np.linalg.norm(states[:, :3]) > np.linalg.norm(digits.sigma[:3]) else digits
+    if np.linalg.norm(states[:, :3]) > np.linalg.norm(digits.sigma[:3]):
+        return covariance
+    return replace(digits, caveat="by the digits of its elements, which exceed the published errors")
 
 
 def _names(full: str, key: str) -> dict[str, str]:
