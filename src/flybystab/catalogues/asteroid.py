@@ -17,6 +17,7 @@ from flybystab.body.body import Body, Material
 from flybystab.body.shape import Shape
 from flybystab.catalogues.covariance_files import embedded_covariance
 from flybystab.catalogues.record import BODILY, ORBIT, ORBIT_SI, ORBITAL, PERIHELION, SHAPE, Record
+from flybystab.catalogues.spin_solutions import SpinSolution, solutions_of
 from flybystab.catalogues.tumbling import attitude_matrix, ecliptic_direction, free_spin, tumbling_state
 from flybystab.constants import DAY
 from flybystab.errors import InvalidInput
@@ -186,6 +187,30 @@ class Asteroid(Record):
         row["diameter_m"] = repr(2.0 * float(shape.mean_radius.value))
         row["assumed"] = ";".join(c for c in self.assumed if not c.startswith(("semi_axis", "diameter")))
         return replace(self, row=row)
+
+    def with_physical(self, *files: str | Path) -> Asteroid:
+        """The same asteroid with the physical parameters of files in place of its own, each with its source.
+
+        Parameters
+        ----------
+        *files : str or Path
+            Of any format of :mod:`flybystab.catalogues.physical`: an SBDB answer with ``phys_par``, a card of SsODNet,
+            a spin file of DAMIT, a table of the LCDB or of spin solutions. Spin solutions of all files are rivals
+            (:attr:`spin_solutions`).
+
+        Raises
+        ------
+        InvalidInput
+            A file cannot be read, or has no data of this asteroid.
+        """
+        from flybystab.catalogues.physical import with_physical
+
+        return with_physical(self, *files)
+
+    @cached_property
+    def spin_solutions(self) -> tuple[SpinSolution, ...]:
+        """Rival spin solutions, with weights; a screening draws one for each sample. Empty where there are none."""
+        return solutions_of(self.row)
 
     def with_tumbling(
         self,
@@ -426,6 +451,10 @@ class Asteroid(Record):
             out.append("shape from size and lightcurve amplitude")
         if "density_kg_m3" in self.assumed and not self.row.get("drawn"):
             out.append("density")
+        if self.spin_solutions:
+            total = sum(s.weight for s in self.spin_solutions)
+            share = max(s.weight for s in self.spin_solutions) / total
+            out.append(f"one of {len(self.spin_solutions)} rival spin solutions (weight {share:.0%})")
         if self.pole is None:
             out.append("pole unknown")
         if "spin_state" in self.assumed:

@@ -61,6 +61,13 @@ def _typed(text: str, unit: str, name: str) -> Measured:
 
 def body_arguments(sub: argparse.ArgumentParser) -> None:
     """Add the options of the body."""
+    sub.add_argument(
+        "--phys",
+        action="append",
+        metavar="FILE",
+        help="physical parameters: SBDB answer, SsODNet card, DAMIT spin.txt, LCDB or spin solutions as CSV; "
+        "may be repeated",
+    )
     sub.add_argument("--axes", metavar="AxBxC", help="semi-axes, with errors: '200x170x150+-10 m', '0.2 km'")
     sub.add_argument("--density", metavar="RHO", help="density: '2000+-300 kg/m3', '2 g/cm3'")
     sub.add_argument("--period", metavar="P", help="spin period: '5.3+-0.1 h'")
@@ -154,9 +161,13 @@ def with_body_options(asteroid: Any, options: argparse.Namespace) -> Any:
     """The asteroid with the values of the options in place of its own."""
     from dataclasses import replace
 
+    if getattr(options, "phys", None):
+        asteroid = asteroid.with_physical(*options.phys)
     row, names = _given(options)
     if not names:
         return asteroid
+    if "period" in names or "pole" in names:
+        row["spin_solutions"] = ""
     columns = {**asteroid.row, **row}
     columns["assumed"] = ";".join(c for c in asteroid.assumed if c not in row)
     return replace(asteroid, row=columns)

@@ -22,7 +22,8 @@ from flybystab.catalogues.catalogue import catalogue
 from flybystab.catalogues.lightcurves import periods_like
 from flybystab.catalogues.magnitude import diameter_of
 from flybystab.catalogues.record import SHAPE
-from flybystab.catalogues.tumbling import attitude_matrices, isotropic_directions
+from flybystab.catalogues.spin_solutions import chosen
+from flybystab.catalogues.tumbling import attitude_matrices, ecliptic_direction, isotropic_directions
 from flybystab.errors import InvalidInput
 from flybystab.flybys.batch import body_rows
 from flybystab.screening.distributions import truncated_normal
@@ -61,6 +62,8 @@ class Draws(NamedTuple):
         Phase of a tumbler in its rotation period.
     drawn : tuple of str
         Quantities drawn from a prior instead of the catalogue.
+    solution : ndarray (n,) of int
+        Number of the rival spin solution; -1 for the values of the catalogue.
     """
 
     axes: Array
@@ -71,6 +74,7 @@ class Draws(NamedTuple):
     omega: Array
     phase: Array
     drawn: tuple[str, ...]
+    solution: NDArray[np.int64]
 
     def part(self, first: int, last: int) -> Draws:
         """Samples `first` to ``last - 1``."""
@@ -105,7 +109,7 @@ class Draws(NamedTuple):
 
 
 #: Columns of uniform numbers behind a draw.
-_SIZE, _SHAPE, _FLAT, _THIRD, _DENSITY, _PERIOD, _FRICTION, _COHESION, _PHASE, _ALBEDO = range(10)
+_SIZE, _SHAPE, _FLAT, _THIRD, _DENSITY, _PERIOD, _FRICTION, _COHESION, _PHASE, _ALBEDO, _SOLUTION = range(11)
 _WIDTH = 12
 
 
@@ -131,7 +135,15 @@ def free_rotation(asteroid: Asteroid, draw: Draws, phases: int = 720) -> Draws:
         np.repeat(x, phases, axis=0) for x in (draw.axes, draw.rho, draw.phi, draw.cohesion)
     )
     period = 2.0 * np.pi / np.linalg.norm(omega, axis=1)
-    return draw._replace(axes=axes, rho=rho, phi=phi, cohesion=cohesion, omega=omega, period=period)
+    return draw._replace(
+        axes=axes,
+        rho=rho,
+        phi=phi,
+        cohesion=cohesion,
+        omega=omega,
+        period=period,
+        solution=np.repeat(draw.solution, phases),
+    )
 
 
 def completed(asteroid: Asteroid, population: Population | None = None) -> Asteroid:
@@ -241,11 +253,21 @@ def _draws(asteroid: Asteroid, x: Array, population: Population, *, keep: bool) 
 
     # Spin
     phase = x[:, _PHASE] if not keep else np.zeros(n)
+    solutions = () if tumbles else asteroid.spin_solutions
+    solution = (
+        chosen(solutions, x[:, _SOLUTION]) if solutions and not keep else np.full(n, -1, dtype=np.int64)
+    )
     if tumbles:
         omega = asteroid.angular_velocities(phase)
         period = 2.0 * np.pi / np.linalg.norm(omega, axis=1)
     else:
-        if known("spin_period_h"):
+        if solutions and not keep:
+            period = np.empty(n)
+            for k, s in enumerate(solutions):
+                u01 = x[solution == k, _PERIOD]
+                hours = truncated_normal(u01, s.period, s.sigma, 0.2 * s.period, 5.0 * s.period)
+                period[solution == k] = 3600.0 * hours
+        elif known("spin_period_h"):
             has_sigma = asteroid.knows("spin_period_sigma_h") and not keep
             centre, sd = value("spin_period_h"), value("spin_period_sigma_h") if has_sigma else 0.0
             period = 3600.0 * truncated_normal(x[:, _PERIOD], centre, sd, 0.2 * centre, 5.0 * centre)
@@ -259,7 +281,7 @@ def _draws(asteroid: Asteroid, x: Array, population: Population, *, keep: bool) 
 
     phi = np.radians(population.friction_angle_deg.quantile(x[:, _FRICTION]))
     cohesion = population.cohesion_Pa.quantile(x[:, _COHESION])
-    return Draws(axes, rho, period, phi, cohesion, omega, phase, tuple(drawn))
+    return Draws(axes, rho, period, phi, cohesion, omega, phase, tuple(drawn), solution)
 
 
 @dataclass(frozen=True)
@@ -289,10 +311,16 @@ class Attitudes:
     @property
     def poles(self) -> Array:
         """Directions of the angular momentum of the samples, ICRF, shape (n, 3)."""
-        known = self.asteroid.pole
-        if known is None:
-            return isotropic_directions(self.uniform[:, :2])
-        return np.tile(known, (len(self.uniform), 1))
+        known, solutions = self.asteroid.pole, self.asteroid.spin_solutions
+        if known is not None and not solutions:
+            return np.tile(known, (len(self.uniform), 1))
+        out = isotropic_directions(self.uniform[:, :2])
+        if known is not None:
+            out[self.draws.solution < 0] = known
+        for k, solution in enumerate(solutions):  # one without a pole leaves it unknown
+            if solution.pole is not None:
+                out[self.draws.solution == k] = ecliptic_direction(*np.radians(solution.pole).tolist())
+        return out
 
     def matrix(self, i: int) -> Array:
         """Rotation of sample `i`, body axes -> ICRF."""

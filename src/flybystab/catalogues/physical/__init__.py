@@ -1,0 +1,160 @@
+"""Readers of files with physical parameters of asteroids, one module per publisher, found by the content of a file.
+
+A module of this package registers a function with :func:`physical_reader`; nothing else is edited to add a format.
+"""
+
+from __future__ import annotations
+
+import importlib
+import pkgutil
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from flybystab.catalogues.spin_solutions import SpinSolution, solution_columns
+from flybystab.errors import InvalidInput
+from flybystab.files import read_bytes
+
+if TYPE_CHECKING:
+    from flybystab.catalogues.asteroid import Asteroid
+
+
+@dataclass(frozen=True)
+class PhysicalData:
+    """Physical parameters of one body.
+
+    Attributes
+    ----------
+    names : tuple of str
+        Number, name, designation as far as the file gives them; none where it does not name its body.
+    row : mapping of str to str
+        Columns of a catalogue, with their sources.
+    spins : tuple of SpinSolution
+        One solution, or rivals.
+    """
+
+    names: tuple[str, ...]
+    row: Mapping[str, str]
+    spins: tuple[SpinSolution, ...] = ()
+
+
+@dataclass(frozen=True)
+class PhysicalReader:
+    """A file format: its name, whether a text has it, and the bodies of a text (arguments: text, name of the file)."""
+
+    name: str
+    identify: Callable[[str], bool]
+    read: Callable[[str, str], list[PhysicalData]]
+
+
+PHYSICAL_READERS: dict[str, PhysicalReader] = {}
+
+_Read = Callable[[str, str], list[PhysicalData]]
+
+
+def physical_reader(name: str, identify: Callable[[str], bool]) -> Callable[[_Read], _Read]:
+    """Register the decorated function as the reader of a format."""
+
+    def register(read: _Read) -> _Read:
+        PHYSICAL_READERS[name] = PhysicalReader(name, identify, read)
+        return read
+
+    return register
+
+
+@lru_cache(maxsize=1)
+def _load() -> None:
+    for module in pkgutil.iter_modules(__path__):
+        importlib.import_module(f"{__name__}.{module.name}")
+
+
+def physical_reader_names() -> tuple[str, ...]:
+    """Names of the formats."""
+    _load()
+    return tuple(PHYSICAL_READERS)
+
+
+def read_physical(path: str | Path) -> list[PhysicalData]:
+    """The bodies of a file of physical parameters; gzipped files are decompressed.
+
+    Raises
+    ------
+    InvalidInput
+        The file cannot be read, or has no known format.
+    """
+    raw = read_bytes(path, "file of physical parameters")
+    try:
+        text = raw.decode("utf-8-sig").replace("\r\n", "\n")
+    except UnicodeDecodeError as error:
+        raise InvalidInput("file of physical parameters", path, f"a text ({error})") from None
+    for reader in (PHYSICAL_READERS[name] for name in physical_reader_names()):
+        if reader.identify(text):
+            return reader.read(text, Path(path).name)
+    raise InvalidInput(
+        "file of physical parameters", path, f"a file of one of: {', '.join(physical_reader_names())}"
+    )
+
+
+def with_physical(asteroid: Asteroid, *paths: str | Path) -> Asteroid:
+    """An asteroid with the values of files in place of its own.
+
+    A file without names is taken for this asteroid; of a table, the rows with one of its names. Later files replace
+    values of earlier ones; their spin solutions are rivals. A new diameter scales known semi-axes.
+
+    Raises
+    ------
+    InvalidInput
+        A file has no data of this asteroid.
+    """
+    from flybystab.catalogues.record import key_of
+
+    keys = {key_of(name) for name in asteroid.names}
+    given: dict[str, str] = {}
+    spins: list[SpinSolution] = []
+    for path in paths:
+        bodies = read_physical(path)
+        mine = [b for b in bodies if not b.names or keys & {key_of(n) for n in b.names}]
+        if not mine:
+            shown = ", ".join(b.names[0] for b in bodies[:5]) or "none"
+            raise InvalidInput(
+                "file of physical parameters", path, f"data of {asteroid.label}; it has: {shown}"
+            )
+        for body in mine:
+            given |= {c: v for c, v in body.row.items() if v}
+            spins += body.spins
+    row = dict(asteroid.row) | _scaled(asteroid, given)
+    if spins:
+        row |= solution_columns(spins)
+        row["spin_state"] = given.get("spin_state") or row["spin_state"]
+    own = {c for c in row if row[c] != asteroid.row.get(c)}
+    row["assumed"] = ";".join(c for c in asteroid.assumed if c not in own)
+    return replace(asteroid, row=row)
+
+
+def _scaled(asteroid: Asteroid, given: Mapping[str, str]) -> dict[str, str]:
+    """The columns given, with the semi-axes of the asteroid scaled to a new diameter."""
+    from flybystab.catalogues.record import SHAPE
+
+    out = dict(given)
+    if "diameter_m" in out:
+        out.setdefault("diameter_sigma_m", "")
+    if "density_kg_m3" in out:
+        out.setdefault("density_sigma_kg_m3", "")
+        out["density_assumed"] = "false"
+    if all(c in out for c in SHAPE):
+        axes = [float(out[c]) for c in SHAPE]
+        out.setdefault("diameter_m", repr(2.0 * (axes[0] * axes[1] * axes[2]) ** (1.0 / 3.0)))
+        return out | {"shape_kind": "measured"}
+    if "diameter_m" in out and asteroid.knows(*SHAPE):
+        axes = asteroid.semi_axes.value.tolist()
+        factor = 0.5 * float(out["diameter_m"]) / (axes[0] * axes[1] * axes[2]) ** (1.0 / 3.0)
+        out |= {c: repr(x * factor) for c, x in zip(SHAPE, axes, strict=True)}
+    return out
+
+
+def source_of(publisher: str, items: Sequence[Mapping[str, object]], file: str) -> str:
+    """Source of a value: publisher, references by ``shortbib``, file."""
+    refs = ", ".join(str(x.get("shortbib")) for x in items if x.get("shortbib"))
+    return f"{publisher}: {refs} ({file})" if refs else f"{publisher} ({file})"
