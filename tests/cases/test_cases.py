@@ -175,7 +175,9 @@ def test_a_reader_is_one_registered_function(tmp_path, monkeypatch):
     monkeypatch.setattr(readers, "READERS", dict(readers.READERS))
     readers.reader_of("")  # loads the modules
 
-    @readers.reader("test", lambda text: text.startswith("MINE "))
+    contents = readers.Contents("a, e, i, node, peri, M", "none", "none", "none")
+
+    @readers.reader("test", lambda text: text.startswith("MINE "), contents)
     def read(text, file):
         return [({"name": text.split()[1]}, None)]
 

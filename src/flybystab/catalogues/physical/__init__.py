@@ -42,11 +42,24 @@ class PhysicalData:
 
 @dataclass(frozen=True)
 class PhysicalReader:
-    """A file format: its name, whether a text has it, and the bodies of a text (arguments: text, name of the file)."""
+    """A file format.
+
+    Attributes
+    ----------
+    name : str
+    identify : callable
+        Whether a text has this format; it must not raise.
+    read : callable
+        Bodies of a text; the second argument is the name of the file.
+    physical, spin : str
+        What is read, for the table in ``docs/inputs.md``.
+    """
 
     name: str
     identify: Callable[[str], bool]
     read: Callable[[str, str], list[PhysicalData]]
+    physical: str
+    spin: str
 
 
 PHYSICAL_READERS: dict[str, PhysicalReader] = {}
@@ -54,11 +67,13 @@ PHYSICAL_READERS: dict[str, PhysicalReader] = {}
 _Read = Callable[[str, str], list[PhysicalData]]
 
 
-def physical_reader(name: str, identify: Callable[[str], bool]) -> Callable[[_Read], _Read]:
+def physical_reader(
+    name: str, identify: Callable[[str], bool], physical: str, spin: str
+) -> Callable[[_Read], _Read]:
     """Register the decorated function as the reader of a format."""
 
     def register(read: _Read) -> _Read:
-        PHYSICAL_READERS[name] = PhysicalReader(name, identify, read)
+        PHYSICAL_READERS[name] = PhysicalReader(name, identify, read, physical, spin)
         return read
 
     return register

@@ -20,7 +20,7 @@ _FIRST = re.compile(
 )
 
 
-@physical_reader("DAMIT spin", lambda text: bool(_FIRST.match(text)))
+@physical_reader("DAMIT spin", lambda text: bool(_FIRST.match(text)), "none", "period and pole")
 def read_spin(text: str, file: str) -> list[PhysicalData]:
     """The solution of a file.
 

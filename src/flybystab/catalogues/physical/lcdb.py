@@ -30,7 +30,12 @@ def _is_lcdb(text: str) -> bool:
     return {"Number", "Name", "Period", "U"} <= {_plain(c) for c in header_of(text)}
 
 
-@physical_reader("LCDB (CSV)", _is_lcdb)
+@physical_reader(
+    "LCDB (CSV)",
+    _is_lcdb,
+    "H, diameter, lightcurve amplitude, taxonomic class",
+    "periods of the best quality; tumbling",
+)
 def read_lcdb(text: str, file: str) -> list[PhysicalData]:
     """Rows of a table, one for each asteroid.
 
@@ -87,7 +92,7 @@ def _is_solutions(text: str) -> bool:
     }  # fmt: skip
 
 
-@physical_reader("spin solutions (CSV)", _is_solutions)
+@physical_reader("spin solutions (CSV)", _is_solutions, "none", "periods with errors, poles, weights")
 def read_solutions(text: str, file: str) -> list[PhysicalData]:
     """Rival solutions, by the name of their asteroid if there is such a column.
 

@@ -13,7 +13,12 @@ from flybystab.errors import InvalidInput
 from flybystab.files import parse_json
 
 
-@physical_reader("SBDB phys_par", lambda text: text.lstrip().startswith("{") and '"phys_par"' in text)
+@physical_reader(
+    "SBDB phys_par",
+    lambda text: text.lstrip().startswith("{") and '"phys_par"' in text,
+    "H, diameter, extent, density (or GM)",
+    "period with error, pole",
+)
 def read_parameters(text: str, file: str) -> list[PhysicalData]:
     """The body of an answer.
 

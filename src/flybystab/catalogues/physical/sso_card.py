@@ -24,7 +24,12 @@ def _is_card(text: str) -> bool:
     return text.lstrip().startswith("{") and '"ssocard"' in text and '"physical"' in text
 
 
-@physical_reader("SsODNet ssoCard", _is_card)
+@physical_reader(
+    "SsODNet ssoCard",
+    _is_card,
+    "H, diameter, axis ratios, density (or mass), taxonomic class",
+    "periods and poles with errors",
+)
 def read_card(text: str, file: str) -> list[PhysicalData]:
     """The body of a card.
 

@@ -28,6 +28,25 @@ FRAME = "heliocentric, ecliptic J2000, TDB"
 
 
 @dataclass(frozen=True)
+class Contents:
+    """What is read from a format: a row of the table in ``docs/inputs.md``, which ``python docs/formats.py`` makes.
+
+    Attributes
+    ----------
+    elements, covariance, nongravitational, physical : str
+        Cells of the table.
+    files : str
+        Names of files, or what else shows that a file has the format.
+    """
+
+    elements: str
+    covariance: str
+    nongravitational: str
+    physical: str
+    files: str = ""
+
+
+@dataclass(frozen=True)
 class Reader:
     """A file format.
 
@@ -39,11 +58,13 @@ class Reader:
         Whether a text has this format; it must not raise.
     read : callable
         Rows of a text; the second argument is the name of the file.
+    contents : Contents
     """
 
     name: str
     identify: Callable[[str], bool]
     read: Callable[[str, str], list[Entry]]
+    contents: Contents
 
 
 READERS: dict[str, Reader] = {}
@@ -51,11 +72,11 @@ READERS: dict[str, Reader] = {}
 _Read = Callable[[str, str], "list[Entry]"]
 
 
-def reader(name: str, identify: Callable[[str], bool]) -> Callable[[_Read], _Read]:
+def reader(name: str, identify: Callable[[str], bool], contents: Contents) -> Callable[[_Read], _Read]:
     """Register the decorated function as the reader of a format."""
 
     def register(read: _Read) -> _Read:
-        READERS[name] = Reader(name, identify, read)
+        READERS[name] = Reader(name, identify, read, contents)
         return read
 
     return register

@@ -12,7 +12,7 @@ from datetime import date
 from typing import TYPE_CHECKING, Any
 
 from flybystab.catalogues.designations import name_columns, unpacked
-from flybystab.catalogues.readers import reader
+from flybystab.catalogues.readers import Contents, reader
 from flybystab.catalogues.readers.conversion import COMETARY, number, perihelion_row, printed_covariance
 from flybystab.catalogues.readers.parameters import (
     check_parameters,
@@ -38,7 +38,11 @@ def _first_line(text: str) -> str:
     return next((line for line in text.splitlines() if line.strip()), "")
 
 
-@reader("MPC CometEls", lambda text: bool(_LINE.match(_first_line(text))))
+@reader(
+    "MPC CometEls",
+    lambda text: bool(_LINE.match(_first_line(text))),
+    Contents("q and Tp, any conic", "printed digits", "none", "none"),
+)
 def read_comets(text: str, file: str) -> list[Entry]:
     """Rows of ``CometEls.txt``.
 
@@ -94,7 +98,11 @@ def _is_json(text: str) -> bool:
     return text.lstrip()[:1] == "[" and '"Designation_and_name"' in text and '"Year_of_perihelion"' in text
 
 
-@reader("MPC comets (JSON)", _is_json)
+@reader(
+    "MPC comets (JSON)",
+    _is_json,
+    Contents("q and Tp, any conic", "printed digits", "none", "none", files="`cometels.json`"),
+)
 def read_comets_json(text: str, file: str) -> list[Entry]:
     """Rows of ``cometels.json``.
 

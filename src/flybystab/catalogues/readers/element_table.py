@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from flybystab.catalogues.designations import name_columns
-from flybystab.catalogues.readers import reader
+from flybystab.catalogues.readers import Contents, reader
 from flybystab.catalogues.readers.conversion import DEGREE, epoch_row, perihelion_row, since_perihelion
 from flybystab.catalogues.readers.parameters import check_parameters, looks_like_parameter
 from flybystab.constants import AU, DAY
@@ -36,7 +36,11 @@ _STATE = frozenset({"x", "vx", "X", "VX"})
 _OTHER = frozenset({"H", "G", "M", "M1", "M2", "K1", "K2", "P", "Q", "ID", "TJ", "U"})
 
 
-@reader("ECSV table", lambda text: text.startswith("# %ECSV"))
+@reader(
+    "ECSV table",
+    lambda text: text.startswith("# %ECSV"),
+    Contents("a and M, or q and Tp, with units", "none", "none", "H"),
+)
 def read_ecsv(text: str, file: str) -> list[Entry]:
     """Rows of an ECSV file: elements with units, or the columns of the catalogue.
 

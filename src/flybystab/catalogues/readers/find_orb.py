@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from flybystab.catalogues.designations import name_columns
-from flybystab.catalogues.readers import reader
+from flybystab.catalogues.readers import Contents, reader
 from flybystab.catalogues.readers.conversion import (
     CARTESIAN,
     covariance_of,
@@ -45,7 +45,11 @@ def _is_covariance(text: str) -> bool:
     return text.lstrip().startswith("{") and '"covar"' in text and '"state_vect"' in text
 
 
-@reader("Find_Orb elements", _is_elements)
+@reader(
+    "Find_Orb elements",
+    _is_elements,
+    Contents("a and M, or q and Tp", "1-sigmas", "A2 or AMRAT", "H", files="`total.json`, `elements.json`"),
+)
 def read_elements(text: str, file: str) -> list[Entry]:
     """Orbits of ``total.json`` or ``elements.json``.
 
@@ -105,7 +109,11 @@ def _is_parameter(key: str) -> bool:
     return looks_like_parameter(key) and key not in _OTHER
 
 
-@reader("Find_Orb covariance", _is_covariance)
+@reader(
+    "Find_Orb covariance",
+    _is_covariance,
+    Contents("cartesian", "full matrix", "none", "none", files="`covar.json`"),
+)
 def read_covariance(text: str, file: str) -> list[Entry]:
     """The orbit of ``covar.json``, which has no name: that of the file is taken.
 

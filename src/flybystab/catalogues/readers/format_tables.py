@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flybystab.catalogues.designations import name_columns
-from flybystab.catalogues.readers import reader
+from flybystab.catalogues.readers import Contents, reader
 from flybystab.catalogues.readers.conversion import (
     CARTESIAN,
     COMETARY,
@@ -84,7 +84,17 @@ def _is_table(text: str) -> bool:
     return "FORMAT" in cells or (len(cells) > 9 and cells[1] in FORMATS)
 
 
-@reader("Sorcha, layup, OpenOrb", _is_table)
+@reader(
+    "Sorcha, layup, OpenOrb",
+    _is_table,
+    Contents(
+        "COM, KEP, CART, CAR, CAREQ; barycentric BCOM, BKEP, BCART, BCART_EQ",
+        "full matrix of a state, else printed digits",
+        "none",
+        "H",
+        files="column FORMAT",
+    ),
+)
 def read_table(text: str, file: str) -> list[Entry]:
     """Rows of a table; FORMAT may change from row to row.
 

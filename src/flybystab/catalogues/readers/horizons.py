@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flybystab.catalogues.designations import is_comet, name_columns
-from flybystab.catalogues.readers import reader
+from flybystab.catalogues.readers import Contents, reader
 from flybystab.catalogues.readers.conversion import (
     CARTESIAN,
     decimals_of,
@@ -54,7 +54,16 @@ def _is_horizons(text: str) -> bool:
     ) or ("JPL/HORIZONS" in head and "osc. elements" in head and "EPOCH=" in head)
 
 
-@reader("JPL Horizons", _is_horizons)
+@reader(
+    "JPL Horizons",
+    _is_horizons,
+    Contents(
+        "elements or vectors, text or CSV; Sun or barycentre; ecliptic or ICRF; au or km; or the page of the object",
+        "printed digits",
+        "A1, A2, A3, their law, DT, AMRAT",
+        "H, radius, rotation period",
+    ),
+)
 def read_horizons(text: str, file: str) -> list[Entry]:
     """The orbit of an answer.
 

@@ -11,7 +11,7 @@ from datetime import date
 from typing import TYPE_CHECKING
 
 from flybystab.catalogues.designations import name_columns
-from flybystab.catalogues.readers import reader
+from flybystab.catalogues.readers import Contents, reader
 from flybystab.catalogues.readers.conversion import (
     MJD,
     elements_row,
@@ -36,7 +36,13 @@ def _is_elements(text: str) -> bool:
     return {"Epoch", "e", "i", "w", "Node"} <= set(lines[0].split())
 
 
-@reader("JPL elements", _is_elements)
+@reader(
+    "JPL elements",
+    _is_elements,
+    Contents(
+        "a and M, or q and Tp", "printed digits", "none", "H", files="`ELEMENTS.NUMBR`, `.UNNUM`, `.COMET`"
+    ),
+)
 def read_elements(text: str, file: str) -> list[Entry]:
     """Rows of a table.
 

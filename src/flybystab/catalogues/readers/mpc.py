@@ -11,7 +11,7 @@ from datetime import date
 from typing import TYPE_CHECKING
 
 from flybystab.catalogues.designations import names_of, unpacked, unpacked_date
-from flybystab.catalogues.readers import FRAME, header_of, reader, rows_of
+from flybystab.catalogues.readers import FRAME, Contents, header_of, reader, rows_of
 from flybystab.catalogues.readers.parameters import (
     check_parameters,
     looks_like_parameter,
@@ -73,7 +73,11 @@ def _middle(arc: str, last: str) -> str:
 _COLUMNS = {"principal_desig", "epoch_jd_tt", "a_au", "e", "i_deg", "node_deg", "peri_deg", "M_deg"}
 
 
-@reader("MPC table", lambda text: set(header_of(text)) >= _COLUMNS)
+@reader(
+    "MPC table",
+    lambda text: set(header_of(text)) >= _COLUMNS,
+    Contents("a, e, i, node, peri, M", "printed digits and U", "none", "H"),
+)
 def read_mpc(text: str, file: str) -> list[Entry]:
     """Rows of an MPC table whose column names carry units."""
     check_parameters("table", [c for c in header_of(text) if looks_like_parameter(c)], file)
@@ -96,7 +100,17 @@ def _is_mpcorb(text: str) -> bool:
     return bool(lines) and bool(_MPCORB.match(lines[0]))
 
 
-@reader("MPCORB", _is_mpcorb)
+@reader(
+    "MPCORB",
+    _is_mpcorb,
+    Contents(
+        "a, e, i, node, peri, M",
+        "printed digits and U",
+        "none",
+        "H",
+        files="`MPCORB.DAT`, `NEA.txt`, `DAILY.DAT`",
+    ),
+)
 def read_mpcorb(text: str, file: str) -> list[Entry]:
     """Rows of MPCORB.DAT, NEA.txt, DAILY.DAT and the like.
 

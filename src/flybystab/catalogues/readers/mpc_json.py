@@ -12,7 +12,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from flybystab.catalogues.designations import name_columns
-from flybystab.catalogues.readers import reader
+from flybystab.catalogues.readers import Contents, reader
 from flybystab.catalogues.readers.conversion import COMETARY, number, perihelion_row, printed_covariance
 from flybystab.catalogues.readers.mpc import from_mpc
 from flybystab.catalogues.readers.parameters import check_parameters, looks_like_parameter
@@ -53,7 +53,17 @@ def _is_service(text: str) -> bool:
     return text.lstrip()[:1] == "[" and '"argument_of_perihelion"' in text and '"epoch_jd"' in text
 
 
-@reader("MPC table (JSON)", _is_extended)
+@reader(
+    "MPC table (JSON)",
+    _is_extended,
+    Contents(
+        "a, e, i, node, peri, M",
+        "printed digits and U",
+        "none",
+        "H",
+        files="`mpcorb_extended.json`, `nea_extended.json`",
+    ),
+)
 def read_extended(text: str, file: str) -> list[Entry]:
     """Rows of an extended file.
 
@@ -64,7 +74,11 @@ def read_extended(text: str, file: str) -> list[Entry]:
     return [_extended(row, file) for row in _rows(text, file)]
 
 
-@reader("MPC web service (JSON)", _is_service)
+@reader(
+    "MPC web service (JSON)",
+    _is_service,
+    Contents("a and M, or q and Tp", "printed digits and U", "none", "H"),
+)
 def read_service(text: str, file: str) -> list[Entry]:
     """Rows of an answer of the web service.
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from flybystab.catalogues.designations import name_columns
-from flybystab.catalogues.readers import reader
+from flybystab.catalogues.readers import Contents, reader
 from flybystab.catalogues.readers.conversion import (
     CARTESIAN,
     MJD,
@@ -42,7 +42,7 @@ def _is_mpc_orbit(text: str) -> bool:
     return text.lstrip()[:1] in "{[" and '"coefficient_names"' in text and '"epoch_data"' in text
 
 
-@reader("MPC orbit (JSON)", _is_mpc_orbit)
+@reader("MPC orbit (JSON)", _is_mpc_orbit, Contents("cometary, cartesian", "full matrix", "A2 or AMRAT", "H"))
 def read_mpc_orbit(text: str, file: str) -> list[Entry]:
     """Orbits of a document, or of an answer of the API that holds documents (``mpc_orb``, ``orb``).
 

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from flybystab.catalogues.designations import is_comet, name_columns
-from flybystab.catalogues.readers import reader
+from flybystab.catalogues.readers import Contents, reader
 from flybystab.catalogues.readers.conversion import (
     COLUMN_OF,
     KEPLERIAN,
@@ -46,7 +46,7 @@ def _is_neows(text: str) -> bool:
     return text.lstrip()[:1] in "{[" and '"orbital_data"' in text and '"epoch_osculation"' in text
 
 
-@reader("NASA NeoWs", _is_neows)
+@reader("NASA NeoWs", _is_neows, Contents("a and M, or q and Tp", "printed digits and U", "none", "H"))
 def read_neows(text: str, file: str) -> list[Entry]:
     """Orbits of an answer.
 

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flybystab.catalogues.designations import is_comet, name_columns
-from flybystab.catalogues.readers import FRAME, reader
+from flybystab.catalogues.readers import FRAME, Contents, reader
 from flybystab.catalogues.readers.conversion import (
     CARTESIAN,
     COMETARY,
@@ -51,7 +51,17 @@ def _is_oef(text: str) -> bool:
     return bool(re.match(r"\s*(format\s*=\s*'OEF2|(KEP|EQU|CAR|COM) )", text))
 
 
-@reader("OEF2.0", _is_oef)
+@reader(
+    "OEF2.0",
+    _is_oef,
+    Contents(
+        "Keplerian, equinoctial, cometary, cartesian",
+        "full matrix",
+        "AMRAT, A2",
+        "H",
+        files="NEOCC, NEODyS, AstDyS: `.ke0 .ke1 .eq0 .eq1`, `neodys.cat`",
+    ),
+)
 def read_oef(text: str, file: str) -> list[Entry]:
     """Orbits of a file, one or many.
 

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flybystab.catalogues.designations import name_columns
-from flybystab.catalogues.readers import reader
+from flybystab.catalogues.readers import Contents, reader
 from flybystab.catalogues.readers.conversion import (
     CARTESIAN,
     COMETARY,
@@ -47,7 +47,17 @@ def _is_openorb(text: str) -> bool:
     return len(head) == 4 and all(line.startswith("#") for line in head) and "-0001-" in head[3]
 
 
-@reader("OpenOrb orbits", _is_openorb)
+@reader(
+    "OpenOrb orbits",
+    _is_openorb,
+    Contents(
+        "Keplerian, cometary, cartesian",
+        "full matrix of Keplerian elements or a state, else printed digits",
+        "none",
+        "none",
+        files="`.orb`",
+    ),
+)
 def read_openorb(text: str, file: str) -> list[Entry]:
     """Rows of a file.
 

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from flybystab.catalogues.designations import is_comet, name_columns, names_of
-from flybystab.catalogues.readers import FRAME, header_of, reader, rows_of
+from flybystab.catalogues.readers import FRAME, Contents, header_of, reader, rows_of
 from flybystab.catalogues.readers.conversion import (
     MJD,
     axis_of,
@@ -296,7 +296,16 @@ def _entries(rows: list[dict[str, str]], columns: set[str], file: str) -> list[E
     return [(from_sbdb(row, file), _covariance(row, file)) for row in whole]
 
 
-@reader("SBDB query (CSV)", _is_query)
+@reader(
+    "SBDB query (CSV)",
+    _is_query,
+    Contents(
+        "a or q, M or Tp; epoch in JD or MJD",
+        "1-sigmas, else printed digits and U",
+        "A1, A2, A3, DT with 1-sigmas",
+        "H, diameter, rotation period, taxonomic class",
+    ),
+)
 def read_query(text: str, file: str) -> list[Entry]:
     """Rows of a query saved as CSV.
 
@@ -312,7 +321,16 @@ def _is_query_json(text: str) -> bool:
     return text.lstrip().startswith("{") and '"fields"' in text and '"data"' in text
 
 
-@reader("SBDB query (JSON)", _is_query_json)
+@reader(
+    "SBDB query (JSON)",
+    _is_query_json,
+    Contents(
+        "a or q, M or Tp; epoch in JD or MJD",
+        "1-sigmas, else printed digits and U",
+        "A1, A2, A3, DT with 1-sigmas",
+        "H, diameter, rotation period, taxonomic class",
+    ),
+)
 def read_query_json(text: str, file: str) -> list[Entry]:
     """Rows of an answer of the query API.
 

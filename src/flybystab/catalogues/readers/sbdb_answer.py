@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from flybystab.catalogues.designations import name_columns
-from flybystab.catalogues.readers import FRAME, reader
+from flybystab.catalogues.readers import FRAME, Contents, reader
 from flybystab.catalogues.readers.conversion import (
     COLUMN_OF,
     KEPLERIAN,
@@ -225,7 +225,16 @@ def _is_answer(text: str) -> bool:
     return text.lstrip().startswith("{") and '"orbit"' in text and '"object"' in text and '"fullname"' in text
 
 
-@reader("SBDB answer", _is_answer)
+@reader(
+    "SBDB answer",
+    _is_answer,
+    Contents(
+        "a and M, or q and Tp",
+        "full matrix, at the epoch of the orbit or its own; else 1-sigmas",
+        "A1, A2, A3, their law, DT, AMRAT",
+        "H, diameter, extent, density (or GM), pole, rotation period",
+    ),
+)
 def read_answer(text: str, file: str) -> list[Entry]:
     """The orbit of an answer for one object."""
     return [from_sbdb_answer(text, file)]
