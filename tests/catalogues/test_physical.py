@@ -169,10 +169,8 @@ def test_a_screening_draws_rival_solutions_by_their_weights(tmp_path):
         assert mine.mean() == pytest.approx(period, rel=1e-3)
     assert np.ptp(hours[sample.solution == 1]) == 0.0
     assert hours[sample.solution == 2].std() == pytest.approx(0.1, rel=0.1)
-    poles = Attitudes.at(a, sample, 4, "earth")
-    by_solution = [
-        np.array([poles.pole(i) for i in np.flatnonzero(sample.solution == k)[:50]]) for k in range(3)
-    ]
+    poles = Attitudes.at(a, sample, 4, "earth").poles
+    by_solution = [poles[sample.solution == k][:50] for k in range(3)]
     assert np.ptp(by_solution[0], axis=0).max() == np.ptp(by_solution[1], axis=0).max() == 0.0
     assert by_solution[0][0] @ by_solution[1][0] == pytest.approx(-1.0)
     assert np.ptp(by_solution[2], axis=0).max() > 1.0  # no pole: isotropic
