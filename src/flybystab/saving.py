@@ -1,40 +1,36 @@
 """Columns with units and metadata as files: ECSV, Parquet, JSON, netCDF to save and read, CSV to save.
 
 The content is a dictionary of arrays (:class:`~astropy.units.Quantity` or numpy, same first dimension) and metadata
-of plain types (:func:`encoded`). Every format but CSV restores both exactly, infinite and undefined numbers included.
+of plain types (:func:`~flybystab.encoding.encoded`). Every format but CSV restores both exactly, infinite and undefined
+numbers included. The entry ``object`` of the metadata is the encoded object that the columns describe.
 """
 
 from __future__ import annotations
 
 import io
 import json
-import math
 import tempfile
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import fields, is_dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 import numpy as np
-from astropy.time import Time
 from astropy.units import Quantity, Unit, UnitBase, km
 
+from flybystab.encoding import KNOWN, decoded, encoded
 from flybystab.errors import FlybystabError, InvalidInput, MissingExtra
 from flybystab.files import parse_json, read_bytes, read_text, replace_file
 
+__all__ = ["KNOWN", "decoded", "encoded", "read_columns", "save_columns", "with_unit"]
+
 #: Columns by name.
 Columns = dict[str, Any]
-#: Dataclasses that metadata may hold, with their modules.
-KNOWN = {
-    "Body": "flybystab.body.body",
-    "Material": "flybystab.body.body",
-    "Planet": "flybystab.orbit.planets",
-}
 #: Units of quantities in documents and CSV files, where tables differ: one key for one quantity.
 DOCUMENT_UNITS = {"distance": km}
 #: Text that starts with one of these is quoted: spreadsheets read it as a formula, ECSV readers as a comment (#).
 QUOTED_START = ("=", "+", "-", "@", "#", " ", "\t")
+#: Variable of a netCDF file that holds the encoded object.
+_OBJECT = "flybystab_object"
 #: Largest file that is read, bytes.
 SAVED_LIMIT = 4 * 2**30
 
@@ -73,57 +69,6 @@ def xarray() -> Any:
     except ImportError:
         raise MissingExtra("xarray", "xarray", "an xarray data set or a netCDF file") from None
     return xarray
-
-
-def encoded(value: Any) -> Any:
-    """Metadata in plain types: numbers, text, lists and dictionaries; what is none of these carries its type."""
-    if value is None or isinstance(value, bool | int) or type(value) is str:
-        return value
-    if isinstance(value, str):
-        return str(value)
-    if isinstance(value, np.generic) and not isinstance(value, Quantity):
-        return encoded(value.item())
-    if isinstance(value, float):
-        return value if math.isfinite(value) else {"number": str(value)}
-    if isinstance(value, Quantity):
-        return {"value": encoded(value.value.tolist()), "unit": value.unit.to_string()}
-    if isinstance(value, np.ndarray):
-        return {"array": encoded(value.tolist())}
-    if isinstance(value, Time):
-        return {"jd1": float(value.jd1), "jd2": float(value.jd2), "scale": value.scale}
-    if isinstance(value, tuple):
-        return {"tuple": [encoded(x) for x in value]}
-    if isinstance(value, list):
-        return [encoded(x) for x in value]
-    if isinstance(value, Mapping):
-        return {"mapping": [[encoded(k), encoded(v)] for k, v in value.items()]}
-    name = type(value).__name__
-    if is_dataclass(value) and name in KNOWN:
-        return {"class": name, **{f.name: encoded(getattr(value, f.name)) for f in fields(value) if f.init}}
-    raise TypeError(f"metadata cannot hold a {name}")
-
-
-def decoded(value: Any) -> Any:
-    """The value that :func:`encoded` made."""
-    if isinstance(value, list):
-        return [decoded(x) for x in value]
-    if not isinstance(value, dict):
-        return value
-    if "number" in value:
-        return float(value["number"])
-    if "unit" in value:
-        number = decoded(value["value"])
-        return (np.array(number) if isinstance(number, list) else number) * Unit(value["unit"])
-    if "array" in value:
-        return np.array(decoded(value["array"]))
-    if "scale" in value:
-        return Time(value["jd1"], value["jd2"], format="jd", scale=value["scale"])
-    if "tuple" in value:
-        return tuple(decoded(x) for x in value["tuple"])
-    if "mapping" in value:
-        return {decoded(k): decoded(v) for k, v in value["mapping"]}
-    made = getattr(import_module(KNOWN[value["class"]]), value["class"])
-    return made(**{k: decoded(v) for k, v in value.items() if k != "class"})
 
 
 def flat(columns: Mapping[str, Any]) -> Columns:
@@ -223,6 +168,8 @@ def _ecsv(columns: Mapping[str, Any], meta: Mapping[str, Any]) -> bytes:
 
     text = io.StringIO()
     about = {**meta, "rows": _length(columns), "layout": _described(columns)}
+    if "object" in about:  # as one text: YAML is slow
+        about["object"] = json.dumps(about["object"], allow_nan=False)
     # not a QTable, whose ECSV writer fails at a quantity in a column named "value"
     Table(dict(columns), meta=about).write(text, format="ascii.ecsv")
     return text.getvalue().encode()
@@ -242,7 +189,10 @@ def _read_ecsv(path: Path) -> tuple[Columns, dict[str, Any]]:
         out[name] = np.asarray(column.value if isinstance(column, Quantity) else column)
     for name, _, unit in table.meta.pop("layout"):  # a column without dimension has no unit in ECSV
         out[name] = out[name] if unit is None else out[name] * Unit(unit)
-    return out, dict(table.meta)
+    meta = dict(table.meta)
+    if "object" in meta:
+        meta["object"] = json.loads(meta["object"])
+    return out, meta
 
 
 def _parquet(columns: Mapping[str, Any], meta: Mapping[str, Any]) -> bytes:
@@ -322,9 +272,12 @@ def _csv(columns: Mapping[str, Any], meta: Mapping[str, Any]) -> bytes:
 
 
 def _netcdf(columns: Mapping[str, Any], meta: Mapping[str, Any]) -> bytes:
+    about = {k: v for k, v in meta.items() if k != "object"}
     data = dataset(
-        {k: (["row", *(f"{k}_{i}" for i in range(1, v.ndim))], v) for k, v in columns.items()}, meta
+        {k: (["row", *(f"{k}_{i}" for i in range(1, v.ndim))], v) for k, v in columns.items()}, about
     )
+    if "object" in meta:  # too long for an attribute of HDF5
+        data[_OBJECT] = ([], json.dumps(meta["object"], allow_nan=False))
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder, "x.nc")
         data.to_netcdf(file, engine="h5netcdf")
@@ -339,6 +292,8 @@ def _read_netcdf(path: Path) -> tuple[Columns, dict[str, Any]]:
             values = data[name].values
             values = values.astype(str) if values.dtype == object else values
             out[name] = values if unit is None else values * Unit(unit)
+        if _OBJECT in data:
+            about["meta"]["object"] = json.loads(str(data[_OBJECT].values))
     return out, dict(about["meta"])
 
 

@@ -1,10 +1,12 @@
-"""Results as data: tables with units, data frames, dictionaries, files, HTML and plots, by two mixins.
+"""Results as data: tables with units, data frames, dictionaries, files, HTML and plots, by mixins.
 
-:class:`Tabular` is for results with one row per time, sample or point of a grid, :class:`Record` for single ones.
+:class:`Tabular` is for results with one row per time, sample or point of a grid, :class:`Record` for single ones,
+:class:`Collection` for those that consist of several rows and of more.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from html import escape
 from importlib import import_module
@@ -16,8 +18,10 @@ from astropy.units import Quantity
 
 from flybystab import saving
 from flybystab._version import __version__
+from flybystab.encoding import decoded, encoded
 from flybystab.errors import InvalidInput
-from flybystab.saving import decoded, encoded, with_unit
+from flybystab.saving import with_unit
+from flybystab.units import brief
 
 if TYPE_CHECKING:
     from astropy.table import QTable
@@ -33,6 +37,12 @@ class Results:
 
     #: Columns that a notebook shows; by default the first ten.
     _shown: ClassVar[tuple[str, ...]] = ()
+    #: Fields that are neither columns nor metadata of the table; so are those whose names begin with "_".
+    _left_out: ClassVar[tuple[str, ...]] = ()
+
+    @classmethod
+    def _hidden(cls, name: str) -> bool:
+        return name.startswith("_") or name in cls._left_out
 
     def _columns(self) -> tuple[dict[str, Any], dict[str, Any]]:
         """Columns of the same length, and metadata of plain types (:func:`flybystab.saving.encoded`)."""
@@ -65,7 +75,7 @@ class Results:
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write to ``.ecsv``, ``.parquet`` (extra ``parquet``), ``.json``, ``.nc`` (extra ``xarray``) or ``.csv``.
 
-        All but ``.csv``, which has no metadata, are for :meth:`read`.
+        All but ``.csv``, which has no metadata, give the same result back by :meth:`read`.
 
         Raises
         ------
@@ -73,7 +83,33 @@ class Results:
             Another suffix, a file that exists (without `overwrite`), or one that cannot be written.
         MissingExtra
         """
-        return saving.save_columns(path, *self._columns(), overwrite)
+        columns, meta = self._columns()
+        return saving.save_columns(path, columns, {**meta, **self._stored_with()}, overwrite)
+
+    def _stored_with(self) -> dict[str, Any]:
+        """Metadata of files only: what :meth:`read` needs beyond the table."""
+        raise NotImplementedError
+
+    @classmethod
+    def read(cls, path: str | Path) -> Self:
+        """The result in a file that :meth:`save` wrote.
+
+        Raises
+        ------
+        InvalidInput
+            Not such a file, or another kind of result.
+        """
+        columns, meta = saving.read_columns(path)
+        if meta.get("result") != cls.__name__:
+            raise InvalidInput("path", str(path), f"a saved {cls.__name__}, not {meta.get('result')}")
+        try:
+            return cls._restored(columns, meta)
+        except KeyError as missing:
+            raise InvalidInput("path", str(path), f"a complete file (it has no {missing})") from None
+
+    @classmethod
+    def _restored(cls, columns: dict[str, Any], meta: dict[str, Any]) -> Self:
+        raise NotImplementedError
 
     def plot(self, axes: Any = None, **options: Any) -> Any:
         """Plot into matplotlib axes, new ones by default; returns the axes.
@@ -87,6 +123,21 @@ class Results:
         """
         # by name: plots import the results that they show
         return import_module("flybystab.plots.results").plot_result(self, axes, **options)
+
+    def __repr__(self) -> str:
+        """Name of the class and the fields that fit on a line."""
+        parts = []
+        for f in fields(self):  # type: ignore[arg-type]
+            value = getattr(self, f.name)
+            if f.name.startswith("_") or not f.repr:
+                continue
+            if isinstance(value, Quantity):
+                parts.append(f"{f.name} {brief(value)}" if value.isscalar else "")
+            elif isinstance(value, bool | str | int | np.generic):
+                parts.append(f"{f.name} {value}")
+            elif isinstance(value, float):
+                parts.append(f"{f.name} {value:.4g}")
+        return f"<{type(self).__name__} {', '.join(p for p in parts if p)}>"
 
     def _repr_html_(self) -> str:
         table = self.to_table()
@@ -104,7 +155,8 @@ class Tabular(Results):
     _dimensions: ClassVar[tuple[str, ...]] = ("row",)
 
     def __len__(self) -> int:
-        raise NotImplementedError
+        visible = (getattr(self, f.name) for f in fields(self) if not self._hidden(f.name))  # type: ignore[arg-type]
+        return next(len(value) for value in visible if isinstance(value, np.ndarray) and value.ndim)
 
     def _grid(self) -> tuple[int, ...]:
         """Leading dimensions of the arrays."""
@@ -114,6 +166,8 @@ class Tabular(Results):
         """Arrays over the grid, coordinates along one dimension of it, and the other fields."""
         grid, arrays, along, rest = self._grid(), {}, {}, {}
         for f in fields(self):  # type: ignore[arg-type]
+            if self._hidden(f.name):
+                continue
             value = getattr(self, f.name)
             if len(grid) > 1 and f.name in self._dimensions:
                 along[f.name] = value
@@ -138,21 +192,17 @@ class Tabular(Results):
             meta["grid"] = list(grid)
         return columns, meta
 
-    @classmethod
-    def read(cls, path: str | Path) -> Self:
-        """The result in a file that :meth:`save` wrote.
+    def _stored_with(self) -> dict[str, Any]:
+        hidden = [f.name for f in fields(self) if self._hidden(f.name)]  # type: ignore[arg-type]
+        return {"object": {name: encoded(getattr(self, name)) for name in hidden}} if hidden else {}
 
-        Raises
-        ------
-        InvalidInput
-            Not such a file, or another kind of result.
-        """
-        columns, meta = saving.read_columns(path)
-        if meta.get("result") != cls.__name__:
-            raise InvalidInput("path", str(path), f"a saved {cls.__name__}, not {meta.get('result')}")
+    @classmethod
+    def _restored(cls, columns: dict[str, Any], meta: dict[str, Any]) -> Self:
         grid = tuple(meta.get("grid", ()))
-        values = {}
+        values = {name: decoded(value) for name, value in meta.get("object", {}).items()}
         for f in fields(cls):  # type: ignore[arg-type]
+            if f.name in values or not f.init:
+                continue
             if f.name not in columns:
                 values[f.name] = decoded(meta[f.name])
                 continue
@@ -179,13 +229,10 @@ class Tabular(Results):
 class Record(Results):
     """Mixin of a single result, a dataclass: a table of one row; nested results are columns with a prefix."""
 
-    #: Fields that are not columns.
-    _left_out: ClassVar[tuple[str, ...]] = ()
-
     def _columns(self) -> tuple[dict[str, Any], dict[str, Any]]:
         columns: dict[str, Any] = {}
         for f in fields(self):  # type: ignore[arg-type]
-            if f.name not in self._left_out:
+            if not self._hidden(f.name):
                 _put(columns, f.name, getattr(self, f.name))
         return columns, self._about()
 
@@ -193,21 +240,35 @@ class Record(Results):
         """Values by name, with the unit in the name; infinite and undefined numbers are None."""
         return {name: values[0] for name, values in super().to_dict().items()}
 
+    def _stored_with(self) -> dict[str, Any]:
+        return {"object": encoded(self)}
+
     @classmethod
-    def read(cls, path: str | Path) -> QTable:
-        """Table of one row in a file that :meth:`save` wrote: what :meth:`to_table` gave.
+    def _restored(cls, columns: dict[str, Any], meta: dict[str, Any]) -> Self:
+        found: Self = decoded(meta["object"])
+        return found
 
-        Raises
-        ------
-        InvalidInput
-            Not such a file, or another kind of result.
-        """
-        from astropy.table import QTable
 
-        columns, meta = saving.read_columns(path)
-        if meta.get("result") != cls.__name__:
-            raise InvalidInput("path", str(path), f"a saved {cls.__name__}, not {meta.get('result')}")
-        return QTable(columns, meta=meta)
+class Collection(Record):
+    """Mixin of a result that consists of several rows and of more: its table has one row for each part."""
+
+    def _rows(self) -> Mapping[str, Any]:
+        """Columns of the table."""
+        raise NotImplementedError
+
+    def _columns(self) -> tuple[dict[str, Any], dict[str, Any]]:
+        columns = {
+            name: column if isinstance(column, Quantity) else np.asarray(column)
+            for name, column in self._rows().items()
+        }
+        return columns, self._about()
+
+    def __len__(self) -> int:
+        return len(next(iter(self._rows().values())))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Lists by column, with the unit in the name; infinite and undefined numbers are None."""
+        return Results.to_dict(self)
 
 
 def _put(columns: dict[str, Any], name: str, value: Any) -> None:
@@ -217,13 +278,19 @@ def _put(columns: dict[str, Any], name: str, value: Any) -> None:
             value = str(value)
         columns[name] = value[None] if isinstance(value, Quantity) else np.asarray(value)[None]
     elif hasattr(value, "_asdict"):
-        for key, part in value._asdict().items():
-            _put(columns, f"{name}_{key}", part)
+        _put_parts(columns, name, value._asdict())
     elif isinstance(value, dict):
-        for key, part in value.items():
-            _put(columns, f"{name}_{key}", part)
+        _put_parts(columns, name, value)
+    elif isinstance(value, Tabular):
+        _put_parts(columns, name, value._parts()[2])
+    elif isinstance(value, tuple) and value and all(isinstance(part, Quantity) for part in value):
+        columns[name] = Quantity(list(value))[None]
     elif is_dataclass(value) and type(value).__name__ not in saving.KNOWN:
         left_out = getattr(value, "_left_out", ())
-        for f in fields(value):
-            if f.name not in left_out:
-                _put(columns, f"{name}_{f.name}", getattr(value, f.name))
+        names = [f.name for f in fields(value) if f.name not in left_out and not f.name.startswith("_")]
+        _put_parts(columns, name, {key: getattr(value, key) for key in names})
+
+
+def _put_parts(columns: dict[str, Any], name: str, parts: Mapping[str, Any]) -> None:
+    for key, part in parts.items():
+        _put(columns, f"{name}_{key}", part)

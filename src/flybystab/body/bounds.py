@@ -14,12 +14,13 @@ from flybystab.constants import G
 from flybystab.core.ellipsoid.rigid_stress import demand, overload, rigid_stress, spin_interval
 from flybystab.core.numerics.jit import kernel
 from flybystab.errors import InvalidInput
+from flybystab.tabular import Tabular
 from flybystab.typing import Array
 from flybystab.units import brief, to_si
 
 
 @dataclass(frozen=True)
-class Requirements:
+class Requirements(Tabular):
     """Requirements on the material, sampled over the uncertain shape, spin and density.
 
     Attributes

@@ -29,6 +29,7 @@ from flybystab.core.ellipsoid.surface_slope import effective_field
 from flybystab.core.ellipsoid.tide import COMPONENTS
 from flybystab.core.material.yield_surface import required_cohesion
 from flybystab.errors import InvalidInput, NotConverged
+from flybystab.tabular import Record
 from flybystab.typing import Array
 from flybystab.units import brief, to_si
 
@@ -48,8 +49,8 @@ RESIDUAL = 1e-8
 SHELLS, DIRECTIONS = 16, 600
 
 
-@dataclass(frozen=True, eq=False)
-class YieldRegion:
+@dataclass(frozen=True, eq=False, repr=False)
+class YieldRegion(Record):
     """Where the elastic stress exceeds the strength of a material.
 
     Attributes
@@ -71,7 +72,7 @@ class YieldRegion:
 
 
 @dataclass(frozen=True, eq=False)
-class ElasticStress:
+class ElasticStress(Record):
     """Elastic stress in an ellipsoid.
 
     Attributes

@@ -25,6 +25,7 @@ from flybystab.core.energy.perturbation import EDGE, pile, rate_of_strain, slope
 from flybystab.core.energy.perturbation import direction as strain_direction
 from flybystab.core.energy.potential import velocity_gradient
 from flybystab.errors import InvalidInput, NotConverged
+from flybystab.tabular import Record
 from flybystab.typing import Array
 from flybystab.units import to_si
 
@@ -32,8 +33,8 @@ from flybystab.units import to_si
 PATIENCE = 100.0
 
 
-@dataclass(frozen=True, eq=False)
-class Recovery:
+@dataclass(frozen=True, eq=False, repr=False)
+class Recovery(Record):
     """End of the motion of a perturbed body.
 
     Attributes
@@ -139,7 +140,7 @@ def recovery_energy(
 
 
 @dataclass(frozen=True, eq=False)
-class RecoveryLimit:
+class RecoveryLimit(Record):
     """Least energy of a perturbation from which a body does not recover, over its directions.
 
     Attributes

@@ -23,6 +23,7 @@ from flybystab.body.shape import Shape
 from flybystab.constants import G
 from flybystab.core.ellipsoid.tide import COMPONENTS
 from flybystab.errors import NotConverged
+from flybystab.tabular import Tabular
 from flybystab.typing import Array
 
 #: Newton steps to a saddle point, and the relative length of the last one.
@@ -30,8 +31,8 @@ STEPS = 60
 ACCURACY = 1e-10
 
 
-@dataclass(frozen=True, eq=False)
-class RocheLobe:
+@dataclass(frozen=True, eq=False, repr=False)
+class RocheLobe(Tabular):
     """Roche lobe of a body at one instant.
 
     Attributes

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
+from typing import ClassVar
 
 import astropy.units as u
 import numpy as np
@@ -55,6 +56,12 @@ class Shape:
         For an open or self-intersecting surface, facets not oriented alike, or without volume; the message names the
         facets.
     """
+
+    #: Saved and restored field by field: the constructor turns the vertices into principal axes.
+    _stored: ClassVar[tuple[str, ...]] = (
+        "vertices", "facets", "origin", "rotation", "_edges", "_sides", "_mass"
+    )  # fmt: skip
+    _verbatim: ClassVar[bool] = True
 
     vertices: Quantity
     facets: Integers

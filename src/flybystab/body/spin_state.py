@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from flybystab.body.body import Body, check_body
 from flybystab.constants import G
 from flybystab.core.ellipsoid.rigid_stress import demand, rigid_stress
+from flybystab.tabular import Record
 from flybystab.units import brief
 
 #: Points of a polhode at which the stress is evaluated.
@@ -26,8 +27,8 @@ POLHODE_POINTS = 201
 EQUAL_MOMENTS = 1e-9
 
 
-@dataclass(frozen=True)
-class SpinState:
+@dataclass(frozen=True, repr=False)
+class SpinState(Record):
     """State of rotation of a free rigid body.
 
     Attributes

@@ -302,8 +302,8 @@ def flow_cohesion(body: Body) -> float:
     return 0.0 if body.material.brittle else body.material.c_pa
 
 
-@dataclass(frozen=True)
-class Push:
+@dataclass(frozen=True, repr=False)
+class Push(Record):
     """One push: its powers, and the barrier against strain along its path.
 
     Attributes

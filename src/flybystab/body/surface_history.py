@@ -8,6 +8,7 @@ normal is the slope.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import ClassVar
 
 import astropy.units as u
 import numpy as np
@@ -19,12 +20,13 @@ from flybystab.body.shape import Shape
 from flybystab.body.shape_slope import field_matrix, gravity_at_facets
 from flybystab.body.surface_slope import SlopeChange, spin_and_tide
 from flybystab.errors import InvalidInput
+from flybystab.tabular import Tabular
 from flybystab.typing import Array
 from flybystab.units import brief, to_si
 
 
 @dataclass(frozen=True, eq=False)
-class SurfaceHistory:
+class SurfaceHistory(Tabular):
     """The surface of a rigid shape at ``m`` instants; ``f`` facets.
 
     Attributes
@@ -48,6 +50,12 @@ class SurfaceHistory:
     acceleration: Quantity
     outward: Quantity
     closest: int
+
+    _dimensions: ClassVar[tuple[str, ...]] = ("time", "facet")
+    _left_out: ClassVar[tuple[str, ...]] = ("shape",)
+
+    def _grid(self) -> tuple[int, ...]:
+        return self.slope.shape
 
     def __len__(self) -> int:
         return len(self.time)

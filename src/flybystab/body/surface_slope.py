@@ -19,12 +19,13 @@ from flybystab.body.equilibrium import tide_components
 from flybystab.constants import G
 from flybystab.core.ellipsoid.surface_slope import effective_field, slopes, slopes_through
 from flybystab.errors import InvalidInput
+from flybystab.tabular import Tabular
 from flybystab.typing import Array
 from flybystab.units import brief, to_si
 
 
-@dataclass(frozen=True)
-class SurfaceSlopes:
+@dataclass(frozen=True, repr=False)
+class SurfaceSlopes(Tabular):
     """Slopes over a surface.
 
     Attributes
@@ -48,7 +49,7 @@ class SurfaceSlopes:
 
 
 @dataclass(frozen=True)
-class SlopeChange:
+class SlopeChange(Tabular):
     """Slopes over a surface through an encounter.
 
     Attributes

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, ClassVar
 
 import astropy.units as u
 import numpy as np
@@ -27,12 +27,13 @@ from flybystab.orbit.ephemeris import Ephemeris
 from flybystab.orbit.orbit import Orbit, later
 from flybystab.orbit.planets import Planet, planet
 from flybystab.orbit.search.encounter_finder import find_encounters
+from flybystab.tabular import Tabular
 from flybystab.typing import Array
 from flybystab.units import brief, checked_time, to_si
 
 
 @dataclass(frozen=True, eq=False)
-class EncounterDistribution:
+class EncounterDistribution(Tabular):
     """Clones of an orbit at one encounter.
 
     Attributes
@@ -79,6 +80,8 @@ class EncounterDistribution:
     linear: LinearPlane | None
     source: str
     correlated: bool
+
+    _left_out: ClassVar[tuple[str, ...]] = ("nominal", "clones")
 
     def __len__(self) -> int:
         return len(self.clones)

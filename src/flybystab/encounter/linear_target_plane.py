@@ -13,11 +13,12 @@ from scipy.stats import norm
 
 from flybystab.orbit.planets import Planet
 from flybystab.orbit.target_plane import capture_radius
+from flybystab.tabular import Record
 from flybystab.typing import Array
 
 
-@dataclass(frozen=True, eq=False)
-class LinearPlane:
+@dataclass(frozen=True, eq=False, repr=False)
+class LinearPlane(Record):
     """The covariance of an orbit mapped linearly to the target plane.
 
     Attributes

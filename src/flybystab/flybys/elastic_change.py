@@ -14,11 +14,12 @@ from flybystab.body.elastic_stress import ElasticStress, elastic_stress, stress_
 from flybystab.core.ellipsoid.tide import COMPONENTS
 from flybystab.encounter.encounter import Encounter
 from flybystab.flybys.rigid_course import Course, rigid_course
+from flybystab.tabular import Record
 from flybystab.units import brief
 
 
 @dataclass(frozen=True, eq=False)
-class ElasticChange:
+class ElasticChange(Record):
     """Elastic stress at the start of an encounter and at closest approach.
 
     Attributes

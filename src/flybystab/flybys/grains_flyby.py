@@ -15,7 +15,7 @@ import time as clock
 import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
 import astropy.units as u
 import numpy as np
@@ -36,6 +36,7 @@ from flybystab.flybys.batch import ground_near, span_of
 from flybystab.flybys.remnant import final_attitude
 from flybystab.flybys.result import FlybyResult
 from flybystab.flybys.verdict import Verdict, classed, letter_of
+from flybystab.tabular import Collection, Record, Tabular
 from flybystab.typing import Array
 from flybystab.units import brief
 
@@ -63,7 +64,7 @@ _REACH = 3.0
 
 
 @dataclass(frozen=True, eq=False)
-class GrainsCourse:
+class GrainsCourse(Tabular):
     """Clumps of one pile against time; every array has the same first dimension.
 
     Attributes
@@ -94,8 +95,8 @@ class GrainsCourse:
         return f"<GrainsCourse {len(self)} rows, {self.positions.shape[1]} grains>"
 
 
-@dataclass(frozen=True, eq=False)
-class GrainsRun:
+@dataclass(frozen=True, eq=False, repr=False)
+class GrainsRun(Record):
     """One pile after an encounter.
 
     Attributes
@@ -151,6 +152,8 @@ class GrainsRun:
     steps: int
     wall_time: Quantity
 
+    _left_out: ClassVar[tuple[str, ...]] = ("course", "radius", "label")
+
     @property
     def stretch(self) -> float:
         """Longest semi-axis of the largest clump over that of the pile at the start."""
@@ -163,7 +166,7 @@ class GrainsRun:
 
 
 @dataclass(frozen=True, eq=False)
-class GrainsOutcome:
+class GrainsOutcome(Collection):
     """What grains say of an encounter: a distribution over piles.
 
     Attributes
@@ -183,6 +186,16 @@ class GrainsOutcome:
     fragments: QTable = field(repr=False)
     modelled: tuple[str, ...] = field(repr=False)
     wall_time: Quantity = field(repr=False)
+
+    def _rows(self) -> dict[str, Any]:
+        tables = [run.to_table() for run in self.runs]
+        names = [name for name in tables[0].colnames if name not in ("axes_directions", "wall_time")]
+        return {
+            name: Quantity([t[name][0] for t in tables])
+            if isinstance(tables[0][name], Quantity)
+            else np.array([t[name][0] for t in tables])
+            for name in names
+        }
 
     @property
     def median(self) -> GrainsRun:

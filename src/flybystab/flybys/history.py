@@ -14,7 +14,7 @@ from flybystab.core.dynamics.run import REGIMES
 from flybystab.core.material.yield_surface import required_frictions
 from flybystab.flybys.batch import FlybyRun
 from flybystab.flybys.inputs import FlybyInputs
-from flybystab.tabular import Tabular
+from flybystab.tabular import Record, Tabular
 from flybystab.typing import Array
 from flybystab.units import brief
 
@@ -74,7 +74,7 @@ class History(Tabular):
 
 
 @dataclass(frozen=True)
-class FlybyError:
+class FlybyError(Record):
     """Measured error of a result: its difference from a run with a 30 times larger step tolerance, or a 30 times
     smaller one where that one does not converge.
 

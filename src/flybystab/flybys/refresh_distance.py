@@ -15,6 +15,7 @@ from flybystab.flybys.spin_sample import spin_states
 from flybystab.flybys.surface_change import check_shape
 from flybystab.flybys.surface_history import surface_history
 from flybystab.orbit.planets import Planet, planet
+from flybystab.tabular import Record
 from flybystab.typing import Array
 from flybystab.units import brief, to_si, whole
 
@@ -27,7 +28,7 @@ INSTANTS = 60
 
 
 @dataclass(frozen=True, eq=False)
-class RefreshDistance:
+class RefreshDistance(Record):
     """Distance within which encounters refresh a share of the surface.
 
     Attributes

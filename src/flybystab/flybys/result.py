@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import astropy.units as u
 import numpy as np
@@ -15,6 +15,7 @@ from flybystab.body.body import Body
 from flybystab.body.surface_slope import SlopeChange
 from flybystab.constants import G
 from flybystab.core.ellipsoid.potential import carlson_fd
+from flybystab.encoding import encoded
 from flybystab.encounter.encounter import Encounter
 from flybystab.flybys.batch import FlybyRun
 from flybystab.flybys.history import FlybyError, History, history_of, measured_error
@@ -24,7 +25,6 @@ from flybystab.flybys.robustness import Robustness, surface_verdicts
 from flybystab.flybys.surface_change import slopes_on_the_way
 from flybystab.flybys.verdict import Verdict, letter_of, settled
 from flybystab.flybys.verdict_margins import VerdictMargins, verdict_margins
-from flybystab.saving import encoded
 from flybystab.tabular import Record
 from flybystab.typing import Array
 from flybystab.units import brief
@@ -89,6 +89,7 @@ class FlybyResult(Record):
     inputs: FlybyInputs
     rung: str
     grains: GrainsOutcome | None
+    _stored: ClassVar[tuple[str, ...]] = ("inputs", "_run", "_comparison", "_by_surface", "_changed")
     _run: FlybyRun
     _comparison: FlybyRun | None
     _by_surface: dict[str, Verdict]

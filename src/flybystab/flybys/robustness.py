@@ -16,6 +16,7 @@ from flybystab.flybys.batch import FlybyRun
 from flybystab.flybys.flyby_many import flyby_many
 from flybystab.flybys.inputs import FlybyInputs
 from flybystab.flybys.verdict import Verdict
+from flybystab.tabular import Record
 from flybystab.typing import Array
 from flybystab.units import whole
 
@@ -26,7 +27,7 @@ FRICTION = np.deg2rad(3.0)
 
 
 @dataclass(frozen=True, eq=False)
-class Robustness:
+class Robustness(Record):
     """Verdicts of the same encounter with one assumption changed at a time.
 
     Attributes

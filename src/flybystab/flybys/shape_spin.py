@@ -25,6 +25,7 @@ from flybystab.encounter.attitude import attitude_matrix, periapsis_axes, rotati
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput, NotConverged
 from flybystab.flybys.surface_change import check_shape
+from flybystab.tabular import Record
 from flybystab.typing import Array
 from flybystab.units import brief, to_si
 
@@ -34,8 +35,8 @@ STEP = 1e-2
 STEADY = 1e-12
 
 
-@dataclass(frozen=True)
-class RotationState:
+@dataclass(frozen=True, repr=False)
+class RotationState(Record):
     """Free rotation of a rigid body.
 
     Attributes
@@ -60,7 +61,7 @@ class RotationState:
 
 
 @dataclass(frozen=True, eq=False)
-class ShapeSpin:
+class ShapeSpin(Record):
     """Rotation of a shape through an encounter.
 
     Attributes

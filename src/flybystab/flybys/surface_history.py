@@ -18,6 +18,7 @@ from flybystab.encounter.encounter import Encounter
 from flybystab.flybys.inputs import FlybyInputs
 from flybystab.flybys.rigid_course import Course, rigid_course
 from flybystab.flybys.surface_change import check_shape
+from flybystab.tabular import Record
 from flybystab.typing import Array
 from flybystab.units import whole
 
@@ -60,8 +61,8 @@ def history_of(inputs: FlybyInputs, shape: Shape) -> SurfaceHistory:
     return surface_history(inputs.body, inputs.encounter, attitude, shape=shape)
 
 
-@dataclass(frozen=True, eq=False)
-class LobeHistory:
+@dataclass(frozen=True, eq=False, repr=False)
+class LobeHistory(Record):
     """Roche lobes before an encounter, at closest approach and after it.
 
     Attributes

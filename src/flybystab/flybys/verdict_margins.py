@@ -13,6 +13,7 @@ from flybystab.flybys.batch import FlybyRun
 from flybystab.flybys.history import axes_of
 from flybystab.flybys.inputs import FlybyInputs
 from flybystab.flybys.verdict import CLASSES, Verdict, bound_fraction_upper
+from flybystab.tabular import Record
 
 #: A run that passes the largest axis ratio is followed to this multiple of it, to see how far beyond it gets.
 FOLLOWED = 5.0
@@ -20,8 +21,8 @@ FOLLOWED = 5.0
 ROWS = 20_000
 
 
-@dataclass(frozen=True)
-class VerdictMargins:
+@dataclass(frozen=True, repr=False)
+class VerdictMargins(Record):
     """Distances of a verdict from its edges. A verdict is not to be relied on where `nearest` is small.
 
     Attributes

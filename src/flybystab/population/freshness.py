@@ -21,6 +21,7 @@ from flybystab.catalogues.asteroid import Asteroid
 from flybystab.errors import InvalidInput
 from flybystab.orbit.search.encounter_finder import find_encounters
 from flybystab.population.rates import encounter_rates
+from flybystab.tabular import Record
 from flybystab.typing import Array
 from flybystab.units import checked_time, to_si, whole
 
@@ -29,7 +30,7 @@ WEATHERING = 1e6 * u.yr
 
 
 @dataclass(frozen=True, eq=False)
-class Freshness:
+class Freshness(Record):
     """Whether a surface is fresh.
 
     Attributes

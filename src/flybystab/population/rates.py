@@ -19,6 +19,7 @@ from flybystab.orbit.elements import GM_SUN, elements_from_state
 from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.planets import Planet, planet
 from flybystab.population.wetherill import NODES_R, NODES_S, rate_and_moments, rate_at_speeds, speed_sums
+from flybystab.tabular import Tabular
 from flybystab.typing import Array
 from flybystab.units import to_si, whole
 
@@ -27,7 +28,7 @@ BLOCK = 20_000
 
 
 @dataclass(frozen=True, eq=False)
-class EncounterRates:
+class EncounterRates(Tabular):
     """Mean rates of encounters of orbits with one planet.
 
     Attributes

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from flybystab.errors import InvalidInput
 from flybystab.flybys.verdict import Verdict
 from flybystab.orbit.planets import planet
+from flybystab.tabular import Collection
 from flybystab.units import to_si
 
 #: Verdicts of a body that changed its shape or lost mass and still exists.
@@ -22,7 +23,7 @@ CHANGED = (Verdict.RESHAPED, Verdict.MASS_LOSS, Verdict.DISRUPTED, Verdict.BEYON
 
 
 @dataclass(frozen=True, eq=False)
-class DisruptionRates:
+class DisruptionRates(Collection):
     """Rates of verdicts in a population.
 
     Attributes
@@ -46,6 +47,9 @@ class DisruptionRates:
     samples: QTable
     bodies: float
     diameter: Quantity | None
+
+    def _rows(self) -> dict[str, Any]:
+        return {name: self.table[name] for name in self.table.colnames}
 
     def rate(self, verdict: str, planet_name: str | None = None) -> Quantity:
         """Rate of a verdict, 1/yr, over all planets or for one."""
