@@ -246,6 +246,18 @@ def test_json_follows_its_schema(results, name, tmp_path):
         "OutcomeMap",
         "TargetMap",
         "Survival",
+        "Stability",
+        "Requirements",
+        "SurfaceSlopes",
+        "SlopeChange",
+        "SurfaceHistory",
+        "EncounterDistribution",
+        "EncounterRates",
+        "DisruptionRates",
+        "SpinForecast",
+        "BinarySample",
+        "GrainsOutcome",
+        "GrainsCourse",
     ],
 )
 def test_plots(results, name):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from flybystab.cli.common import show
+from flybystab.cli.common import document, show
 from flybystab.cli.screen import run_study, study_arguments
 
 HELP = "web site of the encounters of a screening"
@@ -46,6 +46,6 @@ def run(options: argparse.Namespace) -> None:
     page = atlas(results, folder, title=options.title, overwrite=options.overwrite)
     show(
         options,
-        lambda: {"page": str(page), "encounters": len(results), "table": str(table)},
+        lambda: document("atlas", page=str(page), encounters=len(results), table=str(table)),
         lambda: [f"{len(results)} encounters", f"table      {table}", f"page       {page}"],
     )

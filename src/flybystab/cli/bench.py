@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import argparse
 
-from flybystab._version import __version__
 from flybystab.bench import BENCHES
-from flybystab.cli.common import check_picture, figure_argument, show
+from flybystab.cli.common import check_picture, document, figure_argument, show
 
 HELP = "benchmarks, error against computing time: " + "; ".join(
     f"{name} ({about})" for name, about in BENCHES.items()
@@ -27,4 +26,4 @@ def run(options: argparse.Namespace) -> None:
     check_picture(options.output)
     bench = import_module(f"flybystab.bench.{options.what}")
     rows = bench.rows(options.output)
-    show(options, lambda: {"flybystab": __version__, "rows": rows}, lambda: bench.lines(rows))
+    show(options, lambda: document("bench", rows=rows), lambda: bench.lines(rows))

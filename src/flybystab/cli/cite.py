@@ -5,8 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from flybystab._version import __version__
-from flybystab.cli.common import show
+from flybystab.cli.common import document, show
 
 HELP = "BibTeX of the methods and data used, for one result or for the whole package"
 EXAMPLE = "flybystab cite screening.ecsv > flybystab.bib"
@@ -26,7 +25,7 @@ def run(options: argparse.Namespace) -> None:
     from flybystab.io.citation import BIBTEX, cited
 
     entries = [BIBTEX[key] for key in cited(_result(options.file))]
-    show(options, lambda: {"flybystab": __version__, "bibtex": entries}, lambda: ["\n\n".join(entries)])
+    show(options, lambda: document("references", bibtex=entries), lambda: ["\n\n".join(entries)])
 
 
 def _result(path: str | None) -> Any:

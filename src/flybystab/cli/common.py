@@ -11,6 +11,7 @@ import unicodedata
 from collections.abc import Callable, Mapping
 from typing import Any
 
+from flybystab._version import __version__
 from flybystab.cli.body_options import cohesion, friction, with_body_options
 from flybystab.core.material.surfaces import DEFAULT, NAMES
 from flybystab.errors import InvalidInput, NothingComputed, WrongUsage
@@ -69,6 +70,13 @@ def show(options: argparse.Namespace, document: Callable[[], Any], lines: Callab
         print(json.dumps(document(), indent=1, allow_nan=False))
     else:
         print("\n".join(_coloured(printable(line)) for line in lines()))
+
+
+def document(kind: str, **content: Any) -> dict[str, Any]:
+    """Document of a kind in :data:`flybystab.io.schema.NAMES`, with its schema and the version of the package."""
+    from flybystab.flybys.document import plain
+
+    return plain({"schema": f"{kind}/1", "flybystab": __version__, **content})
 
 
 def printable(text: str) -> str:

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from flybystab._version import __version__
-from flybystab.cli.common import show
+from flybystab.cli.common import document, show
 from flybystab.cli.tab_completion import SHELLS
 
 HELP = "script for tab completion in bash or zsh"
@@ -25,6 +24,6 @@ def run(options: argparse.Namespace) -> None:
     text = script(options.shell, command_parser())
     show(
         options,
-        lambda: {"flybystab": __version__, "shell": options.shell, "script": text},
+        lambda: document("completion", shell=options.shell, script=text),
         lambda: [text],
     )

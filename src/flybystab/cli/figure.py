@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import argparse
 
-from flybystab._version import __version__
 from flybystab.cli.common import (
     asteroid_of,
     check_picture,
+    document,
     material_arguments,
     material_of,
     show,
@@ -61,6 +61,6 @@ def run(options: argparse.Namespace) -> None:
     save(figure, output)
     show(
         options,
-        lambda: {"flybystab": __version__, "figure": options.what, "file": output},
+        lambda: document("figure", figure=options.what, file=output),
         lambda: [f"figure     {output}"],
     )

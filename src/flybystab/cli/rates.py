@@ -6,8 +6,7 @@ import argparse
 import sys
 from typing import Any
 
-from flybystab._version import __version__
-from flybystab.cli.common import sampling_arguments, show, surface_argument
+from flybystab.cli.common import document, sampling_arguments, show, surface_argument
 from flybystab.errors import InvalidInput
 
 HELP = "encounter rates of a population, and the rates of the verdicts"
@@ -101,7 +100,7 @@ def run(options: argparse.Namespace) -> None:
         what = "encounters " + ("at the surface" if within is None else f"within {options.within:g} au")
     show(
         options,
-        lambda: {"flybystab": __version__, "source": source, "orbits": count, "rows": rows},
+        lambda: document("rates", source=source, orbits=count, rows=rows),
         lambda: [f"{source} ({count} orbits): {what}", *lines],
     )
 

@@ -9,7 +9,9 @@ from typing import Any
 from flybystab.errors import UnknownName
 
 #: Kinds of document.
-NAMES = ("flyby", "table", "stability", "result")
+NAMES = (
+    "flyby", "table", "stability", "result", "rates", "references", "figure", "atlas", "bench", "completion",
+)  # fmt: skip
 
 
 def schema(name: str) -> dict[str, Any]:

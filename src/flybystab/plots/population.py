@@ -80,7 +80,7 @@ def verdict_plot(axes: Any, result: DisruptionRates) -> Any:
         for bar in bars:
             bar.set_hatch(hatches[k % 4])
     axes.set_xticks(np.arange(len(planets)), [p.capitalize() for p in planets])
-    axes.set(ylabel="rate in the population (1/Myr)", yscale="log" if shown else "linear")
+    axes.set(xlabel="planet", ylabel="rate in the population (1/Myr)", yscale="log" if shown else "linear")
     axes.set_title("Verdicts by planet", fontsize=9)
     if shown:
         least = min(bar.get_height() for bar in axes.patches if bar.get_height() > 0.0)

@@ -2,23 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import singledispatch
 from typing import Any
 
 import astropy.units as u
 import numpy as np
 
+from flybystab.body.bounds import Requirements
+from flybystab.body.stability import Stability
+from flybystab.body.surface_history import SurfaceHistory
+from flybystab.body.surface_slope import SlopeChange, SurfaceSlopes
+from flybystab.encounter.distribution import EncounterDistribution
 from flybystab.errors import InvalidInput
+from flybystab.flybys.binary import BinarySample
 from flybystab.flybys.critical import CriticalValues
+from flybystab.flybys.grains_flyby import GrainsCourse, GrainsOutcome
 from flybystab.flybys.history import History
 from flybystab.flybys.outcome_map import OutcomeMap, TargetMap
 from flybystab.flybys.result import FlybyResult
+from flybystab.flybys.spin_forecast import SpinForecast
 from flybystab.flybys.spin_sample import SpinSample
 from flybystab.flybys.survival import Survival
 from flybystab.flybys.table import FlybyTable
+from flybystab.plots import distributions
 from flybystab.plots.flyby import BLUE, axes_plot, flyby_panels, friction_plot, spin_plot
 from flybystab.plots.outcome_map import outcome_plot, target_plot
+from flybystab.plots.population import rate_plot, verdict_plot
+from flybystab.plots.stability import barrier_plot
 from flybystab.plots.style import new_axes
+from flybystab.population.rates import EncounterRates
+from flybystab.population.verdict_rates import DisruptionRates
 
 
 def plot_result(result: Any, axes: Any = None, **options: Any) -> Any:
@@ -102,6 +116,45 @@ def _(result: CriticalValues, axes: Any) -> Any:
     axes.set_xlabel("spin phase at closest approach (deg)")
     axes.set_ylabel(f"least {result.quantity.replace('_', ' ')} ({unit})\nfor {result.outcome}")
     return axes
+
+
+@_plot.register
+def _(result: Stability, axes: Any) -> Any:
+    return barrier_plot(axes, result.body, dilatancy=result.dilatancy)
+
+
+@_plot.register
+def _(result: EncounterRates, axes: Any) -> Any:
+    return rate_plot(axes, [result])
+
+
+@_plot.register
+def _(result: DisruptionRates, axes: Any) -> Any:
+    return verdict_plot(axes, result)
+
+
+#: Results whose figure needs nothing but the result.
+_DISTRIBUTIONS: dict[type, Callable[[Any, Any], Any]] = {
+    SurfaceSlopes: distributions.slope_plot,
+    SlopeChange: distributions.slope_change_plot,
+    SurfaceHistory: distributions.surface_history_plot,
+    EncounterDistribution: distributions.distribution_plot,
+    SpinForecast: distributions.forecast_plot,
+    BinarySample: distributions.binary_plot,
+    GrainsOutcome: distributions.grains_outcome_plot,
+    GrainsCourse: distributions.grains_course_plot,
+    Requirements: distributions.requirements_plot,
+}
+
+
+def _register(kind: type, function: Callable[[Any, Any], Any]) -> None:
+    @_plot.register(kind)
+    def _(result: Any, axes: Any) -> Any:
+        return function(axes, result)
+
+
+for _kind, _function in _DISTRIBUTIONS.items():
+    _register(_kind, _function)
 
 
 @_plot.register
