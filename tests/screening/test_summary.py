@@ -43,6 +43,27 @@ def test_summary_counts_and_ranks(tmp_path):
     assert "margin -3.00 deg, 1 deg by the passage, yields in 40 % of the samples" in text
 
 
+def test_probabilities_come_before_the_catalogue_values():
+    row = ROWS[3] | {"samples": 50, "p_intact": 0.6, "p_not_in_equilibrium": 0.4, "p_yield": 0.0}
+    row |= {"margin": -float("inf"), "friction_rise": float("nan"), "assumed": "density, spin period"}
+    s = summary(table_of([row], COLUMNS, {}))
+    assert s.expected == {"INTACT": 0.6, "NOT IN EQUILIBRIUM": 0.4}
+    lines = s.text().splitlines()
+    assert lines[:3] == ["1 encounter", "probability over the samples", "  INTACT: 0.6"]
+    assert lines[4] == "at the catalogue values (1 of 1 of bodies with assumed properties)"
+    assert lines[5] == "  NOT IN EQUILIBRIUM: 1"
+    assert "P(intact) 0.6; NOT IN EQUILIBRIUM (density, spin period assumed)" in s.text()
+    assert "inf" not in s.text()
+    assert "nan" not in s.text()
+
+
+def test_summary_without_samples_says_how_to_get_probabilities():
+    row = ROWS[0] | {"samples": 0, "assumed": "density"}
+    s = summary(table_of([row], COLUMNS, {}))
+    assert s.expected == {}
+    assert "1 of 1 of bodies with assumed properties; --samples 100 gives probabilities" in s.text()
+
+
 def test_summary_of_a_file_and_its_figure(tmp_path):
     write_rows(ROWS, tmp_path / "x.ecsv", COLUMNS, {"title": "t"})
     assert summary(tmp_path / "x.ecsv").rows == 5

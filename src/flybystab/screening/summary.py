@@ -13,7 +13,7 @@ from astropy.table import QTable
 
 from flybystab.errors import InvalidInput
 from flybystab.flybys.verdict import Verdict
-from flybystab.screening.columns import VERDICTS
+from flybystab.screening.columns import VERDICTS, share_of
 from flybystab.screening.results import read_results
 
 #: Rows of a list in the text.
@@ -29,6 +29,9 @@ SHORT = (
     "margin",
     "friction_rise",
     "p_yield",
+    "p_intact",
+    "p_not_in_equilibrium",
+    "assumed",
 )
 
 
@@ -42,6 +45,11 @@ class Summary:
         Encounters, and those that could not be computed.
     verdicts : dict of str to int
         Encounters by the verdict on the catalogue body.
+    expected : dict of str to float
+        Expected number of encounters of each verdict: the probabilities over the samples, summed over the sampled
+        encounters.
+    sampled, assumed : int
+        Encounters with samples, and those of bodies with properties that are assumed, not measured.
     samples, samples_dynamic : int
         Samples drawn, and those that needed the dynamics.
     closest : QTable
@@ -50,6 +58,9 @@ class Summary:
         Integrated encounters of bodies in equilibrium with the largest increase of mobilised friction.
     reshaped : QTable
         Encounters in which any sample, or the catalogue body, yields.
+    undecided : QTable
+        Encounters of bodies that are not in equilibrium at their catalogue values but are in some samples, the largest
+        probability of INTACT first.
     contributors : dict of str to int
         Inputs to which the margin is most sensitive, with the number of passages.
     errors : dict of str to int
@@ -61,11 +72,15 @@ class Summary:
     rows: int
     failed: int
     verdicts: dict[str, int]
+    expected: dict[str, float]
+    sampled: int
+    assumed: int
     samples: int
     samples_dynamic: int
     closest: QTable
     strongest: QTable
     reshaped: QTable
+    undecided: QTable
     contributors: dict[str, int]
     errors: dict[str, int]
     meta: dict[str, Any]
@@ -76,13 +91,22 @@ class Summary:
         return self.samples_dynamic / self.samples if self.samples else float("nan")
 
     def text(self) -> str:
-        """A few lines for a terminal."""
+        """A few lines for a terminal: probabilities over the samples first, then the verdicts at catalogue values."""
         lines = [
             f"{self.rows} encounter{'s' * (self.rows != 1)}"
             + (f", {self.failed} not computed" if self.failed else "")
         ]
         if not self.meta.get("complete", True):
             lines[0] += " (unfinished run)"
+        if self.sampled:
+            one = self.sampled == 1
+            lines.append(
+                "probability over the samples"
+                if one
+                else f"expected number over the samples ({self.sampled} encounters with samples)"
+            )
+            lines += [f"  {name}: {n:.3g}" for name, n in self.expected.items()]
+        lines.append("at the catalogue values" + self._caveat())
         lines += [f"  {name}: {n}" for name, n in self.verdicts.items()]
         if self.samples:
             lines.append(f"{self.samples} samples, {100 * self.dynamic_share:.2g} % of them by the dynamics")
@@ -93,23 +117,36 @@ class Summary:
             ("closest to failure", self.closest),
             ("largest increase by the passage", self.strongest),
             ("may yield", self.reshaped[:TOP]),
+            ("not in equilibrium at the catalogue values, but in a share of the samples", self.undecided),
         ):
             if len(table):
                 lines += [f"{title}:", *("  " + line for line in _lines(table))]
         lines += [f"  {n} x {reason}" for reason, n in self.errors.items()]
         return "\n".join(lines)
 
+    def _caveat(self) -> str:
+        if not self.assumed:
+            return ""
+        caveat = f" ({self.assumed} of {self.rows} of bodies with assumed properties"
+        return caveat + (")" if self.sampled else "; --samples 100 gives probabilities)")
+
 
 def _lines(table: QTable) -> list[str]:
     out = []
     for row in table:
-        p = f", yields in {100 * row['p_yield']:.3g} % of the samples" if np.isfinite(row["p_yield"]) else ""
-        out.append(
-            f"{row['asteroid']:>16} {row['time_tdb'][:16]} {row['planet']:>7} "
-            f"{row['distance'].to_value(u.km):11,.0f} km {row['verdict']}, "
-            f"margin {row['margin'].to_value(u.deg):.2f} deg, "
-            f"{row['friction_rise'].to_value(u.deg):.3g} deg by the passage{p}"
-        )
+        line = f"{row['asteroid']:>16} {row['time_tdb'][:16]} {row['planet']:>7} "
+        line += f"{row['distance'].to_value(u.km):11,.0f} km "
+        if np.isfinite(row["p_intact"]):
+            line += f"P(intact) {row['p_intact']:.3g}; "
+        line += str(row["verdict"])
+        if row["verdict"] == Verdict.NOT_IN_EQUILIBRIUM:  # no margin, and no effect of the encounter
+            line += f" ({row['assumed']} assumed)" if row["assumed"] else ""
+        else:
+            line += f", margin {row['margin'].to_value(u.deg):.2f} deg, "
+            line += f"{row['friction_rise'].to_value(u.deg):.3g} deg by the passage"
+        if np.isfinite(row["p_yield"]):
+            line += f", yields in {100 * row['p_yield']:.3g} % of the samples"
+        out.append(line)
     return out
 
 
@@ -144,15 +181,25 @@ def summary(results: QTable | str | Path, closest: int = 10) -> Summary:
         else Counter()
     )
     errors = Counter(e for e in np.asarray(table["error"], dtype=str) if e)
+    sampled = (np.asarray(table["samples"]) > 1) & ~failed
+    shares = {str(v): np.nan_to_num(np.asarray(table[share_of(v)], dtype=float)) for v in VERDICTS}
+    expected = {name: float(share[sampled].sum()) for name, share in shares.items()}
+    unstable = ~failed & (verdict == Verdict.NOT_IN_EQUILIBRIUM) & sampled
+    likely = np.argsort(-shares[str(Verdict.INTACT)], kind="stable")
+    undecided = likely[unstable[likely] & (shares[str(Verdict.INTACT)][likely] > 0.0)]
     return Summary(
         rows=len(table),
         failed=int(failed.sum()),
         verdicts={str(v): counts[v] for v in VERDICTS if counts[v]},
+        expected={name: n for name, n in expected.items() if n > 0.0},
+        sampled=int(sampled.sum()),
+        assumed=int(np.count_nonzero(np.asarray(table["assumed"], dtype=str) != "")),
         samples=int(np.maximum(table["samples"], 0).sum()),
         samples_dynamic=int(np.maximum(table["samples_dynamic"], 0).sum()),
         closest=table[order[:closest]][list(SHORT)],
         strongest=table[loaded[:closest]][list(SHORT)],
         reshaped=table[order[touched[order]]][list(SHORT)],
+        undecided=table[undecided[:closest]][list(SHORT)],
         contributors=dict(first.most_common(4)),
         errors=dict(errors.most_common(10)),
         meta=dict(table.meta),
