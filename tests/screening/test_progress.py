@@ -4,7 +4,7 @@ import io
 
 import pytest
 
-from flybystab.screening.progress import Progress, ProgressBar, duration
+from flybystab.screening.progress import Progress, ProgressBar
 
 STATE = Progress(30, 120, 10, 55, {"INTACT": 50, "RESHAPED": 5}, 4.0)
 
@@ -39,7 +39,3 @@ def test_a_log_gets_one_line_at_the_end():
     assert out.getvalue().count("\n") == 1
     assert "120/120 asteroids" in out.getvalue()
     assert "120 INTACT" in out.getvalue()
-
-
-def test_durations():
-    assert [duration(s) for s in (48, 200, 9000, 4e5)] == ["48 s", "3.3 min", "2.5 h", "4.6 d"]

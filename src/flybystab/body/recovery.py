@@ -25,6 +25,7 @@ from flybystab.core.energy.perturbation import EDGE, pile, rate_of_strain, slope
 from flybystab.core.energy.perturbation import direction as strain_direction
 from flybystab.core.energy.potential import velocity_gradient
 from flybystab.errors import InvalidInput, NotConverged
+from flybystab.progress import Progressing, progress_bar
 from flybystab.tabular import Record
 from flybystab.typing import Array
 from flybystab.units import to_si
@@ -189,6 +190,7 @@ def recovery(
     high: float = 2.0,
     largest_strain: float | None = None,
     seed: int = 0,
+    progress: Progressing = None,
 ) -> RecoveryLimit:
     """Least energy of a perturbation from which a body does not recover, by the full dynamics.
 
@@ -243,7 +245,11 @@ def recovery(
     if not 0.0 < low < high:
         raise InvalidInput("low", low, "a positive number below high")
     search = _Search(body, beta, precision, low, high, np.inf if largest_strain is None else largest_strain)
-    found = [search.least(np.random.default_rng([seed, i]), directions, refinements) for i in range(searches)]
+    with progress_bar(progress, searches, "searches", "recovery") as tick:
+        found = []
+        for i in range(searches):
+            found.append(search.least(np.random.default_rng([seed, i]), directions, refinements))
+            tick(i + 1)
     energies = np.array([e for e, _ in found])
     best = int(np.argmin(energies))
     least = float(energies[best])

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import time
 from typing import Any
 
 from flybystab.cli.common import check_table, names_a_file, show, span_arguments, tdb
@@ -45,7 +44,6 @@ def run(options: argparse.Namespace) -> None:
     from flybystab.catalogues.catalogue import catalogue
     from flybystab.flybys.document import table_document
     from flybystab.orbit.search.encounter_finder import find_encounters
-    from flybystab.screening.progress import Progress, ProgressBar
     from flybystab.screening.tables import write_table
 
     if options.name is None and not options.all:
@@ -54,12 +52,6 @@ def run(options: argparse.Namespace) -> None:
         raise WrongUsage("--clones: expected one asteroid or a file of a few, not --all")
     check_table(options.output)
     asteroids = list(catalogue()) if options.name is None else _asteroids(options.name)
-    bar = ProgressBar()
-    begin = time.monotonic()
-
-    def progress(done: int, total: int, found: int) -> None:
-        bar(Progress(done, total, 0, found, {}, time.monotonic() - begin))
-
     table = find_encounters(
         asteroids,
         tdb(options.start, "--from"),
@@ -68,7 +60,6 @@ def run(options: argparse.Namespace) -> None:
         within=options.within * u.au,
         error=options.error * u.km,
         growth=not options.all,
-        progress=progress if len(asteroids) > SHOWN else None,
     )
     if options.clones:
         table = _with_clones(table, asteroids, options.clones, options.seed)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import sys
 from typing import Any
 
 from flybystab.cli.common import document, sampling_arguments, show, surface_argument
@@ -139,7 +138,6 @@ def _verdicts(
         priors=None if options.population is None else Population.from_file(options.population),
         grains=options.grains,
         journal=None if output is None else output.with_name(output.name + ".journal"),
-        progress=_progress if sys.stderr.isatty() else None,
     )
     if figure and output is not None:
         from flybystab.plots.population import population_figure
@@ -178,11 +176,6 @@ def _diameter(text: str) -> Any:
         raise InvalidInput(
             "--diameter", text, "a number of km, or H for sizes from absolute magnitudes"
         ) from None
-
-
-def _progress(done: int, total: int) -> None:
-    end = "\n" if done == total else ""
-    print(f"\r{done} of {total} strata", end=end, file=sys.stderr, flush=True)
 
 
 def _interval(rate: float) -> str:

@@ -27,6 +27,7 @@ from flybystab.orbit.ephemeris import Ephemeris
 from flybystab.orbit.orbit import Orbit, later
 from flybystab.orbit.planets import Planet, planet
 from flybystab.orbit.search.encounter_finder import find_encounters
+from flybystab.progress import Progressing
 from flybystab.tabular import Tabular
 from flybystab.typing import Array
 from flybystab.units import brief, checked_time, to_si
@@ -141,6 +142,7 @@ def encounter_distribution(
     tolerance: float = 1e-12,
     workers: int | None = None,
     threads: int | None = None,
+    progress: Progressing = None,
 ) -> EncounterDistribution:
     """Clones of an orbit through one encounter.
 
@@ -162,6 +164,8 @@ def encounter_distribution(
         As in :func:`flybystab.find_encounters`.
     threads : int, optional
         Deprecated name of `workers`.
+    progress : bool or function, optional
+        Whether to show a bar (:mod:`flybystab.progress`); after two seconds on a terminal by default.
 
     Raises
     ------
@@ -204,6 +208,7 @@ def encounter_distribution(
         ephemeris=ephemeris,
         tolerance=tolerance,
         workers=workers,
+        progress=progress,
     )[0]
 
 
@@ -218,12 +223,13 @@ def distributions(
     ephemeris: str | Ephemeris | None = None,
     tolerance: float = 1e-12,
     workers: int | None = None,
+    progress: Progressing = None,
 ) -> list[EncounterDistribution]:
     """Clones of an orbit through several encounters, in one integration.
 
     Parameters
     ----------
-    orbit, n, seed, search, within, ephemeris, tolerance, workers
+    orbit, n, seed, search, within, ephemeris, tolerance, workers, progress
         As in :func:`encounter_distribution`.
     table : QTable
         The encounters of the nominal orbit, from :func:`flybystab.find_encounters`.
@@ -250,8 +256,14 @@ def distributions(
         ephemeris=ephemeris,
         tolerance=tolerance,
         workers=workers,
+        progress=_pairs(progress),
     )
     return [_distribution(path, row, clones, len(points), found, reach) for row in table]
+
+
+def _pairs(progress: Progressing) -> bool | Callable[[int, int, int], None] | None:
+    """`progress` for :func:`find_encounters`, which also counts the encounters."""
+    return (lambda done, total, _: progress(done, total)) if callable(progress) else progress
 
 
 def clone_passages(

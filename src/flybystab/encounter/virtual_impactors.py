@@ -27,6 +27,7 @@ from flybystab.orbit.orbit import Orbit, _ephemeris, deviated, later, seconds
 from flybystab.orbit.planets import Planet, planet
 from flybystab.orbit.search.encounter_finder import find_encounters
 from flybystab.orbit.target_plane import capture_radius
+from flybystab.progress import Progressing, progress_bar
 from flybystab.typing import Array
 from flybystab.units import checked_time, to_si, whole
 
@@ -104,6 +105,7 @@ def virtual_impactors(
     least: float = 1e-12,
     ephemeris: str | Ephemeris | None = None,
     workers: int | None = None,
+    progress: Progressing = None,
 ) -> QTable:
     """Possible impacts of an uncertain orbit, by a search along its line of variations.
 
@@ -124,6 +126,8 @@ def virtual_impactors(
         Smallest impact probability that is listed.
     ephemeris, workers
         As of :func:`flybystab.find_encounters`.
+    progress : bool or function, optional
+        Whether to show a bar (:mod:`flybystab.progress`); after two seconds on a terminal by default.
 
     Returns
     -------
@@ -152,11 +156,13 @@ def virtual_impactors(
     way = line.weak_direction(stop)
     grid = np.linspace(-float(sigmas), float(sigmas), count)
     table = line.encounters(grid[:, None] * way, start, stop, reach)
-    rows = [
-        found
-        for k, time in _minima(table, count)
-        if (found := _impact(line, way, float(grid[k]), float(grid[1] - grid[0]), time, reach)) is not None
-    ]
+    rows, minima = [], _minima(table, count)
+    with progress_bar(progress, len(minima), "candidates", "virtual impactors") as tick:
+        for i, (k, time) in enumerate(minima):
+            found = _impact(line, way, float(grid[k]), float(grid[1] - grid[0]), time, reach)
+            if found is not None:
+                rows.append(found)
+            tick(i + 1)
     rows = sorted(
         (r for r in _distinct(rows) if r["probability"] >= least), key=lambda r: float(r["time"].tdb.jd)
     )

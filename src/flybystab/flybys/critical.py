@@ -19,6 +19,7 @@ from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput, UnknownName
 from flybystab.flybys.flyby_many import flyby_many
 from flybystab.flybys.verdict import SEVERITY, Verdict
+from flybystab.progress import Progressing, progress_bar
 from flybystab.tabular import Tabular
 from flybystab.typing import Array
 from flybystab.units import to_si, whole
@@ -123,6 +124,7 @@ def critical(
     high: Quantity | None = None,
     tolerance: float = 1e-3,
     workers: int | None = None,
+    progress: Progressing = None,
 ) -> CriticalValues:
     """Least value of a quantity for which an encounter does no worse than an outcome, over the phases of the spin.
 
@@ -144,7 +146,7 @@ def critical(
         Range of the search, in place of that of :data:`PARAMETERS`.
     tolerance : float
         Relative width of the last bracket.
-    workers : int, optional
+    workers, progress
         As in :func:`flybystab.flyby_many`.
 
     Returns
@@ -189,25 +191,34 @@ def critical(
             attitude_at_start(b, e, np.asarray(base) @ about_z(float(a)))
             for (b, e), a in zip(scenes, angle[rows], strict=True)
         ]
-        table = flyby_many([b for b, _ in scenes], [e for _, e in scenes], turns, workers=workers)
+        table = flyby_many(
+            [b for b, _ in scenes], [e for _, e in scenes], turns, workers=workers, progress=False
+        )
         return np.array([SEVERITY.index(str(v)) > worst for v in table.verdict])
 
     every = np.arange(n)
     bad, good = np.full(n, np.nan), np.full(n, np.inf)
     open_ = every
-    for x in grid[::-1]:
-        failing = fails(np.full(len(open_), x), open_)
-        good[open_[~failing]] = x
-        bad[open_[failing]] = x
-        open_ = open_[~failing]
-        if not len(open_):
-            break
-    refined = np.isfinite(good) & np.isfinite(bad)
-    while (rows := np.flatnonzero(refined & (good - bad > width * good))).size:
-        middle = 0.5 * (good[rows] + bad[rows])
-        failing = fails(middle, rows)
-        bad[rows[failing]] = middle[failing]
-        good[rows[~failing]] = middle[~failing]
+    # Bisections of the widest bracket, relative to its safe end.
+    bisections = int(np.ceil(np.log2(max(2.0, float(np.max(1.0 - grid[:-1] / grid[1:])) / width))))
+    with progress_bar(progress, SCAN + bisections, "steps", quantity.replace("_", " ")) as tick:
+        for k, x in enumerate(grid[::-1]):
+            failing = fails(np.full(len(open_), x), open_)
+            good[open_[~failing]] = x
+            bad[open_[failing]] = x
+            open_ = open_[~failing]
+            tick(k + 1)
+            if not len(open_):
+                break
+        refined = np.isfinite(good) & np.isfinite(bad)
+        step = 0
+        while (rows := np.flatnonzero(refined & (good - bad > width * good))).size:
+            middle = 0.5 * (good[rows] + bad[rows])
+            failing = fails(middle, rows)
+            bad[rows[failing]] = middle[failing]
+            good[rows[~failing]] = middle[~failing]
+            step += 1
+            tick(min(SCAN + step, SCAN + bisections))
     unit = parameter.unit
     return CriticalValues(
         phase=np.rad2deg(angle) * u.deg,

@@ -17,6 +17,7 @@ from flybystab.flybys.inputs import FlybyInputs
 from flybystab.flybys.result import FlybyResult
 from flybystab.flybys.rigid_course import check_tension
 from flybystab.flybys.robustness import phases_of, robustness_of
+from flybystab.progress import Progressing
 
 #: The run that measures the error allows this many times more error in a step.
 LOOSER = 30.0
@@ -39,6 +40,7 @@ def flyby(
     seeds: int | Sequence[int] | None = None,
     model: str | None = None,
     attitude_at: str = "start",
+    progress: Progressing = None,
 ) -> FlybyResult:
     """Follow a body through an encounter.
 
@@ -76,6 +78,8 @@ def flyby(
     attitude_at : str
         ``"start"``: `attitude` is that at the start of the encounter; ``"periapsis"``: that which the freely rotating
         body would have at closest approach (:func:`attitude_at_start`).
+    progress : bool or function, optional
+        Of grains: whether to show a bar (:mod:`flybystab.progress`); after two seconds on a terminal by default.
 
     Returns
     -------
@@ -124,7 +128,7 @@ def flyby(
     result = FlybyResult(inputs, run, comparison, verdicts)
     if phases:
         result = result.with_(robustness=robustness_of(inputs, run, phases))
-    return handed_on(result, body, encounter, rotation, asked, pile)
+    return handed_on(result, body, encounter, rotation, asked, pile, progress)
 
 
 def _comparison(inputs: FlybyInputs, row: RowInputs) -> FlybyRun:

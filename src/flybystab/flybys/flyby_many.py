@@ -31,6 +31,7 @@ from flybystab.flybys.batch import (
 from flybystab.flybys.rigid_course import check_tension
 from flybystab.flybys.table import FlybyTable
 from flybystab.flybys.verdict import Verdict, verdict_of
+from flybystab.progress import Progressing, progress_bar
 from flybystab.typing import Array
 
 T = TypeVar("T")
@@ -44,6 +45,7 @@ def flyby_many(
     tolerance: float = TOLERANCE,
     max_axis_ratio: float = 6.0,
     workers: int | None = None,
+    progress: Progressing = None,
 ) -> FlybyTable:
     """Follow bodies through encounters, one for each row, on all cores.
 
@@ -57,6 +59,8 @@ def flyby_many(
         As in :func:`flyby`.
     workers : int, optional
         Threads (kernels release the interpreter lock), one a core by default; no result depends on it.
+    progress : bool or function, optional
+        Whether to show a bar (:mod:`flybystab.progress`); after two seconds on a terminal by default.
 
     Returns
     -------
@@ -91,7 +95,7 @@ def flyby_many(
     if not n:
         return _table(np.empty(0, OUTCOME), np.zeros(0), [], failures, tolerance)
     rows, met = records(bodies, rotations, encounters)
-    out = _outcomes(rows, met, np.flatnonzero(failures == ""), tolerance, max_axis_ratio, threads)
+    out = _outcomes(rows, met, np.flatnonzero(failures == ""), tolerance, max_axis_ratio, threads, progress)
     return _table(out, rows["phi"], encounters, failures, tolerance)
 
 
@@ -101,6 +105,7 @@ def follow_rows(
     *,
     tolerance: float = TOLERANCE,
     workers: int | None = None,
+    progress: Progressing = None,
 ) -> FlybyTable:
     """`flyby_many` for bodies that exist as records only (:func:`flybystab.flybys.batch.body_rows`).
 
@@ -110,7 +115,7 @@ def follow_rows(
         Attitudes in the frame of the encounter. The bodies are settled and without a tension cut-off.
     encounters : sequence of Encounter
         Those that the rows refer to.
-    tolerance, workers
+    tolerance, workers, progress
         As in :func:`flyby_many`.
     """
     tolerance, threads = step_tolerance(tolerance), worker_count(workers)
@@ -118,7 +123,7 @@ def follow_rows(
     if not len(rows):
         return _table(np.empty(0, OUTCOME), np.zeros(0), [], failures, tolerance)
     met = encounter_records(encounters, float(rows["axes"].max()))
-    out = _outcomes(rows, met, np.arange(len(rows)), tolerance, 6.0, threads)
+    out = _outcomes(rows, met, np.arange(len(rows)), tolerance, 6.0, threads, progress)
     return _table(out, rows["phi"], [encounters[k] for k in rows["encounter"]], failures, tolerance)
 
 
@@ -129,6 +134,7 @@ def _outcomes(
     tolerance: float,
     max_axis_ratio: float,
     threads: int,
+    progress: Progressing,
 ) -> NDArray[Any]:
     """Outcomes (OUTCOME) of the bodies in `rows`, as not computed for the others."""
     out = np.empty(len(bodies), OUTCOME)
@@ -144,7 +150,11 @@ def _outcomes(
             part(rows)
     else:  # rows that flow take longer: more parts than threads
         parts = min(len(rows), 16 * threads)
-        list(in_order(part, [rows[k::parts].copy() for k in range(parts)], threads))
+        with progress_bar(progress, len(rows), "flybys") as tick:
+            done = 0
+            for k, _ in enumerate(in_order(part, [rows[k::parts].copy() for k in range(parts)], threads)):
+                done += len(rows[k::parts])
+                tick(done)
     return out
 
 

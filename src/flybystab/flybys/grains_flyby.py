@@ -10,10 +10,11 @@ above if mass escapes. What is bound to it but apart, as satellites are, counts 
 
 from __future__ import annotations
 
+import itertools
 import os
 import time as clock
 import warnings
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, NamedTuple
 
@@ -36,6 +37,7 @@ from flybystab.flybys.batch import ground_near, span_of
 from flybystab.flybys.remnant import final_attitude
 from flybystab.flybys.result import FlybyResult
 from flybystab.flybys.verdict import Verdict, classed, letter_of
+from flybystab.progress import Progressing, progress_bar
 from flybystab.tabular import Collection, Record, Tabular
 from flybystab.typing import Array
 from flybystab.units import brief
@@ -275,6 +277,7 @@ def grains_flyby(
     threads: int | None = None,
     pile: Pile | None = None,
     keep: bool = True,
+    progress: Progressing = None,
 ) -> GrainsOutcome:
     """Carry piles of grains through an encounter.
 
@@ -296,6 +299,8 @@ def grains_flyby(
         Of this body: gives the shape and the sizes of the grains.
     keep : bool
         Whether piles are kept in the cache.
+    progress : bool or function, optional
+        Whether to show a bar (:mod:`flybystab.progress`); after two seconds on a terminal by default.
 
     Raises
     ------
@@ -311,19 +316,15 @@ def grains_flyby(
     warn_of_few(grains)
     begun = clock.perf_counter()
     cores = os.cpu_count() or 1
-    runs = tuple(
-        in_order(
-            lambda seed: one_pile(
-                pile.state(seed) if pile else make_pile(body, grains, seed, keep=keep),
-                body,
-                encounter,
-                rotation,
-                seed,
-            ),
-            chosen,
-            threads or cores,
-        )
-    )
+    rows = _FRAMES * len(chosen)
+    with progress_bar(progress, rows, "frames", f"{len(chosen)} piles of {grains} grains") as tick:
+        counter = itertools.count(1)
+
+        def one(seed: int) -> GrainsRun:
+            state = pile.state(seed) if pile else make_pile(body, grains, seed, keep=keep)
+            return one_pile(state, body, encounter, rotation, seed, lambda: tick(min(next(counter), rows)))
+
+        runs = tuple(in_order(one, chosen, threads or cores))
     tables = []
     for run in runs:
         rows = run.fragments.copy()
@@ -365,8 +366,15 @@ def _seeds(seeds: int | Sequence[int]) -> list[int]:
     return chosen
 
 
-def one_pile(pile: PileState, body: Body, encounter: Encounter, rotation: Array, seed: int = 0) -> GrainsRun:
-    """Carry one pile through an encounter (see :func:`grains_flyby`)."""
+def one_pile(
+    pile: PileState,
+    body: Body,
+    encounter: Encounter,
+    rotation: Array,
+    seed: int = 0,
+    tick: Callable[[], None] = lambda: None,
+) -> GrainsRun:
+    """Carry one pile through an encounter (see :func:`grains_flyby`); `tick` is called at every frame of its course."""
     begun = clock.perf_counter()
     sim, unit = pile.simulation, pile.time
     sim.rotate(rotation)
@@ -384,10 +392,12 @@ def one_pile(pile: PileState, body: Body, encounter: Encounter, rotation: Array,
         if moment - sim.time > 0.5 * sim.dt:
             sim.advance(moment - sim.time)
         _record(sim, rows, places, masses)
+        tick()
     step = float(frames[-1] - frames[-2])
     while not _quiet(rows, masses) and sim.time < longest:
         sim.advance(step)
         _record(sim, rows, places, masses)
+    tick()
     settled = _quiet(rows, masses)
     fragments, label = _fragments(sim, pile)
     directions, _, rate_after, momentum_after = _turning(_at_positions(sim), label)
@@ -621,6 +631,7 @@ def handed_on(
     rotation: Array,
     asked: Request,
     pile: Pile | None = None,
+    progress: Progressing = None,
 ) -> FlybyResult:
     """The result of the ellipsoid, or of grains where it hands on to them or they are forced.
 
@@ -636,7 +647,9 @@ def handed_on(
     needed = result.verdict in HANDED_ON or (apart and result.verdict != Verdict.IMPACT)
     if encounter.impact or not (asked.always or needed):
         return result
-    outcome = grains_flyby(body, encounter, rotation, grains=asked.grains, seeds=asked.seeds, pile=pile)
+    outcome = grains_flyby(
+        body, encounter, rotation, grains=asked.grains, seeds=asked.seeds, pile=pile, progress=progress
+    )
     run, verdict = outcome.median, outcome.verdict
     return result.with_(
         verdict=verdict,

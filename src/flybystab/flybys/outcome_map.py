@@ -18,6 +18,7 @@ from flybystab.flybys.flyby_many import flyby_many
 from flybystab.flybys.verdict import SEVERITY, Verdict
 from flybystab.orbit.planets import Planet, planet
 from flybystab.orbit.target_plane import capture_radius
+from flybystab.progress import Progressing
 from flybystab.tabular import Tabular
 from flybystab.typing import Array
 from flybystab.units import counted, to_si
@@ -89,6 +90,7 @@ def outcome_map(
     retrograde: bool = False,
     tolerance: float = 1e-6,
     workers: int | None = None,
+    progress: Progressing = None,
 ) -> OutcomeMap:
     """Verdicts of hyperbolic encounters over a grid, with the spin axis along the orbital angular momentum.
 
@@ -103,7 +105,7 @@ def outcome_map(
         Phases of the spin at the start, uniform over half a turn (an ellipsoid repeats after that).
     retrograde : bool
         Turn the spin axis against the orbital angular momentum.
-    tolerance, workers
+    tolerance, workers, progress
         As in :func:`flybystab.flyby_many`.
 
     Raises
@@ -120,7 +122,12 @@ def outcome_map(
     encounters = [Encounter.hyperbolic(where, x * u.m, y * u.m / u.s) for x in q for y in v]
     every = [e for e in encounters for _ in turns]
     table = flyby_many(
-        [body] * len(every), every, turns * len(encounters), tolerance=tolerance, workers=workers
+        [body] * len(every),
+        every,
+        turns * len(encounters),
+        tolerance=tolerance,
+        workers=workers,
+        progress=progress,
     )
     shape = (q.size, v.size, phases)
     return OutcomeMap(
@@ -184,6 +191,7 @@ def target_map(
     attitude: Any = None,
     tolerance: float = 1e-6,
     workers: int | None = None,
+    progress: Progressing = None,
 ) -> TargetMap:
     """Verdicts of a body with its attitude fixed in space over the target plane.
 
@@ -199,7 +207,7 @@ def target_map(
     attitude : ndarray (3, 3), optional
         Body axes -> (S, T, R): along the asymptote, and the two axes of the target plane. By default the
         spin axis is along -R and the long axis along the asymptote, so that paths with B along +T are prograde.
-    tolerance, workers
+    tolerance, workers, progress
         As in :func:`flybystab.flyby_many`.
     """
     where = planet(on)
@@ -225,7 +233,14 @@ def target_map(
             )
             encounters.append(encounter)
             rotations.append(frame @ spin @ turn)
-    table = flyby_many([body] * len(encounters), encounters, rotations, tolerance=tolerance, workers=workers)
+    table = flyby_many(
+        [body] * len(encounters),
+        encounters,
+        rotations,
+        tolerance=tolerance,
+        workers=workers,
+        progress=progress,
+    )
     shape = (q.size, directions)
     return TargetMap(
         planet=where,

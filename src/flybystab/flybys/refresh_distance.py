@@ -15,6 +15,7 @@ from flybystab.flybys.spin_sample import spin_states
 from flybystab.flybys.surface_change import check_shape
 from flybystab.flybys.surface_history import surface_history
 from flybystab.orbit.planets import Planet, planet
+from flybystab.progress import Progressing, progress_bar
 from flybystab.tabular import Record
 from flybystab.typing import Array
 from flybystab.units import brief, to_si, whole
@@ -74,6 +75,7 @@ def refresh_distance(
     rise: Quantity | None = None,
     attitudes: int = 8,
     seed: int = 0,
+    progress: Progressing = None,
 ) -> RefreshDistance:
     """Periapsis distance within which an encounter refreshes a share of the surface.
 
@@ -92,6 +94,8 @@ def refresh_distance(
     attitudes : int
         Isotropic attitudes at the start.
     seed : int
+    progress : bool or function, optional
+        Whether to show a bar (:mod:`flybystab.progress`); after two seconds on a terminal by default.
 
     Returns
     -------
@@ -130,6 +134,7 @@ def refresh_distance(
             radii = low if step == 0 else float(np.sqrt(low * high))
             if radii not in found:
                 found[radii] = shares(radii)
+                tick(min(len(found), 3 * BISECTIONS))
             reached = float(getattr(np, statistic)(found[radii])) >= share
             if step == 0:
                 if not reached:
@@ -140,5 +145,6 @@ def refresh_distance(
                 high = radii
         return float(np.sqrt(low * high))
 
-    middle, least, most = (root(s) * home.radius / 1e3 * u.km for s in ("mean", "min", "max"))
+    with progress_bar(progress, 3 * BISECTIONS, "distances", "refreshing distance") as tick:
+        middle, least, most = (root(s) * home.radius / 1e3 * u.km for s in ("mean", "min", "max"))
     return RefreshDistance(home, middle, float(share), least, most, len(rotations))

@@ -17,6 +17,7 @@ from flybystab.errors import InvalidInput
 from flybystab.flybys.rigid_course import rigid_course
 from flybystab.flybys.shape_spin import RotationState, free_rotation
 from flybystab.flybys.spin_sample import SpinStates, spin_states
+from flybystab.progress import Progressing, progress_bar
 from flybystab.tabular import Tabular
 from flybystab.typing import Array
 from flybystab.units import to_si
@@ -75,6 +76,7 @@ def spin_forecast(
     seed: int = 0,
     *,
     turned: Quantity = 0.0 * u.deg,
+    progress: Progressing = None,
 ) -> SpinForecast:
     """Rotation of an asteroid after an encounter, at `n` phases of its rotation.
 
@@ -87,6 +89,8 @@ def spin_forecast(
     n, seed : int
     turned : Quantity
         Angle by which the pole is moved towards the pole of the ecliptic, for its uncertainty.
+    progress : bool or function, optional
+        Whether to show a bar (:mod:`flybystab.progress`); after two seconds on a terminal by default.
 
     Returns
     -------
@@ -106,14 +110,16 @@ def spin_forecast(
     tilt = _tilt(rotations[0] @ (_moments(bodies[0]) * bodies[0].omega), to_si(turned, u.rad, "turned"))
     after: list[RotationState] = []
     change = []
-    for body, rotation in zip(bodies, rotations, strict=True):
-        moments, start = _moments(body), tilt @ rotation
-        course = rigid_course(body, encounter, frame @ start)
-        state = free_rotation(moments, course.spin.value[-1], course.attitude[-1])
-        before = start @ (moments * body.omega)
-        now = state.momentum.value
-        change.append(np.arctan2(np.linalg.norm(np.cross(before, now)), before @ now))
-        after.append(state)
+    with progress_bar(progress, n, "phases", "spin forecast") as tick:
+        for body, rotation in zip(bodies, rotations, strict=True):
+            moments, start = _moments(body), tilt @ rotation
+            course = rigid_course(body, encounter, frame @ start)
+            state = free_rotation(moments, course.spin.value[-1], course.attitude[-1])
+            before = start @ (moments * body.omega)
+            now = state.momentum.value
+            change.append(np.arctan2(np.linalg.norm(np.cross(before, now)), before @ now))
+            after.append(state)
+            tick(len(after))
     momenta = np.array([s.momentum.value for s in after])
     return SpinForecast(
         Quantity([s.precession_period for s in after]),

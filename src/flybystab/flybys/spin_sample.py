@@ -17,6 +17,7 @@ from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
 from flybystab.flybys.batch import TOLERANCE, body_rows
 from flybystab.flybys.flyby_many import flyby_many, follow_rows
+from flybystab.progress import Progressing
 from flybystab.tabular import Tabular
 from flybystab.typing import Array
 from flybystab.units import counted, whole
@@ -83,6 +84,7 @@ def spin_sample(
     material: Material | None = None,
     tolerance: float = TOLERANCE,
     workers: int | None = None,
+    progress: Progressing = None,
 ) -> SpinSample:
     """The same encounter at `n` attitudes.
 
@@ -102,6 +104,8 @@ def spin_sample(
         As in :func:`flybystab.flybys.flyby.flyby`.
     workers : int, optional
         Threads; one a core by default. The result does not depend on it.
+    progress : bool or function, optional
+        Whether to show a bar (:mod:`flybystab.progress`); after two seconds on a terminal by default.
 
     Raises
     ------
@@ -117,9 +121,13 @@ def spin_sample(
     attitudes = periapsis_axes(encounter) @ states.rotations
     if states.body.material.cut_off:
         bodies, turns = states.bodies(), list(attitudes)
-        table = flyby_many(bodies, [encounter] * n, turns, tolerance=tolerance, workers=workers)
+        table = flyby_many(
+            bodies, [encounter] * n, turns, tolerance=tolerance, workers=workers, progress=progress
+        )
     else:
-        table = follow_rows(states.rows(), [encounter], tolerance=tolerance, workers=workers)
+        table = follow_rows(
+            states.rows(), [encounter], tolerance=tolerance, workers=workers, progress=progress
+        )
     return SpinSample(
         spin_ratio=table.spin_ratio,
         pole_change=table.pole_change,

@@ -20,6 +20,7 @@ from flybystab.flybys.flyby_many import follow_rows
 from flybystab.flybys.spin_sample import SpinSampleStates, SpinStates, spin_states
 from flybystab.flybys.verdict import Verdict
 from flybystab.orbit.planets import Planet
+from flybystab.progress import Progressing
 from flybystab.tabular import Tabular
 from flybystab.typing import Array
 from flybystab.units import counted
@@ -93,6 +94,7 @@ def survival(
     tolerance: float = 1e-6,
     workers: int | None = None,
     quick: bool = True,
+    progress: Progressing = None,
 ) -> Survival:
     """Probabilities of the verdicts on a body whose orbit is uncertain.
 
@@ -112,7 +114,7 @@ def survival(
         Body axes -> ICRF at the start of every encounter, instead of drawing it.
     material : Material, optional
         Instead of the body's own.
-    tolerance, workers
+    tolerance, workers, progress
         As in :func:`flybystab.flyby_many`.
     quick : bool
         Whether the bound may decide. The verdicts are the same without it, and every margin is exact.
@@ -145,7 +147,7 @@ def survival(
     encounters = [
         Encounter.hyperbolic(distribution.planet, distances[k] * u.m, speeds[k] * u.m / u.s) for k in rows
     ]
-    table = follow_rows(bodies, encounters, tolerance=tolerance, workers=workers)
+    table = follow_rows(bodies, encounters, tolerance=tolerance, workers=workers, progress=progress)
     verdict[rows], margin[rows], failure[rows] = table.verdict, table.margin.to_value(u.deg), table.failure
     return Survival(verdict, distribution.found, margin * u.deg, failure, bounded)
 

@@ -25,6 +25,7 @@ from flybystab.errors import InvalidInput
 from flybystab.flybys.document import plain, table_document
 from flybystab.flybys.verdict import Verdict
 from flybystab.io.text import MEANING
+from flybystab.progress import Progressing, progress_bar
 from flybystab.saving import csv_text
 from flybystab.screening.columns import VERDICTS, share_of
 from flybystab.screening.results import read_results
@@ -57,7 +58,12 @@ _FILES = ("atlas.css", "atlas.js")
 
 
 def atlas(
-    results: QTable | str | Path, folder: str | Path, *, title: str = "", overwrite: bool = False
+    results: QTable | str | Path,
+    folder: str | Path,
+    *,
+    title: str = "",
+    overwrite: bool = False,
+    progress: Progressing = None,
 ) -> Path:
     """Write the atlas of a screening into a folder; returns the path of its ``index.html``.
 
@@ -71,6 +77,8 @@ def atlas(
         Heading of the list.
     overwrite : bool
         Replace an atlas that is there.
+    progress : bool or function, optional
+        Whether to show a bar (:mod:`flybystab.progress`); after two seconds on a terminal by default.
 
     Raises
     ------
@@ -100,18 +108,20 @@ def atlas(
     pages = _templates()
     (place / "encounters").mkdir()
     page = pages.get_template("encounter.html")
-    for entry, row in zip(entries, document["rows"], strict=True):
-        own = by_name[entry["label"]]
-        k = own.index(entry)
-        text = page.render(
-            e=entry,
-            earlier=own[k - 1] if k else None,
-            later=own[k + 1] if k + 1 < len(own) else None,
-            others=[o for o in own if o is not entry],
-        )
-        (place / "encounters" / entry["file"]).write_text(text, encoding="utf-8")
-        one = {**document, "rows": [row]}
-        (place / "encounters" / entry["data"]).write_text(json.dumps(one, indent=1), encoding="utf-8")
+    with progress_bar(progress, len(entries), "pages", "atlas") as tick:
+        for number, (entry, row) in enumerate(zip(entries, document["rows"], strict=True)):
+            own = by_name[entry["label"]]
+            k = own.index(entry)
+            text = page.render(
+                e=entry,
+                earlier=own[k - 1] if k else None,
+                later=own[k + 1] if k + 1 < len(own) else None,
+                others=[o for o in own if o is not entry],
+            )
+            (place / "encounters" / entry["file"]).write_text(text, encoding="utf-8")
+            one = {**document, "rows": [row]}
+            (place / "encounters" / entry["data"]).write_text(json.dumps(one, indent=1), encoding="utf-8")
+            tick(number + 1)
     (place / "index.html").write_text(_index(pages, table, entries, title), encoding="utf-8")
     for name in _FILES:
         shutil.copyfile(

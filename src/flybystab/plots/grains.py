@@ -19,6 +19,7 @@ from flybystab.flybys.batch import span_of
 from flybystab.flybys.grains_flyby import GrainsOutcome, GrainsRun
 from flybystab.flybys.result import FlybyResult
 from flybystab.plots.flyby import BLACK
+from flybystab.progress import Progressing, progress_bar
 from flybystab.typing import Array
 
 #: Colours of clumps, the most massive first; then they repeat.
@@ -159,8 +160,15 @@ def grains_figure(result: FlybyResult, title: str = "", path: str | Path | None 
     return figure
 
 
-def grains_animation(result: FlybyResult, path: str | Path, title: str = "", rate: int = 8) -> Path:
-    """An animation of the pile with the median outcome, as GIF or MP4."""
+def grains_animation(
+    result: FlybyResult,
+    path: str | Path,
+    title: str = "",
+    rate: int = 8,
+    *,
+    progress: Progressing = None,
+) -> Path:
+    """An animation of the pile with the median outcome, as GIF or MP4; `progress` as in :func:`flybystab.flyby`."""
     from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -180,9 +188,9 @@ def grains_animation(result: FlybyResult, path: str | Path, title: str = "", rat
 
     figure.suptitle(title, fontsize=10)
     film = FuncAnimation(figure, draw, frames=len(run.course))
-    film.save(
-        target, writer=PillowWriter(fps=rate) if target.suffix.lower() == ".gif" else FFMpegWriter(fps=rate)
-    )
+    writer = PillowWriter(fps=rate) if target.suffix.lower() == ".gif" else FFMpegWriter(fps=rate)
+    with progress_bar(progress, len(run.course), "pictures", target.name) as tick:
+        film.save(target, writer=writer, progress_callback=lambda k, _: tick(k + 1))
     return target
 
 

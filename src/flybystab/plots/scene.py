@@ -17,6 +17,7 @@ from flybystab.encounter.attitude import periapsis_axes
 from flybystab.errors import InvalidInput
 from flybystab.flybys.result import FlybyResult, History
 from flybystab.plots.flyby import BLACK, BLUE, ORANGE, RED
+from flybystab.progress import Progressing, progress_bar
 from flybystab.typing import Array
 
 #: Colour of the body by regime; light comes from the planet's side, so that shape shows in greyscale.
@@ -125,7 +126,13 @@ def body_plot(
 
 
 def animation(
-    result: FlybyResult, path: str | Path, title: str = "", frames: int = 60, rate: int = 15
+    result: FlybyResult,
+    path: str | Path,
+    title: str = "",
+    frames: int = 60,
+    rate: int = 15,
+    *,
+    progress: Progressing = None,
 ) -> Path:
     """Write an animation: the path around the planet, and the body in a panel of its own.
 
@@ -138,6 +145,8 @@ def animation(
     title : str
     frames, rate : int
         Number of pictures, and pictures per second.
+    progress : bool or function, optional
+        Whether to show a bar (:mod:`flybystab.progress`); after two seconds on a terminal by default.
 
     Raises
     ------
@@ -192,7 +201,9 @@ def animation(
 
     figure.suptitle(title, fontsize=10)
     film = FuncAnimation(figure, draw, frames=frames)
-    film.save(target, writer=PillowWriter(fps=rate) if kind == ".gif" else FFMpegWriter(fps=rate))
+    writer = PillowWriter(fps=rate) if kind == ".gif" else FFMpegWriter(fps=rate)
+    with progress_bar(progress, frames, "pictures", target.name) as tick:
+        film.save(target, writer=writer, progress_callback=lambda k, _: tick(k + 1))
     return target
 
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
@@ -27,6 +27,7 @@ from flybystab.orbit.planets import planet
 from flybystab.population.rates import EncounterRates, elements_table
 from flybystab.population.sampled_encounters import Plan, impact_and_total, sampled
 from flybystab.population.verdict_rates import DisruptionRates
+from flybystab.progress import Progressing, progress_bar
 from flybystab.screening.journal import Journal
 from flybystab.screening.priors import Population
 from flybystab.units import to_si, whole
@@ -51,7 +52,7 @@ def disruption_rates(
     workers: int | None = None,
     executor: Executor | None = None,
     journal: str | Path | None = None,
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progressing = None,
 ) -> DisruptionRates:
     """Rates of every verdict in a population of asteroids.
 
@@ -82,8 +83,8 @@ def disruption_rates(
         Computes the strata, such as processes or a dask client's executor; no result depends on it.
     journal : str or Path, optional
         File in which finished strata are kept: the same call resumes an interrupted run. Removed at the end.
-    progress : callable, optional
-        Called with the number of finished strata and the number of all.
+    progress : bool or function, optional
+        Whether to show a bar (:mod:`flybystab.progress`); after two seconds on a terminal by default.
 
     Returns
     -------
@@ -137,12 +138,12 @@ def disruption_rates(
             if number in done:
                 parts[task] = _restored(done[number]["columns"])
         todo = [(n, t) for n, t in enumerate(tasks) if t not in parts]
-        for number, task, table in _results(plan, todo, rates, workers, executor):
-            parts[task] = table
-            if book is not None:
-                book.add(number, {"columns": _stored(table)})
-            if progress is not None:
-                progress(len(parts), len(tasks))
+        with progress_bar(progress, len(tasks), "strata", "rates of verdicts") as tick:
+            for number, task, table in _results(plan, todo, rates, workers, executor):
+                parts[task] = table
+                if book is not None:
+                    book.add(number, {"columns": _stored(table)})
+                tick(len(parts))
     except BaseException:
         if book is not None:
             book.close()

@@ -28,6 +28,7 @@ from flybystab.core.ellipsoid.yield_bound import quick_margins, tide_size
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
 from flybystab.orbit.search.encounter_finder import find_encounters
+from flybystab.progress import Progressing, progress_bar
 from flybystab.screening.draws import stream
 from flybystab.units import to_si, whole
 
@@ -47,6 +48,7 @@ def infer(
     attitudes: int = 32,
     seed: int = 0,
     yield_surface: str = DEFAULT_SURFACE,
+    progress: Progressing = None,
 ) -> QTable:
     """Least friction angles compatible with the shape and spin of a body and with its past encounters.
 
@@ -64,6 +66,8 @@ def infer(
         Seed of the random attitudes.
     yield_surface : str
         As in :class:`flybystab.Material`.
+    progress : bool or function, optional
+        Whether to show a bar (:mod:`flybystab.progress`); after two seconds on a terminal by default.
 
     Returns
     -------
@@ -98,20 +102,22 @@ def infer(
     rest = np.empty(shape)
     needs = np.empty((*shape, len(encounters), 2))  # at the best and at the worst attitude
     followed = np.zeros(len(encounters), dtype=bool)
-    for i, r in enumerate(rho):
-        for j, c in enumerate(cohesion):
-            free, bounds = _by_bound(bodies, float(r), float(c), code, sizes)
-            rest[i, j] = free
-            for k, encounter in enumerate(encounters):
-                if bounds[k] < free + NEGLIGIBLE or not np.isfinite(free):
-                    needs[i, j, k] = free, max(free, bounds[k] if np.isfinite(free) else free)
-                    continue
-                followed[k] = True
-                found = [
-                    _need(body, q, encounter, float(r), float(c), code)
-                    for body, q in zip(bodies, turns, strict=True)
-                ]
-                needs[i, j, k] = max(free, min(found)), max(free, *found)
+    with progress_bar(progress, len(rho) * len(cohesion), "materials", "bounds") as tick:
+        for i, r in enumerate(rho):
+            for j, c in enumerate(cohesion):
+                free, bounds = _by_bound(bodies, float(r), float(c), code, sizes)
+                rest[i, j] = free
+                for k, encounter in enumerate(encounters):
+                    if bounds[k] < free + NEGLIGIBLE or not np.isfinite(free):
+                        needs[i, j, k] = free, max(free, bounds[k] if np.isfinite(free) else free)
+                        continue
+                    followed[k] = True
+                    found = [
+                        _need(body, q, encounter, float(r), float(c), code)
+                        for body, q in zip(bodies, turns, strict=True)
+                    ]
+                    needs[i, j, k] = max(free, min(found)), max(free, *found)
+                tick(i * len(cohesion) + j + 1)
     least, most = (
         np.maximum(rest, needs[..., side].max(axis=2)) if len(encounters) else rest for side in (0, 1)
     )

@@ -32,6 +32,7 @@ from flybystab.body.body import Material
 from flybystab.catalogues.catalogue import Asteroid
 from flybystab.errors import FlybystabWarning, InvalidInput, OutputFailed
 from flybystab.orbit.ephemeris import ephemeris
+from flybystab.progress import check_progress, progress_bar
 from flybystab.screening.columns import COLUMNS, SAMPLE_COLUMNS
 from flybystab.screening.encounters import Finder, passages
 from flybystab.screening.journal import Journal
@@ -294,7 +295,7 @@ def screen(
     *,
     tolerance: float = 1e-7,
     grains: int | None = None,
-    progress: Callable[[Progress], None] | None = None,
+    progress: bool | Callable[[Progress], None] | None = None,
     finder: Finder = passages,
 ) -> QTable:
     """Verdicts on the encounters of asteroids, modelled as rubble piles.
@@ -324,8 +325,9 @@ def screen(
         Step tolerance of the dynamics.
     grains : int, optional
         Grains of the piles that carry on the samples where the ellipsoid ends, one pile a sample.
-    progress : callable, optional
-        Called with a :class:`Progress` after every asteroid.
+    progress : bool or callable, optional
+        Whether to show a bar (:mod:`flybystab.progress`), or a function that is called with a :class:`Progress` after
+        every asteroid.
     finder : callable
         Finds the passages of an asteroid, instead of its orbit.
 
@@ -346,10 +348,13 @@ def screen(
     began = clock.monotonic()
     found: dict[int, list[dict[str, Any]]] = {}
     counts: Counter[str] = Counter()
-    for i, result in run.results(executor):
-        found[i] = result["rows"]
-        counts.update(r.get("verdict") or "error" for r in result["rows"])
-        if progress is not None:
-            rows = sum(counts.values())
-            progress(Progress(len(found), len(chosen), 0, rows, dict(counts), clock.monotonic() - began))
+    check_progress(progress)
+    with progress_bar(not callable(progress) and progress, len(chosen), "asteroids", "screening") as tick:
+        for i, result in run.results(executor):
+            found[i] = result["rows"]
+            counts.update(r.get("verdict") or "error" for r in result["rows"])
+            tick(len(found))
+            if callable(progress):
+                rows = sum(counts.values())
+                progress(Progress(len(found), len(chosen), 0, rows, dict(counts), clock.monotonic() - began))
     return table_of((r for i in sorted(found) for r in found[i]), COLUMNS, run.meta())

@@ -44,6 +44,7 @@ from flybystab.orbit.search.minima import WIDTH
 from flybystab.orbit.search.neighbours import add_growth
 from flybystab.orbit.search.track import EXHAUSTED, INSIDE, MAX_STEPS, STALLED, search
 from flybystab.orbit.target_plane import target_plane
+from flybystab.progress import check_progress, progress_bar
 from flybystab.typing import Array
 from flybystab.units import checked_time, to_si
 
@@ -78,7 +79,7 @@ def find_encounters(
     forces: tuple[str, ...] | None = None,
     growth: bool = False,
     workers: int | None = None,
-    progress: Callable[[int, int, int], None] | None = None,
+    progress: bool | Callable[[int, int, int], None] | None = None,
     threads: int | None = None,
 ) -> QTable:
     """All closest approaches of asteroids to planets within a distance.
@@ -113,8 +114,9 @@ def find_encounters(
         does not depend on the span; about ten times the time.
     workers : int, optional
         Number of threads; one per processor by default.
-    progress : callable, optional
-        Called with the asteroids searched, all of them, and the encounters found so far.
+    progress : bool or callable, optional
+        Whether to show a bar (:mod:`flybystab.progress`), or a function that is called with the asteroids searched,
+        all of them, and the encounters found so far.
     threads : int, optional
         Deprecated name of `workers`.
 
@@ -248,10 +250,13 @@ def find_encounters(
     cuts = sorted({*range(0, len(rows), size), *twins, *(i + 1 for i in twins), len(rows)})
     tasks = [slice(i, j) for i, j in pairwise(cuts)]
     flat: list[Array] = []
-    for task, parts in zip(tasks, in_order(run, tasks, workers), strict=True):
-        flat += parts
-        if progress is not None:
-            progress(task.stop, len(rows), sum(map(len, flat)))
+    check_progress(progress)
+    with progress_bar(not callable(progress) and progress, len(rows), "orbits", "encounters") as tick:
+        for task, parts in zip(tasks, in_order(run, tasks, workers), strict=True):
+            flat += parts
+            tick(task.stop)
+            if callable(progress):
+                progress(task.stop, len(rows), sum(map(len, flat)))
     raw = np.concatenate(flat) if flat else np.empty((0, WIDTH))
     raw = raw[np.lexsort((raw[:, 1], raw[:, 11]))]
     # An impact between the epoch of an orbit and the span ends the search of that asteroid.
