@@ -114,18 +114,23 @@ class Bar:
         self._bar.set_postfix_str(self._note, refresh=False)
         self._bar.last_print_t = self._bar._time()  # without it close() takes the bar for one never shown
 
-    def _text(self) -> str:
-        done = int(self._done) if float(self._done).is_integer() else round(self._done, 2)
+    def text(self, done: float, note: str, seconds: float, width: int = 0) -> str:
+        """One line: with a bar and as wide as `width` if it is positive."""
         return tqdm.format_meter(
-            done,
+            int(done) if float(done).is_integer() else round(done, 2),
             self.total,
-            time.monotonic() - self._begun,
+            seconds,
+            ncols=width or None,
+            ascii=".#",
             initial=self.initial,
-            bar_format=_LINE,
+            bar_format=_FORMAT if width else _LINE,
             prefix=self._words["desc"],
             unit=self._words["unit"],
-            postfix=self._note or None,
+            postfix=note or None,
         )
+
+    def _text(self) -> str:
+        return self.text(self._done, self._note, time.monotonic() - self._begun)
 
     def close(self) -> None:
         """Draw the last state and end the line, so that other text can follow."""

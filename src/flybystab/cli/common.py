@@ -57,6 +57,17 @@ def figure_argument(sub: argparse.ArgumentParser, films: bool = False) -> None:
     """Add the option --output for a figure, or for an animation too."""
     film = f" or an animation ({', '.join(FILMS)})" if films else ""
     sub.add_argument("--output", metavar="FILE", help=f"write a figure ({', '.join(FIGURES)}){film}")
+    style_argument(sub)
+
+
+def style_argument(sub: argparse.ArgumentParser) -> None:
+    """Add the option --style of figures."""
+    sub.add_argument(
+        "--style",
+        choices=("default", "paper", "talk"),
+        default="default",
+        help="of the figure: paper (8 pt, width of journal columns) or talk (large text and lines)",
+    )
 
 
 def movie_argument(sub: argparse.ArgumentParser) -> None:

@@ -11,6 +11,7 @@ from flybystab.cli.common import (
     material_arguments,
     material_of,
     show,
+    style_argument,
 )
 from flybystab.plots.formats import FIGURES
 
@@ -28,6 +29,7 @@ def arguments(sub: argparse.ArgumentParser) -> None:
     )
     material_arguments(sub)
     sub.add_argument("--output", metavar="FILE", help=f"file ({', '.join(FIGURES)}; WHAT.png)")
+    style_argument(sub)
 
 
 def run(options: argparse.Namespace) -> None:

@@ -51,12 +51,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         ):  # the notice of Python would be a second one
             sys.modules["flybystab.core.numerics.compile_notice"].uninstall()
         if options.json or options.command in ("cite", "completion"):
-            COMMANDS[options.command].run(options)
+            _run(options)
         else:
             from flybystab.cli.compile_notice import announced
 
             with announced(sys.stderr, elsewhere=getattr(options, "jobs", 1) > 1):
-                COMMANDS[options.command].run(options)
+                _run(options)
         sys.stdout.flush()
     except WrongUsage as reason:
         print(printable(f"flybystab {options.command}: {reason} (see --help)"), file=sys.stderr)
@@ -73,6 +73,17 @@ def main(argv: Sequence[str] | None = None) -> int:
         print("flybystab: stopped", file=sys.stderr)
         return 1
     return 0
+
+
+def _run(options: argparse.Namespace) -> None:
+    """Run the command, in the style of its figure."""
+    if getattr(options, "style", "default") == "default":
+        COMMANDS[options.command].run(options)
+        return
+    from flybystab.plots.style import figure_style
+
+    with figure_style(options.style):
+        COMMANDS[options.command].run(options)
 
 
 class _Parser(argparse.ArgumentParser):

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from flybystab.cli.common import document, sampling_arguments, show, surface_argument
+from flybystab.cli.common import document, sampling_arguments, show, style_argument, surface_argument
 from flybystab.errors import InvalidInput
 
 HELP = "encounter rates of a population, and the rates of the verdicts"
@@ -57,6 +57,7 @@ def arguments(sub: argparse.ArgumentParser) -> None:
         "--output", metavar="FILE",
         help="with --verdicts: figure (.png, .pdf, .svg) or table of the samples (.ecsv, .parquet, .csv); resumable",
     )  # fmt: skip
+    style_argument(sub)
 
 
 def run(options: argparse.Namespace) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 
-from flybystab.cli.common import check_picture, check_table, show
+from flybystab.cli.common import check_picture, check_table, show, style_argument
 from flybystab.plots.formats import FIGURES
 
 HELP = "summary and plot of a screening table"
@@ -17,6 +17,7 @@ def arguments(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
         "--output", metavar="FILE", help=f"write a figure ({', '.join(FIGURES)}) or the table (.csv)"
     )
+    style_argument(sub)
 
 
 def run(options: argparse.Namespace) -> None:

@@ -13,6 +13,7 @@ from matplotlib.patches import Patch
 from flybystab.body.body import DEFAULT_SURFACE, Body, Material
 from flybystab.body.fluids import roche_limit
 from flybystab.constants import GM_EARTH, R_EARTH, G
+from flybystab.plots.flyby import described
 from flybystab.plots.stability import (
     ANGLES,
     BLACK,
@@ -21,6 +22,7 @@ from flybystab.plots.stability import (
     regions_plot,
     spin_plot,
 )
+from flybystab.plots.style import new_figure, styled
 
 #: Spins of the panels of :func:`regions_figure`, omega^2/(pi G rho).
 SPINS = (0.0, 0.2, 0.4, 0.8)
@@ -47,9 +49,10 @@ def catalogue_bodies() -> dict[str, Body]:
     return {a.name: a.body for a in catalogue() if not a.tumbles}
 
 
+@styled
 def regions_figure(bodies: Mapping[str, Body], surface: str = DEFAULT_SURFACE, cells: int = 200) -> Figure:
     """Required friction angle of shapes at four spins; each body is on the panel of the spin nearest to its own."""
-    figure = Figure(figsize=(9.0, 8.6), layout="constrained")
+    figure = new_figure(9.0, 8.6)
     w2 = {name: float(b.omega @ b.omega) * b.dynamical_time**2 for name, b in bodies.items()}
     for axes, spin in zip(figure.subplots(2, 2).flat, SPINS, strict=True):
         near = {n: b for n, b in bodies.items() if min(SPINS, key=lambda s: abs(s - w2[n])) == spin}
@@ -61,13 +64,14 @@ def regions_figure(bodies: Mapping[str, Body], surface: str = DEFAULT_SURFACE, c
         ),
         Line2D([], [], color=BLACK, ls="", marker="o", ms=4, mec="white", label="asteroids of the catalogue"),
     ]
-    figure.legend(handles=handles, loc="outside lower center", ncols=3, frameon=False, fontsize=8)
+    figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
 
 
+@styled
 def spin_figure(bodies: Mapping[str, Body], surface: str = DEFAULT_SURFACE) -> Figure:
     """Spin limits against the axis ratio, oblate and prolate, with bodies by ``a3/a1`` and ``omega^2/(pi G rho)``."""
-    figure = Figure(figsize=(9.6, 4.8), layout="constrained")
+    figure = new_figure(9.6, 4.8)
     flat, long = figure.subplots(1, 2, sharey=True)
     for axes in (flat, long):
         axes.set(xlim=(0.1, 1.02), ylim=(0.0, 1.3))
@@ -78,20 +82,23 @@ def spin_figure(bodies: Mapping[str, Body], surface: str = DEFAULT_SURFACE) -> F
     return figure
 
 
+@styled
 def barrier_figure(body: Body) -> Figure:
     """Energy lost by a perturbation against its strain, for volume-preserving and for associative flow."""
-    figure = Figure(figsize=(9.6, 4.2), layout="constrained")
+    figure = new_figure(9.6, 4.2)
     for axes, dilatancy, name in zip(
         figure.subplots(1, 2), (0.0, 1.0), ("volume-preserving flow", "associative flow"), strict=True
     ):
         barrier_plot(axes, body, dilatancy=dilatancy)
-        axes.set_title(name, fontsize=9)
+        axes.set_title(name)
+    figure.suptitle(described(body))
     return figure
 
 
+@styled
 def failure_figure(surface: str = DEFAULT_SURFACE) -> Figure:
     """Static failure distance from the Earth against the friction angle, for free bodies and synchronous satellites."""
-    figure = Figure(figsize=(9.6, 4.4), layout="constrained")
+    figure = new_figure(9.6, 4.4)
     free, bound = figure.subplots(1, 2)
     density, material = 2000 * u.kg / u.m**3, Material(yield_surface=surface)
     gm, radius = GM_EARTH * u.m**3 / u.s**2, R_EARTH * u.m
@@ -107,7 +114,8 @@ def failure_figure(surface: str = DEFAULT_SURFACE) -> Figure:
     mean = GM_EARTH / (4.0 / 3.0 * np.pi * G * R_EARTH**3)
     far = (4.0 * mean / (3.0 * fluid.load * density.value)) ** (1 / 3)
     bound.axhline(far, color=BLACK, ls=(0, (1, 3)), lw=2, label="fluid: Roche limit")
-    bound.legend(frameon=False, fontsize=8)
-    free.set_title("own spin, long axis to the planet, 2000 kg/m$^3$", fontsize=9)
-    bound.set_title("synchronous satellite, 2000 kg/m$^3$", fontsize=9)
+    bound.legend()
+    free.set_title("own spin, long axis to the planet")
+    bound.set_title("synchronous satellite")
+    figure.suptitle(f"Earth; bodies of {density.value:g} kg/m$^3$, {surface.title()}")
     return figure

@@ -13,10 +13,11 @@ from typing import Any
 import astropy.units as u
 import numpy as np
 
+from flybystab.body.body import Body
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
 from flybystab.flybys.result import FlybyResult, History
-from flybystab.plots.style import save
+from flybystab.plots.style import new_figure, save, styled
 
 BLACK, ORANGE, SKY, GREEN, BLUE, RED = "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00"
 STYLES = ("-", "--", ":")
@@ -40,6 +41,14 @@ def _shade(axes: Any, history: History, labels: bool = False) -> None:
             axes.axvspan(t[a], t[min(b, len(t) - 1)], lw=0, zorder=0, label=label, **style)
 
 
+def described(body: Body) -> str:
+    """Size, density and spin of a body for a title."""
+    size = " x ".join(f"{2.0 * a:.4g}" for a in body.axes)
+    rate = float(np.linalg.norm(body.omega))
+    spin = f"{2.0 * np.pi / rate / 3600.0:.4g} h" if rate > 0.0 else "no spin"
+    return f"{size} m, {body.rho:.4g} kg/m$^3$, {spin}, {body.material.friction_angle.to_value(u.deg):g} deg"
+
+
 def distance_plot(axes: Any, history: History, encounter: Encounter) -> Any:
     """Plot distance from the planet's centre against time, with the planet's radius and a legend of the shading."""
     axes.semilogy(_hours(history), history.distance.to_value(u.km), color=BLACK)
@@ -47,7 +56,7 @@ def distance_plot(axes: Any, history: History, encounter: Encounter) -> Any:
     axes.axhline(radius, color=BLUE, ls="--", label=f"radius of {encounter.planet.name.capitalize()}")
     axes.set_ylabel("distance (km)")
     _shade(axes, history, labels=True)
-    axes.legend(frameon=False, fontsize=8)
+    axes.legend()
     return axes
 
 
@@ -58,7 +67,7 @@ def friction_plot(axes: Any, history: History, limit: u.Quantity) -> Any:
     axes.axhline(limit.to_value(u.deg), color=BLACK, ls="--", label="material")
     axes.set_ylim(0.0, 1.15 * limit.to_value(u.deg))
     axes.set_ylabel("friction angle (deg)")
-    axes.legend(frameon=False, fontsize=8, loc="center right")
+    axes.legend(loc="center right")
     _shade(axes, history)
     return axes
 
@@ -80,7 +89,7 @@ def axes_plot(axes: Any, history: History) -> Any:
         axes.plot(_hours(history), a[:, i], color=colour, ls=style, label=f"$a_{i + 1}$")
     axes.set_ylim(0.0, 1.15 * a.max())
     axes.set_ylabel("semi-axes (m)")
-    axes.legend(frameon=False, fontsize=8, ncols=3, loc="lower left")
+    axes.legend(ncols=3)
     _shade(axes, history)
     return axes
 
@@ -98,13 +107,10 @@ def flyby_panels(panels: Sequence[Any], result: FlybyResult) -> Sequence[Any]:
     return panels
 
 
+@styled
 def flyby_figure(result: FlybyResult, title: str, path: str | Path) -> Path:
     """Write a figure with the four panels of a flyby; returns its path."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.2, 8.4), layout="constrained")
-    FigureCanvasAgg(figure)
+    figure = new_figure(7.2, 8.4)
     panels: Any = figure.subplots(4, 1, sharex=True)
     flyby_panels(panels, result)
     panels[0].set_title(title)

@@ -19,6 +19,7 @@ from flybystab.flybys.batch import span_of
 from flybystab.flybys.grains_flyby import GrainsOutcome, GrainsRun
 from flybystab.flybys.result import FlybyResult
 from flybystab.plots.flyby import BLACK
+from flybystab.plots.style import new_figure, save, styled
 from flybystab.progress import Progressing, progress_bar
 from flybystab.typing import Array
 
@@ -122,25 +123,23 @@ def grains_scene_plot(
     axes.set_title(
         f"{encounter.planet.name.capitalize()} to scale, pile {magnification:,.0f} times larger; "
         "colours: clumps at the end",
-        fontsize=9,
     )
     return axes
 
 
+@styled
 def grains_figure(result: FlybyResult, title: str = "", path: str | Path | None = None) -> Any:
     """Four stills of the pile with the median outcome, and the largest clump of all piles against time."""
-    from matplotlib.figure import Figure
-
     outcome = _outcome(result)
     run, turn = outcome.median, periapsis_axes(result.encounter)
     hours = run.course.time.to_value(u.h)
     rows = [0, *(int(np.abs(hours - h).argmin()) for h in (0.7, 1.8)), len(hours) - 1]
-    figure = Figure(figsize=(11.0, 5.6), layout="constrained")
+    figure = new_figure(11.0, 5.6)
     grid = figure.add_gridspec(2, 4, height_ratios=(1.4, 1.0))
     for k, row in enumerate(rows):
         axes = figure.add_subplot(grid[0, k])
         grains_plot(axes, run, row, turn)
-        axes.set_title(f"{hours[row]:+.2f} h", fontsize=10)
+        axes.set_title(f"{hours[row]:+.2f} h")
         if k == 0:
             axes.set_ylabel("y (km)")
     share, spin = figure.add_subplot(grid[1, :2]), figure.add_subplot(grid[1, 2:])
@@ -153,13 +152,13 @@ def grains_figure(result: FlybyResult, title: str = "", path: str | Path | None 
     spin.set(xlabel="time from closest approach (h)", ylabel="its long semi-axis (m)")
     figure.suptitle(
         f"{title + ': ' if title else ''}{result.verdict}, {len(outcome.runs)} piles, blue: the median one",
-        fontsize=10,
     )
     if path is not None:
-        figure.savefig(path, dpi=150)
+        save(figure, path)
     return figure
 
 
+@styled
 def grains_animation(
     result: FlybyResult,
     path: str | Path,
@@ -170,23 +169,20 @@ def grains_animation(
 ) -> Path:
     """An animation of the pile with the median outcome, as GIF or MP4; `progress` as in :func:`flybystab.flyby`."""
     from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
 
     target = Path(path)
     run, turn = _outcome(result).median, periapsis_axes(result.encounter)
-    figure = Figure(figsize=(5.0, 5.2), dpi=80)
-    FigureCanvasAgg(figure)
+    figure = new_figure(5.0, 5.2, dpi=80, layout=None)
     axes: Any = figure.add_axes((0.16, 0.1, 0.8, 0.8))
 
     def draw(k: int) -> list[Any]:
         axes.clear()
         grains_plot(axes, run, k, turn)
-        axes.set_title(f"{run.course.time[k].to_value(u.h):+.2f} h", fontsize=10)
+        axes.set_title(f"{run.course.time[k].to_value(u.h):+.2f} h")
         axes.set_ylabel("y (km)")
         return []
 
-    figure.suptitle(title, fontsize=10)
+    figure.suptitle(title)
     film = FuncAnimation(figure, draw, frames=len(run.course))
     writer = PillowWriter(fps=rate) if target.suffix.lower() == ".gif" else FFMpegWriter(fps=rate)
     with progress_bar(progress, len(run.course), "pictures", target.name) as tick:

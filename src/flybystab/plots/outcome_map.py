@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 
 from flybystab.flybys.outcome_map import OutcomeMap, TargetMap, outcome_map, target_map
 from flybystab.flybys.verdict import Verdict
+from flybystab.plots.flyby import described
 from flybystab.typing import Array
 
 __all__ = ["MARKERS", "SCALE", "outcome_map", "outcome_plot", "target_map", "target_plot", "verdict_points"]
@@ -49,11 +50,14 @@ def outcome_plot(axes: Any, outcomes: OutcomeMap) -> Any:
     share = outcomes.share_yielding
     if share.min() < 0.5 <= share.max() and min(share.shape) > 1:
         lines = axes.contour(q, v, share.T, levels=[0.1, 0.9], colors="black", linestyles=["--", "-"])
-        labels = axes.clabel(lines, fmt=lambda x: f"{x:.0%} of phases yield", fontsize=7, inline=False)
+        labels = axes.clabel(
+            lines, fmt=lambda x: f"{x:.0%} of phases yield", fontsize="x-small", inline=False
+        )
         for label in labels:  # a halo instead of a gap in the line
             label.set_path_effects([withStroke(linewidth=2.5, foreground="white")])
     axes.set_xlabel(f"periapsis (radii of {outcomes.planet.name.capitalize()})")
     axes.set_ylabel("hyperbolic excess speed $v_\\infty$ (km/s)")
+    axes.set_title(f"{outcomes.planet.name.capitalize()}; {described(outcomes.body)}")
     _legend(axes, worst)
     return axes
 
@@ -80,12 +84,14 @@ def target_plot(axes: Any, target: TargetMap) -> Any:
         color="white",
         ha="center",
         va="center",
-        fontsize=7,
+        fontsize="x-small",
         zorder=4,
     )
     axes.set_aspect("equal")
     axes.set_xlabel("B.T (km)")
     axes.set_ylabel("B.R (km)")
+    speed = target.v_inf.to_value(u.km / u.s)
+    axes.set_title(f"{target.planet.name.capitalize()}, $v_\\infty$ = {speed:g} km/s")
     _legend(axes, target.verdict)
     return axes
 
@@ -105,7 +111,7 @@ def verdict_points(axes: Any, b: Quantity, verdict: Sequence[str], radius: Quant
 
         axes.add_patch(Circle((0, 0), radius.to_value(u.km), fill=False))
     axes.set(xlabel="B.T (km)", ylabel="B.R (km)")
-    axes.legend(frameon=False, fontsize=8)
+    axes.legend()
     return axes
 
 
@@ -128,7 +134,15 @@ def _letters(axes: Any, places: Sequence[Array], names: NDArray[np.str_]) -> Non
         letter = SCALE[name][0]
         dark = letter in "DXH"
         if letter != "I":
-            axes.text(x, y, letter, ha="center", va="center", fontsize=6, color="white" if dark else "black")
+            axes.text(
+                x,
+                y,
+                letter,
+                ha="center",
+                va="center",
+                fontsize="xx-small",
+                color="white" if dark else "black",
+            )
 
 
 def _legend(axes: Any, names: NDArray[np.str_]) -> None:
@@ -136,4 +150,4 @@ def _legend(axes: Any, names: NDArray[np.str_]) -> None:
 
     found = [n for n in _ORDER if n in set(names.ravel().tolist())]
     handles = [Patch(facecolor=SCALE[n][1], edgecolor="0.5", label=f"{SCALE[n][0]}  {n}") for n in found]
-    axes.legend(handles=handles, fontsize=7, loc="upper right", framealpha=0.9)
+    axes.legend(handles=handles, loc="upper right", framealpha=0.9)

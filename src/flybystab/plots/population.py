@@ -11,6 +11,7 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
 from flybystab.flybys.verdict import Verdict
+from flybystab.plots.style import new_figure, styled
 from flybystab.population.rates import EncounterRates
 from flybystab.population.verdict_rates import CHANGED, DisruptionRates
 
@@ -48,8 +49,8 @@ def rate_plot(axes: Any, rates: Sequence[EncounterRates]) -> Any:
         colour, style = _line(one.planet.name)
         axes.loglog(q, total, color=colour, ls=style, label=one.planet.name.capitalize())
     axes.set(xlabel="periapsis distance (radii of the planet)", ylabel="encounters within it (1/Myr)")
-    axes.set_title("Encounters of the population", fontsize=9)
-    axes.legend(frameon=False, fontsize=8)
+    axes.set_title("Encounters of the population")
+    axes.legend()
     return axes
 
 
@@ -81,11 +82,11 @@ def verdict_plot(axes: Any, result: DisruptionRates) -> Any:
             bar.set_hatch(hatches[k % 4])
     axes.set_xticks(np.arange(len(planets)), [p.capitalize() for p in planets])
     axes.set(xlabel="planet", ylabel="rate in the population (1/Myr)", yscale="log" if shown else "linear")
-    axes.set_title("Verdicts by planet", fontsize=9)
+    axes.set_title("Verdicts by planet")
     if shown:
         least = min(bar.get_height() for bar in axes.patches if bar.get_height() > 0.0)
         axes.set_ylim(bottom=0.3 * least)
-        axes.legend(frameon=False, fontsize=8)
+        axes.legend()
     return axes
 
 
@@ -93,7 +94,7 @@ def probability_plot(axes: Any, result: DisruptionRates, planet_name: str = "ear
     """Plot the probability of a change (reshaped or worse) over periapsis and hyperbolic excess speed at one planet."""
     here = result.samples["planet"] == planet_name
     if not np.any(here):
-        axes.set_title(f"{planet_name.capitalize()}: no encounters sampled", fontsize=9)
+        axes.set_title(f"{planet_name.capitalize()}: no encounters sampled")
         return axes
     speed = result.samples["v_inf"][here].to_value(u.km / u.s)
     edges_v = np.unique(np.round(np.quantile(speed, np.linspace(0.0, 1.0, 7)), 1))
@@ -106,7 +107,7 @@ def probability_plot(axes: Any, result: DisruptionRates, planet_name: str = "ear
     )
     axes.figure.colorbar(image, ax=axes, label="probability of a change of shape")
     axes.set(xlabel="periapsis distance (radii of the planet)", ylabel="hyperbolic excess speed (km/s)")
-    axes.set_title(f"Reshaped or worse at {planet_name.capitalize()}", fontsize=9)
+    axes.set_title(f"Reshaped or worse at {planet_name.capitalize()}")
     return axes
 
 
@@ -125,14 +126,15 @@ def size_plot(axes: Any, result: DisruptionRates) -> Any:
     axes.xaxis.set_major_formatter(FormatStrFormatter("%g"))
     axes.xaxis.set_minor_formatter(NullFormatter())
     axes.set(xlabel="diameter (km)", ylabel="rate for larger bodies (1/Myr)")
-    axes.set_title("Cumulative rate against size", fontsize=9)
-    axes.legend(frameon=False, fontsize=8)
+    axes.set_title("Cumulative rate against size")
+    axes.legend()
     return axes
 
 
+@styled
 def population_figure(result: DisruptionRates, rates: Sequence[EncounterRates]) -> Figure:
     """Encounters, verdicts by planet, probability over periapsis and speed, and rates against size, on one page."""
-    figure = Figure(figsize=(9.6, 7.6), layout="constrained")
+    figure = new_figure(9.6, 7.6)
     (first, second), (third, fourth) = figure.subplots(2, 2)
     rate_plot(first, rates)
     verdict_plot(second, result)

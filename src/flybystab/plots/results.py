@@ -26,11 +26,11 @@ from flybystab.flybys.spin_sample import SpinSample
 from flybystab.flybys.survival import Survival
 from flybystab.flybys.table import FlybyTable
 from flybystab.plots import distributions
-from flybystab.plots.flyby import BLUE, axes_plot, flyby_panels, friction_plot, spin_plot
+from flybystab.plots.flyby import BLUE, axes_plot, described, flyby_panels, friction_plot, spin_plot
 from flybystab.plots.outcome_map import outcome_plot, target_plot
 from flybystab.plots.population import rate_plot, verdict_plot
 from flybystab.plots.stability import barrier_plot
-from flybystab.plots.style import new_axes
+from flybystab.plots.style import new_axes, styled
 from flybystab.population.rates import EncounterRates
 from flybystab.population.verdict_rates import DisruptionRates
 
@@ -55,9 +55,14 @@ def plot_result(result: Any, axes: Any = None, **options: Any) -> Any:
     InvalidInput
         There is no figure of this kind of result.
     """
-    if axes is None:
-        axes = new_axes(4 if isinstance(result, FlybyResult) else 1)
-    return _plot(result, axes, **options)
+    if axes is not None:
+        return _plot(result, axes, **options)
+    return _plot_alone(result, **options)
+
+
+@styled
+def _plot_alone(result: Any, **options: Any) -> Any:
+    return _plot(result, new_axes(4 if isinstance(result, FlybyResult) else 1), **options)
 
 
 @singledispatch
@@ -70,7 +75,7 @@ def _plot(result: Any, axes: Any) -> Any:
 def _(result: FlybyResult, axes: Any) -> Any:
     flyby_panels(axes, result)
     planet = result.encounter.planet.name.capitalize()
-    axes[0].set_title(f"{result.verdict} past {planet}")
+    axes[0].set_title(f"{planet}; {described(result.inputs.body)}: {result.verdict}")
     return axes
 
 
@@ -106,6 +111,7 @@ def _(result: TargetMap, axes: Any) -> Any:
 def _(result: SpinSample, axes: Any) -> Any:
     axes.scatter(result.pole_change.to_value(u.deg), result.spin_ratio, s=14, color=BLUE)
     axes.set(xlabel="rotation of the spin axis (deg)", ylabel="spin rate after / before")
+    axes.set_title(f"{len(result)} attitudes, pole {'known' if result.pole_known else 'unknown'}")
     return axes
 
 

@@ -17,6 +17,7 @@ from flybystab.encounter.attitude import periapsis_axes
 from flybystab.errors import InvalidInput
 from flybystab.flybys.result import FlybyResult, History
 from flybystab.plots.flyby import BLACK, BLUE, ORANGE, RED
+from flybystab.plots.style import new_figure, styled
 from flybystab.progress import Progressing, progress_bar
 from flybystab.typing import Array
 
@@ -84,7 +85,7 @@ def scene_plot(
     axes.set_zticks([])
     name = encounter.planet.name.capitalize()
     axes.set_title(
-        f"{name} to scale, body {magnification:,.0f} times larger; grey rigid, orange flowing", fontsize=9
+        f"{name} to scale, body {magnification:,.0f} times larger; grey rigid, orange flowing",
     )
     limits = np.array([getattr(axes, f"get_{n}lim")() for n in "xyz"])
     # The scene is wide, the square that matplotlib draws it in is as high as the figure: it may reach out to the sides.
@@ -125,6 +126,7 @@ def body_plot(
     return axes
 
 
+@styled
 def animation(
     result: FlybyResult,
     path: str | Path,
@@ -154,8 +156,6 @@ def animation(
         Another ending, or no ffmpeg for an ``.mp4``.
     """
     from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
     from matplotlib.patches import Circle
 
     target = Path(path)
@@ -176,8 +176,7 @@ def animation(
     places = encounter.positions(inside) @ turn.T / 1e3
     reach = float(history.semi_axes[:, 0].to_value(u.km).max())
 
-    figure = Figure(figsize=(8.0, 4.2), layout="constrained", dpi=80)
-    FigureCanvasAgg(figure)
+    figure = new_figure(8.0, 4.2, dpi=80)
     left: Any = figure.add_subplot(1, 2, 1)
     right: Any = figure.add_subplot(1, 2, 2, projection="3d")
     left.add_patch(Circle((0, 0), encounter.planet.radius / 1e3, color=BLUE))
@@ -196,10 +195,10 @@ def animation(
         right.view_init(elev=90, azim=-90)
         right.set_zticks([])
         right.set_zlabel("")
-        right.set_title(f"{history.regime[rows[k]]}, {moments[k] / 3600.0:+.2f} h", fontsize=10)
+        right.set_title(f"{history.regime[rows[k]]}, {moments[k] / 3600.0:+.2f} h")
         return [dot]
 
-    figure.suptitle(title, fontsize=10)
+    figure.suptitle(title)
     film = FuncAnimation(figure, draw, frames=frames)
     writer = PillowWriter(fps=rate) if kind == ".gif" else FFMpegWriter(fps=rate)
     with progress_bar(progress, frames, "pictures", target.name) as tick:

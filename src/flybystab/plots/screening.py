@@ -12,7 +12,7 @@ from astropy.table import QTable
 from flybystab.flybys.verdict import Verdict
 from flybystab.plots.labels import label_points
 from flybystab.plots.outcome_map import MARKERS, SCALE
-from flybystab.plots.style import save
+from flybystab.plots.style import new_figure, save, styled
 from flybystab.screening.columns import VERDICTS
 from flybystab.screening.inference import strongest_passage
 from flybystab.screening.results import read_results
@@ -29,15 +29,7 @@ NOTHING = 1e-5
 _LEVELS = (0, 5, 10, 15, 20, 25, 30, 35, 40, 45, 60)
 
 
-def _figure(width: float, height: float) -> Any:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(width, height), layout="constrained")
-    FigureCanvasAgg(figure)
-    return figure
-
-
+@styled
 def inference_figure(table: QTable, path: str | Path) -> Path:
     """Plot the region of density, cohesion and friction angle that is consistent with :func:`flybystab.infer`.
 
@@ -54,7 +46,7 @@ def inference_figure(table: QTable, path: str | Path) -> Path:
     density = np.unique(table["density"].to_value(u.kg / u.m**3))
     cohesion = np.unique(table["cohesion"].to_value(u.Pa))
     names = list(PANELS) if table.meta.get("passages") else list(PANELS)[:1]
-    figure = _figure(1.2 + 3.6 * len(names), 3.8)
+    figure = new_figure(1.2 + 3.6 * len(names), 3.8)
     panels: Any = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
     # Zero cohesion has a place below the least of the others.
     height = np.arange(len(cohesion))
@@ -68,12 +60,12 @@ def inference_figure(table: QTable, path: str | Path) -> Path:
             filled = panel.contourf(density, height, capped, _LEVELS, cmap=colours, extend="max")
 
             lines = panel.contour(density, height, capped, [15, 25, 35, 45], colors="k", linewidths=0.7)
-            panel.clabel(lines, fmt="%g deg", fontsize=7)
+            panel.clabel(lines, fmt="%g deg", fontsize="x-small")
             panel.contourf(density, height, capped, [60, 91], colors="none", hatches=["///"])
         if len(known) == 2:
             panel.axvspan(known[0] - known[1], known[0] + known[1], color="w", alpha=0.35, lw=0)
             panel.axvline(known[0], color="w", lw=1)
-        panel.set_title(PANELS[name], fontsize=9)
+        panel.set_title(PANELS[name])
         panel.set(xlabel="density (kg/m$^3$)", xlim=(density[0], density[-1]))
         panel.locator_params(axis="x", nbins=4)
     panels[0].set_yticks(height, [f"{c:g}" for c in cohesion])
@@ -85,10 +77,11 @@ def inference_figure(table: QTable, path: str | Path) -> Path:
     strongest = strongest_passage(table)
     if strongest is not None:
         title += f"; strongest tide: {strongest['passage']}"
-    figure.suptitle(title, fontsize=9)
+    figure.suptitle(title)
     return save(figure, path)
 
 
+@styled
 def results_figure(results: QTable | str | Path, path: str | Path, names: int = 4) -> Path:
     """Plot a result table: effect of each encounter on the mobilised friction angle, and the margin.
 
@@ -105,7 +98,7 @@ def results_figure(results: QTable | str | Path, path: str | Path, names: int = 
     distance = table["distance"].to_value(u.au)
     rise = np.maximum(table["friction_rise"].to_value(u.deg), NOTHING)
     margin = table["margin"].to_value(u.deg)
-    figure = _figure(10, 4.2)
+    figure = new_figure(10, 4.2)
     left, right = figure.subplots(1, 2)
     stands = np.isfinite(rise) & np.isfinite(margin) & (verdict != Verdict.NOT_IN_EQUILIBRIUM)
     bound = np.asarray(table["decided_by"], dtype=str) == "bound"
@@ -130,7 +123,7 @@ def results_figure(results: QTable | str | Path, path: str | Path, names: int = 
     right.set_ylabel("margin (deg of friction angle)")
     right.axhline(0.0, color="0.6", lw=0.8)
     if left.get_legend_handles_labels()[0]:
-        left.legend(fontsize=7)
+        left.legend(fontsize="x-small")
     out = int((verdict == Verdict.NOT_IN_EQUILIBRIUM).sum())
     rest = len(table) - out - int(stands.sum())
     hidden = f"{out} of bodies that are not in equilibrium" + (
@@ -139,7 +132,6 @@ def results_figure(results: QTable | str | Path, path: str | Path, names: int = 
     least = f"; {NOTHING:g} deg: that or less" if np.any(rise[stands] == NOTHING) else ""
     figure.suptitle(
         f"{len(table)} encounters, ephemeris {table.meta.get('ephemeris', '-')}; not shown: {hidden}{least}",
-        fontsize=9,
     )
     exact = stands & ~bound
     for axes, x, y, rows in (
@@ -149,5 +141,5 @@ def results_figure(results: QTable | str | Path, path: str | Path, names: int = 
         named = [
             (x[k], y[k], f"{table['asteroid'][k]} {str(table['time_tdb'][k])[:4]}") for k in rows[:names]
         ]
-        label_points(axes, named, np.column_stack([x[stands], y[stands]]), fontsize=7)
+        label_points(axes, named, np.column_stack([x[stands], y[stands]]), fontsize="x-small")
     return save(figure, path)

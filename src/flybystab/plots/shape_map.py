@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from flybystab.body.shape import Shape
 from flybystab.body.surface_history import SurfaceHistory
 from flybystab.body.surface_slope import SlopeChange
+from flybystab.plots.style import new_figure, styled
 
 #: Directions of view, with the image's right and up: from +x, +y and +z of the principal frame.
 VIEWS = (("+x", 0, (1, 2)), ("+y", 1, (0, 2)), ("+z", 2, (0, 1)))
@@ -67,10 +68,11 @@ def shape_map(
     names = "xyz"
     axes.set_xlabel(f"{'-' if mirror < 0 else ''}{names[right]} (m)")
     axes.set_ylabel(f"{names[up]} (m)")
-    axes.set_title(f"seen from {view}", fontsize=9)
+    axes.set_title(f"seen from {view}")
     return drawn
 
 
+@styled
 def slope_change_figure(shape: Shape, change: SlopeChange, repose: Quantity = 35 * u.deg) -> Any:
     """Slopes before an encounter, the greatest during it, and the largest change, in three views each.
 
@@ -86,9 +88,7 @@ def slope_change_figure(shape: Shape, change: SlopeChange, repose: Quantity = 35
     -------
     matplotlib Figure
     """
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9.0, 7.5), layout="constrained")
+    figure = new_figure(9.0, 7.5)
     grid = figure.subplots(3, 3)
     steepest = float(change.greatest.max().to_value(u.deg))
     rows = (
@@ -103,10 +103,11 @@ def slope_change_figure(shape: Shape, change: SlopeChange, repose: Quantity = 35
             drawn = shape_map(axes, shape, number, view, limits=span, cmap=cmap)
         figure.colorbar(drawn, ax=list(row), label=label)
     share = 100.0 * change.share_passing(repose)
-    figure.suptitle(f"{share:.2g} % of the area passes {repose.to_value(u.deg):g} deg", fontsize=10)
+    figure.suptitle(f"{share:.2g} % of the area passes {repose.to_value(u.deg):g} deg")
     return figure
 
 
+@styled
 def surface_history_figure(
     history: SurfaceHistory, repose: Quantity = 35 * u.deg, *, figure: Any = None
 ) -> Any:
@@ -125,9 +126,7 @@ def surface_history_figure(
     -------
     matplotlib Figure
     """
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9.0, 9.5), layout="constrained") if figure is None else figure
+    figure = new_figure(9.0, 9.5) if figure is None else figure
     grid = figure.add_gridspec(4, 3, height_ratios=(1.0, 1.0, 1.0, 0.8))
     slope, change = history.slope.to_value(u.deg), history.change.to_value(u.deg)
     largest = float(max(np.abs(change).max(), 1e-3))
@@ -148,7 +147,7 @@ def surface_history_figure(
     left.axvline(0.0, color="0.5", lw=0.8, ls="--")
     left.set_xlabel("time from closest approach (h)")
     left.set_ylabel("change of slope (deg)")
-    left.legend(title="percentile of the facets", loc="upper left", fontsize=8, title_fontsize=8)
+    left.legend(title="percentile of the facets", loc="upper left")
     right.plot(hours, 100.0 * history.share_past(repose))
     right.set_xlabel("time (h)")
     right.set_ylabel(f"steeper than {repose.to_value(u.deg):g} deg (% of area)")

@@ -28,7 +28,7 @@ def _mark(axes: Any, points: Mapping[str, tuple[float, float]], named: Sequence[
     for name, (x, y) in points.items():
         axes.plot(x, y, "o", ms=4 if name in shown else 2, color=BLACK, mec="white", mew=0.4, zorder=5)
     everywhere = np.array(list(points.values())).reshape(-1, 2)
-    label_points(axes, [(*points[name], name) for name in shown], everywhere, fontsize=7)
+    label_points(axes, [(*points[name], name) for name in shown], everywhere, fontsize="x-small")
 
 
 def axis_ratios(bodies: Mapping[str, Body]) -> dict[str, tuple[float, float]]:
@@ -76,13 +76,13 @@ def regions_plot(
         lines = axes.contour(
             ratio, ratio, required, levels=sorted(angles), cmap="viridis", linewidths=1.3, vmin=0, vmax=45
         )
-        axes.clabel(lines, fmt="%g°", fontsize=7)
+        axes.clabel(lines, fmt="%g°", fontsize="x-small")
     axes.plot([0, 1], [0, 1], color=BLACK, lw=0.8)
     axes.set_xlim(0, 1)
     axes.set_ylim(0, 1)
     axes.set_xlabel("axis ratio $a_2/a_1$")
     axes.set_ylabel("axis ratio $a_3/a_1$")
-    axes.set_title(rf"friction angle required, $\omega^2/\pi G\rho = {w2:g}$", fontsize=9)
+    axes.set_title(rf"friction angle required, $\omega^2/\pi G\rho = {w2:g}$")
     _mark(axes, axis_ratios(bodies or {}), named)
     return axes
 
@@ -139,7 +139,7 @@ def spin_plot(
     }
     axes.set_xlabel("axis ratio $a_3/a_1$" + (" (prolate)" if prolate else " (oblate)"))
     axes.set_ylabel(r"$\omega^2/\pi G\rho$")
-    axes.legend(frameon=False, fontsize=7)
+    axes.legend(fontsize="x-small")
     _mark(axes, marks, named)
     return axes
 
@@ -175,7 +175,7 @@ def barrier_plot(axes: Any, body: Body, *, dilatancy: float = 1.0, longest: floa
     lost = p.loss.barrier.to_value(u.J) / binding
     top = max(float(lost.max()), 1e-12)
     axes.set_ylim(max(-0.3 * top, min(-0.03 * top, 1.1 * float(lost.min()))), 1.4 * top)
-    axes.legend(frameon=False, fontsize=8)
+    axes.legend()
     return axes
 
 
@@ -197,7 +197,7 @@ def failure_distance_plot(
     axes.axhline(1.0, color="0.5", lw=0.8)  # the surface
     axes.set_xlabel("friction angle (deg)")
     axes.set_ylabel("failure distance (planetary radii)")
-    axes.legend(frameon=False, fontsize=8)
+    axes.legend()
     return axes
 
 

@@ -74,6 +74,11 @@ class ProgressBar:
         if state.done >= state.total:
             self._bar.close()
 
+    def line(self, state: Progress, width: int = 0) -> str:
+        """One line of text: with a bar and as wide as `width` if it is positive."""
+        self._bar.total, self._bar.initial = state.total, state.resumed
+        return self._bar.text(state.done + state.begun, state.note, state.seconds, width)
+
     def end(self) -> None:
         """End the line of the bar, so that other text can follow."""
         self._bar.close()
