@@ -44,6 +44,7 @@ def run(options: argparse.Namespace) -> None:
     from flybystab.catalogues.catalogue import catalogue
     from flybystab.flybys.document import table_document
     from flybystab.orbit.search.encounter_finder import find_encounters
+    from flybystab.progress import Bar
     from flybystab.screening.tables import write_table
 
     if options.name is None and not options.all:
@@ -52,6 +53,7 @@ def run(options: argparse.Namespace) -> None:
         raise WrongUsage("--clones: expected one asteroid or a file of a few, not --all")
     check_table(options.output)
     asteroids = list(catalogue()) if options.name is None else _asteroids(options.name)
+    bar = Bar(len(asteroids), "asteroids") if len(asteroids) > SHOWN else None
     table = find_encounters(
         asteroids,
         tdb(options.start, "--from"),
@@ -60,7 +62,10 @@ def run(options: argparse.Namespace) -> None:
         within=options.within * u.au,
         error=options.error * u.km,
         growth=not options.all,
+        progress=None if bar is None else lambda done, _, found: bar(done, f"{found} encounters"),
     )
+    if bar is not None:
+        bar.close()
     if options.clones:
         table = _with_clones(table, asteroids, options.clones, options.seed)
     if options.output:
