@@ -152,3 +152,25 @@ def test_results_are_quantities():
     for name in ("distance", "v_inf", "v_periapsis", "start_distance"):
         assert isinstance(getattr(E, name), u.Quantity), name
     assert E.b_plane().unit == u.km
+
+
+def test_dates_as_text_are_tdb():
+    orbit = fs.Asteroid.from_catalogue("Apophis").orbit
+    when = Time("2029-04-13", scale="tdb")
+    table = fs.find_encounters(orbit, "2029-04-12", "2029-04-15")
+    other = fs.find_encounters(orbit, when - 1 * u.d, when + 2 * u.d)
+    assert len(table) == len(other) == 1
+    assert abs((table["time"][0] - other["time"][0]).to_value(u.s)) < 1e-3
+    assert (
+        fs.Encounter.from_orbit(orbit, "earth", "2029-04-13").time
+        == fs.Encounter.from_orbit(orbit, "earth", when).time
+    )
+    assert (
+        fs.encounter_distribution(orbit, "earth", "2029-04-13", n=2).time
+        == fs.encounter_distribution(orbit, "earth", when, n=2).time
+    )
+    given, other = orbit.at("2028-01-01"), orbit.at(Time("2028-01-01", scale="tdb"))
+    assert np.all(given[0] == other[0])
+    for wrong in ("April", "2029-13-01", ""):
+        with pytest.raises(InvalidInput, match="read as TDB"):
+            fs.find_encounters(orbit, wrong, "2029-04-15")

@@ -95,15 +95,22 @@ def whole(value: Any, name: str, least: int) -> int:
 
 
 def checked_time(value: Any, name: str) -> Time:
-    """One astropy Time that converts to TDB without tables of the Earth's rotation.
+    """One astropy Time that converts to TDB without tables of the Earth's rotation; text is a date in TDB.
 
     Raises
     ------
     InvalidInput
-        Not one Time, of a local scale or UT1, or not within the Julian dates -1e7 and 1e7.
+        Neither one Time nor a date, of a local scale or UT1, or not within the Julian dates -1e7 and 1e7.
     """
+    if isinstance(value, str):
+        try:
+            value = Time(value, scale="tdb")
+        except ValueError:
+            raise InvalidInput(
+                name, value, "a date such as 2029-04-13, read as TDB, or an astropy Time"
+            ) from None
     if not isinstance(value, Time) or value.shape != ():
-        raise InvalidInput(name, value, "one astropy Time")
+        raise InvalidInput(name, value, "one astropy Time, or a date such as 2029-04-13 (TDB)")
     if value.scale in ("local", "ut1"):
         raise InvalidInput(name, f"a Time of scale {value.scale}", "the scale tdb, tt, tai or utc")
     if not abs(value.jd) <= 1e7:

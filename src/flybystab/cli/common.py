@@ -119,12 +119,9 @@ def _coloured(line: str) -> str:
 
 def tdb(text: str, name: str) -> Any:
     """Parse a date, TDB, into an astropy Time; `name` is the argument in the error message."""
-    from astropy.time import Time
+    from flybystab.units import checked_time
 
-    try:
-        return Time(text, scale="tdb")
-    except ValueError:
-        raise InvalidInput(name, text, "a date such as 2029-04-13, read as TDB") from None
+    return checked_time(text, name)
 
 
 def material_of(options: argparse.Namespace) -> Any:

@@ -132,7 +132,7 @@ class EncounterDistribution(Tabular):
 def encounter_distribution(
     orbit: Any,
     planet: str | Planet,
-    time: Time,
+    time: Time | str,
     *,
     n: int = 1000,
     seed: int = 0,
@@ -152,8 +152,8 @@ def encounter_distribution(
         Or anything with an attribute ``orbit``; it must have a covariance.
     planet : str or Planet
         The body encountered.
-    time : Time
-        Near closest approach; the nominal orbit's minimum of distance nearest to it counts.
+    time : Time or str
+        Near closest approach (text: TDB); the nominal orbit's minimum of distance nearest to it counts.
     n, seed : int
         Number of clones and seed: see :meth:`flybystab.Orbit.clones`.
     search : Quantity
@@ -177,7 +177,7 @@ def encounter_distribution(
     """
     path = _path(orbit)
     workers = worker_count(workers, threads)
-    checked_time(time, "time")
+    time = checked_time(time, "time")
     body = _planet(planet)
     reach = to_si(search, u.s, "search", low=0.0, open_low=True)
     largest = far_enough(body) if within is None else to_si(within, u.m, "within", low=0.0, open_low=True)

@@ -353,7 +353,7 @@ class Encounter:
         path: str | Path,
         target: int | str | None,
         planet: str | Planet,
-        time: Time,
+        time: Time | str,
         *,
         start_distance: Quantity | None = None,
         settle: Quantity = SETTLE * u.s,
@@ -372,8 +372,8 @@ class Encounter:
             Number of the asteroid or identifier of NAIF; None for the only small body of the kernel.
         planet : str or Planet
             The body encountered. It comes from `ephemeris` unless the trajectory is relative to it.
-        time : Time
-            Near closest approach; the minimum of distance nearest to it counts.
+        time : Time or str
+            Near closest approach (text: TDB); the minimum of distance nearest to it counts.
         start_distance, settle, search, ephemeris
             As in :meth:`from_orbit`.
         j2, pole
@@ -390,7 +390,7 @@ class Encounter:
             spiceypy (extra ``spk``) is not installed.
         NoEncounter, OutOfSpan, UnitMismatch, InvalidInput, UnknownName
         """
-        checked_time(time, "time")
+        time = checked_time(time, "time")
         body = _planet(planet)
         start = None if start_distance is None else to_si(start_distance, u.m, "start_distance", low=0.0)
         reach = to_si(search, u.s, "search", low=0.0, open_low=True)
@@ -458,7 +458,7 @@ class Encounter:
         cls,
         orbit: Orbit,
         planet: str | Planet,
-        time: Time,
+        time: Time | str,
         *,
         error: Quantity = 0.1 * u.km,
         start_distance: Quantity | None = None,
@@ -476,8 +476,8 @@ class Encounter:
             Or anything with an attribute ``orbit``.
         planet : str or Planet
             The body encountered.
-        time : Time
-            Near closest approach; the minimum of distance nearest to it counts.
+        time : Time or str
+            Near closest approach (text: TDB); the minimum of distance nearest to it counts.
         error : Quantity
             Displacement asked for: forces whose estimated share is larger are modelled, the rest is listed.
             Sources of tide are modelled down to a tenth of the relative error that this means for the tide.
@@ -507,7 +507,7 @@ class Encounter:
         path = getattr(orbit, "orbit", orbit)
         if not isinstance(path, Orbit):
             raise InvalidInput("orbit", orbit, "an Orbit, or an object with one as its attribute 'orbit'")
-        checked_time(time, "time")
+        time = checked_time(time, "time")
         body = _planet(planet)
         if body.name not in BODIES or body.name == "sun":
             raise InvalidInput("planet", body.name, f"one of {', '.join(BODIES[1:])}")

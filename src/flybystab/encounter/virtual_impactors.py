@@ -95,8 +95,8 @@ class _Line:
 
 def virtual_impactors(
     orbit: Any,
-    start: Time,
-    stop: Time,
+    start: Time | str,
+    stop: Time | str,
     planet: str | Planet = "earth",
     *,
     n: int = 1001,
@@ -113,8 +113,8 @@ def virtual_impactors(
     ----------
     orbit : Orbit
         Or an object with an attribute ``orbit``; with a covariance.
-    start, stop : Time
-        Span of the search.
+    start, stop : Time or str
+        Span of the search; text is read as TDB.
     planet : str or Planet
     n : int
         Number of orbits on the line.
@@ -146,8 +146,7 @@ def virtual_impactors(
     path = getattr(orbit, "orbit", orbit)
     if not isinstance(path, Orbit):
         raise InvalidInput("orbit", orbit, "an Orbit, or an object with one as its attribute 'orbit'")
-    for name, value in (("start", start), ("stop", stop)):
-        checked_time(value, name)
+    start, stop = checked_time(start, "start"), checked_time(stop, "stop")
     body, count = _body(planet), whole(n, "n", 3)
     reach = to_si(within, u.m, "within", low=0.0, open_low=True)
     if not 0.0 < float(sigmas) <= 10.0:

@@ -616,8 +616,7 @@ def _ephemeris(name: str | Ephemeris | None) -> Ephemeris:
 
 
 def _epoch(epoch: Any) -> Time:
-    checked_time(epoch, "epoch")
-    return epoch.tdb
+    return checked_time(epoch, "epoch").tdb
 
 
 def _centre(centre: Any) -> str:

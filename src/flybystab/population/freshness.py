@@ -94,7 +94,7 @@ def freshness(
     distances: Mapping[str, Quantity],
     *,
     weathering: Quantity = WEATHERING,
-    now: Time | None = None,
+    now: Time | str | None = None,
     span: Quantity = 100.0 * u.yr,
     clones: int = 0,
     seed: int = 0,
@@ -132,8 +132,7 @@ def freshness(
         raise InvalidInput("asteroid", asteroid, "an Asteroid")
     if not distances:
         raise InvalidInput("distances", distances, "at least one planet with its refreshing distance")
-    end = asteroid.epoch if now is None else now
-    checked_time(end, "now")
+    end = checked_time(asteroid.epoch if now is None else now, "now")
     years = to_si(span, u.yr, "span", low=0.0, open_low=True)
     aged = to_si(weathering, u.yr, "weathering", low=0.0, open_low=True)
     names = list(distances)

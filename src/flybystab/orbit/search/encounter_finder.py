@@ -68,8 +68,8 @@ def _window(eph: Ephemeris, day: float, fraction: float, start: float, stop: flo
 
 def find_encounters(
     objects: Any,
-    start: Time,
-    stop: Time,
+    start: Time | str,
+    stop: Time | str,
     planets: Sequence[str] = ("earth",),
     within: Quantity = 0.05 * u.au,
     *,
@@ -88,9 +88,9 @@ def find_encounters(
     ----------
     objects : Orbit, object with ``orbit`` and ``name``, or an iterable of either
         The asteroids; they do not disturb each other.
-    start, stop : Time
-        Span of the search. A passage within 1 s of an end counts at `start` and not at `stop`, so that spans side
-        by side have each passage once.
+    start, stop : Time or str
+        Span of the search; text is read as TDB. A passage within 1 s of an end counts at `start` and not at `stop`, so
+        that spans side by side have each passage once.
     planets : sequence of str
         Planets and ``"moon"``. Impacts on the Sun are always included (``planet`` is ``"sun"``).
     within : Quantity
@@ -147,8 +147,7 @@ def find_encounters(
     workers = worker_count(workers, threads)
     if forces is not None and (isinstance(forces, str) or not isinstance(forces, Iterable)):
         raise InvalidInput("forces", forces, "a sequence of names")
-    for name, value in (("start", start), ("stop", stop)):
-        checked_time(value, name)
+    start, stop = checked_time(start, "start"), checked_time(stop, "stop")
     if not start < stop:
         raise InvalidInput("stop", stop.iso, f"a time after start, {start.iso}")
     if not isinstance(planets, Iterable):
