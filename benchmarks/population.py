@@ -1,7 +1,7 @@
 """Encounter rates of the known near-Earth asteroids, against counts and published figures; and what encounters do.
 
-Usage: ``python benchmarks/population.py counts|published|nbody|verdicts|convergence|scale|binaries``. The MPC catalogue
-and CNEOS's list of close approaches are read from ``../shared/data`` (or ``FLYBYSTAB_SHARED``).
+Usage: ``python benchmarks/population.py counts|published|answers|nbody|verdicts|convergence|scale|binaries``. The MPC
+catalogue and CNEOS's list of close approaches are read from ``../shared/data`` (or ``FLYBYSTAB_SHARED``).
 """
 
 import argparse
@@ -93,39 +93,96 @@ def verdicts():
     print(f"{len(rates.samples)} sampled encounters in {wall:.0f} s")
 
 
+def beside(published, value):
+    """Relative difference of a value from a published one, or from the nearer end of a published range; as text."""
+    low, high = published if isinstance(published, tuple) else (published, published)
+    text = f"{low:g}" if low == high else f"{low:g}-{high:g}"
+    if low <= value <= high:
+        return text, "inside" if low < high else "+0 %"
+    return text, f"{100 * (value / (low if value < low else high) - 1):+.0f} %"
+
+
 def published():
     """Rates of the known asteroids beside published figures of the whole population."""
     orbits, h = catalogue()
     kilometre = orbits[h < 17.75]
     # H of a diameter of 420 m at an albedo of 0.14; the catalogue is nearly complete there.
-    limit = 5.0 * np.log10(1329.0 / (0.42 * np.sqrt(0.14)))
-    large = orbits[h < limit]
-    planets = {name: fs.encounter_rates(kilometre, name) for name in ("earth", "venus")}
+    large = orbits[h < 5.0 * np.log10(1329.0 / (0.42 * np.sqrt(0.14)))]
+    planets = {n: fs.encounter_rates(kilometre, n) for n in ("mercury", "venus", "earth", "mars")}
+    each = {n: 1e6 * r.within(10 * r.planet.radius * u.m).rate.value for n, r in planets.items()}
+    either = (each["earth"] + each["venus"]).mean()
+    impact = 1e6 * planets["earth"].total.value
     deep = fs.encounter_rates(large, "earth", 5.96 * fs.R_earth).total.value
-    impact = 1e-6 / planets["earth"].total.value
+    met = sum(r.within(10 * fs.R_earth).rate.value for r in planets.values())
+    wide = sum(r.within(30 * fs.R_earth).rate.value for r in planets.values())
+    crossing = met > 0.0
+    times = [1e-6 / np.median(x[crossing]) for x in (met, wide)]
     lines = [
-        (f"Earth impacts of H < 17.75 ({len(kilometre)} known), one in (Myr)", "0.5-0.7", impact),
+        (f"Earth impact of H < 17.75 ({len(kilometre)} known), one in (Myr)", (0.5, 0.7), 1 / impact, "a"),
         (
-            f"Earth passages of NEAs > 420 m ({len(large)} known) in 5.96 R_E, one in (kyr)",
-            "7-8.2",
+            "  the same for the 936 of the model, one in (Myr)",
+            (0.5, 0.7),
+            len(kilometre) / 936 / impact,
+            "a, b",
+        ),
+        (
+            f"Earth passage of NEAs > 420 m ({len(large)} known) in 5.96 R_E, one in (kyr)",
+            (7, 8.2),
             1e-3 / deep,
+            "a",
+        ),
+        ("Earth passage of one NEA within 10 radii, one in (Myr)", 10, 1 / each["earth"].mean(), "a"),
+        ("Venus passage of one NEA within 10 radii, one in (Myr)", 10, 1 / each["venus"].mean(), "a"),
+        ("  either of the two, one in (Myr)", 5, 1 / either, "a"),
+        ("any terrestrial planet within 10 R_E, median NEA, one in (Myr)", (1, 10), times[0], "c"),
+        ("any terrestrial planet within 30 R_E, median NEA, one in (Myr)", (0, 1), times[1], "c"),
+        (
+            "Earth impacts of one NEA of H < 28 (1/Gyr), the known H < 17.75",
+            2.83,
+            1e3 * impact / len(kilometre),
+            "b",
         ),
     ]
-    passages = 0.0
-    for name, rates in planets.items():
-        near = rates.within(10 * rates.planet.radius * u.m).total.value / len(kilometre)
-        passages += near
-        lines.append(
-            (
-                f"{name.capitalize()} passages of one NEA within 10 radii, one in (Myr)",
-                "about 10",
-                1e-6 / near,
-            )
-        )
-    lines.append(("either of the two, one in (Myr)", "5", 1e-6 / passages))
-    print(f"{'figure':75s} {'published':>9s} {'known asteroids':>16s}")
-    for name, figure, value in lines:
-        print(f"{name:75s} {figure:>9s} {value:16.2f}")
+    print(f"{'figure':79s} {'published':>9s} {'here':>7s}  difference  source")
+    for name, figure, value, source in lines:
+        text, error = beside(figure, value)
+        print(f"{name:79s} {text:>9s} {value:7.2f}  {error:>10s}  {source}")
+    print(
+        "a: rates of whole populations; b: Nesvorny et al. 2024 (936 of H < 17.75; 1.2e7 of H < 28 with 0.034"
+    )
+    print("impacts a year, small ones on other orbits); c: Fang & Margot 2012 (almost all binaries)")
+
+
+def answers():
+    """Asteroids most likely to have been reshaped, and how many have fresh surfaces."""
+    from flybystab.population.freshness import fresh_fraction
+
+    rows = read("nea_mpc_2026-02.csv.gz")
+    orbits, h = catalogue()
+    large = np.flatnonzero(h < 17.75)
+    rates = fs.disruption_rates(orbits[large], ("mercury", "venus", "earth", "mars"), samples=4800, seed=1)
+    print(f"{len(large)} known asteroids of H < 17.75 as bodies of 1 km, drawn properties")
+    print(f"share reshaped in the last Myr: {100 * rates.changed_fraction(1 * u.Myr):.2f} %")
+    print("\nlargest rates of changes of shape by encounters within 5 radii")
+    print("asteroid            changes per Gyr  samples")
+    for row in rates.contributors(most=8):
+        one = rows[large[row["orbit"]]]
+        name = " ".join(x for x in (one["number"], one["name"] or one["principal_desig"]) if x)
+        print(f"{name:18s} {1e9 * row['rate'].to_value(1 / u.yr):16.1f} {row['samples']:8d}")
+    print(
+        "\nshare of the asteroids with a fresh surface, by refreshing distance and weathering time (Earth, Venus)"
+    )
+    print("radii   0.1 Myr   1 Myr")
+    for radii in (3.6, 5, 7.2, 10, 16):
+        cells = [
+            fresh_fraction(orbits[large], dict.fromkeys(("earth", "venus"), radii), weathering=w * u.Myr)
+            for w in (0.1, 1.0)
+        ]
+        print(f"{radii:5.1f} {100 * cells[0]:7.1f} % {100 * cells[1]:5.1f} %")
+    print(
+        "published: 5 radii with less than 1 Myr (Nesvorny et al. 2010), 16 radii (Binzel et al. 2010) for the"
+    )
+    print("Q types, about a fifth of the S complex and Q types among near-Earth asteroids")
 
 
 def nbody(years=3000.0, particles=200, within=0.1):
@@ -257,28 +314,36 @@ def scale():
 
 
 def binaries():
-    """Fate of binaries like 1991 VH by periapsis distance at the Earth, 10 km/s: fractions over 200 phases."""
+    """Fate of binaries like 1991 VH by periapsis distance at the Earth, 10 km/s, over 200 phases."""
     print(
-        "1991 VH: primary of 1.2 km diameter and 1700 kg/m3, mass ratio 0.06, a = 3.26 km, e = 0.05; v_inf 10 km/s"
+        "1991 VH: primary 1.30 x 1.25 x 1.18 km, 1630 kg/m3, companion 0.66 x 0.49 x 0.44 km in synchronous"
     )
-    primary = fs.Body([600, 600, 600] * u.m, 1700 * u.kg / u.m**3, 2.62 * u.h)
-    print("q (R_E)  bound  escape  collision  median e of the bound  sigma of a (relative)")
-    for q in (2, 3, 4, 6, 8, 10, 15, 20, 30, 60):
+    print("rotation, a = 3.26 km, e = 0; v_inf 10 km/s, 200 phases; spin of those that stay bound")
+    primary = fs.Body([650, 625, 518] * u.m, 1630 * u.kg / u.m**3, 2.62 * u.h)
+    companion = fs.Body([330, 245, 220] * u.m, 1630 * u.kg / u.m**3, 32 * u.h)
+    print("q (R_E)  bound  escape  collision  median e  median |da|/a  median wobble (deg)  wobble > 10 deg")
+    for q in (2, 3, 4, 6, 8, 10, 12.5, 15, 20, 30, 60):
         passage = fs.Encounter.hyperbolic(
             "earth", q * fs.R_earth, 10 * u.km / u.s, start_distance=200 * fs.R_earth
         )
         out = fs.binary_flyby(
-            primary, passage, 3.26 * u.km, mass_ratio=0.06, eccentricity=0.05, samples=200, seed=1
+            primary, passage, 3.26 * u.km, companion=companion, oblate=True, samples=200, seed=1
         )
         bound = out.fate == "bound"
-        e = np.median(out.eccentricity[bound]) if bound.any() else np.nan
-        change = np.std(out.semi_major_axis[bound].to_value(u.km) / 3.26) if bound.any() else np.nan
+        e, wobble = np.median(out.eccentricity[bound]), out.wobble[bound].to_value(u.deg)
+        change = np.median(np.abs(out.semi_major_axis[bound].to_value(u.km) / 3.26 - 1.0))
         shares = [out.probability(f) for f in ("bound", "escape", "collision")]
-        print(f"{q:7d} {shares[0]:6.3f} {shares[1]:7.3f} {shares[2]:10.3f} {e:22.3f} {change:22.3f}")
+        print(
+            f"{q:7g} {shares[0]:6.3f} {shares[1]:7.3f} {shares[2]:10.3f} {e:9.3f} {change:14.3f}"
+            f" {np.median(wobble):20.1f} {np.mean(wobble > 10.0):16.3f}"
+        )
+    print(
+        "published: an encounter within about 80,000 km, 12.5 R_E, explains its tumbling companion (Meyer et al. 2024)"
+    )
 
 
 if __name__ == "__main__":
-    commands = (counts, published, nbody, verdicts, convergence, scale, binaries)
+    commands = (counts, published, answers, nbody, verdicts, convergence, scale, binaries)
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("what", choices=[c.__name__ for c in commands])
     {c.__name__: c for c in commands}[parser.parse_args().what]()

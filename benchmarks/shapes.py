@@ -15,6 +15,7 @@ from astropy.time import Time
 
 import flybystab as fs
 from flybystab.body.elastic_stress import elastic_stress
+from flybystab.body.limit_analysis import cohesion_bounds
 from flybystab.body.shape_slope import shape_slopes
 from flybystab.constants import G
 from flybystab.core.ellipsoid.potential import gravity_coefficients
@@ -57,36 +58,47 @@ def gravity():
 
 def published(file=None):
     """Valvano et al. 2022 and Kim et al. 2023: slopes of Apophis in 2029, over 16 attitudes."""
-    shape = RELIEF if file is None else fs.Shape.read(file, unit=u.km)
-    shape = shape.scaled(diameter=340 * u.m)
+    lobe = [[160.0, 130.0, 125.0] * u.m, [130.0, 110.0, 105.0] * u.m]
+    shapes = (
+        {
+            "ellipsoid with Gaussian relief": RELIEF,
+            "contact binary": fs.Shape.contact_binary(*lobe, overlap=0.4, facets=1000),
+        }
+        if file is None
+        else {"shape from a file": fs.Shape.read(file, unit=u.km)}
+    )
     encounter = fs.Encounter.hyperbolic("earth", periapsis=38_012 * u.km, v_inf=5.841 * u.km / u.s)
-    name = "ellipsoid with Gaussian relief" if file is None else "shape from a file"
-    print(f"{name}, {len(shape.facets)} facets; largest change of slope (deg), 16 attitudes")
-    print("g/cm3  from before (least to most)  least to greatest slope  99 % of the area  published")
     quoted = {1.29: "4 (Valvano et al. 2022)", 2.2: "2 (Valvano et al. 2022, higher density)", 3.5: ""}
-    for density in (1.29, 2.2, 3.5):
-        body = fs.Body.from_shape(shape, density=density * u.g / u.cm**3, spin_period=30.5 * u.h)
-        most, ranges, nearly, steepest = [], [], [], []
-        for rotation in spin_states(body, 16, 1)[1]:
-            history = fs.surface_history(body, encounter, rotation, shape=shape, instants=80)
-            change = history.extremes.change.to_value(u.deg)
-            order = np.argsort(change)
-            share = np.cumsum(shape.facet_area.value[order]) / shape.area.value
-            most.append(change.max())
-            ranges.append((history.extremes.greatest - history.extremes.least).to_value(u.deg).max())
-            nearly.append(change[order][np.searchsorted(share, 0.99)])
-            steepest.append([history.share_refreshed(repose=x * u.deg) for x in (15, 20, 25, 30, 35)])
-        print(
-            f"{density:5.2f}  {np.median(most):11.2f} ({min(most):.2f} to {max(most):.2f})"
-            f"  {np.median(ranges):8.2f} ({min(ranges):.2f} to {max(ranges):.2f})  {np.median(nearly):16.2f}"
-            f"  {quoted[density]}".rstrip()
-        )
-        if density == 1.29:
-            passing = 100.0 * np.mean(steepest, axis=0)
-    print("\nshare of the area that first exceeds an angle of repose at 1.29 g/cm3 (%)")
-    print("deg  this work")
-    for angle, share in zip((15, 20, 25, 30, 35), passing, strict=True):
-        print(f"{angle:3d}  {share:9.2f}")
+    passing = {}
+    for name, made in shapes.items():
+        shape = made.scaled(diameter=340 * u.m)
+        axes = " x ".join(f"{2 * x:.0f}" for x in shape.ellipsoid().to_value(u.m))
+        print(f"{name}, {len(shape.facets)} facets, {axes} m; largest change of slope (deg), 16 attitudes")
+        print("g/cm3  from before (least to most)  least to greatest slope  99 % of the area  published")
+        for density, reference in quoted.items():
+            body = fs.Body.from_shape(shape, density=density * u.g / u.cm**3, spin_period=30.5 * u.h)
+            most, ranges, nearly, steepest = [], [], [], []
+            for rotation in spin_states(body, 16, 1)[1]:
+                history = fs.surface_history(body, encounter, rotation, shape=shape, instants=80)
+                change = history.extremes.change.to_value(u.deg)
+                order = np.argsort(change)
+                share = np.cumsum(shape.facet_area.value[order]) / shape.area.value
+                most.append(change.max())
+                ranges.append((history.extremes.greatest - history.extremes.least).to_value(u.deg).max())
+                nearly.append(change[order][np.searchsorted(share, 0.99)])
+                steepest.append([history.share_refreshed(repose=x * u.deg) for x in (15, 20, 25, 30, 35)])
+            print(
+                f"{density:5.2f}  {np.median(most):11.2f} ({min(most):.2f} to {max(most):.2f})"
+                f"  {np.median(ranges):8.2f} ({min(ranges):.2f} to {max(ranges):.2f})  {np.median(nearly):16.2f}"
+                f"  {reference}".rstrip()
+            )
+            if density == 1.29:
+                passing[name] = 100.0 * np.mean(steepest, axis=0)
+        print()
+    print("share of the area that first exceeds an angle of repose at 1.29 g/cm3 (%)")
+    print("deg  " + "  ".join(passing))
+    for k, angle in enumerate((15, 20, 25, 30, 35)):
+        print(f"{angle:3d}  " + "  ".join(f"{values[k]:{len(name)}.2f}" for name, values in passing.items()))
     print("published: about 1 (Kim et al. 2023)")
 
 
@@ -132,6 +144,20 @@ def stress():
             f"  {region.depth:8.2f}  {100 * region.share:24.0f} %"
         )
     print("published: 0.5 Pa (finite elements, other shapes and measures)")
+    print(
+        "\nlimit analysis: cohesion (Pa) necessary for the whole and sufficient for every part, and the elastic one"
+    )
+    print("body                                   necessary  sufficient  elastic, Poisson 0.25")
+    rotators = {
+        "Apophis at rest": apophis.body,
+        "sphere of 500 m, 2 g/cm3, 2 h": fs.Body([500] * 3 * u.m, 2 * u.g / u.cm**3, 2 * u.h),
+        "700 x 500 x 400 m, 2 g/cm3, 1.5 h": fs.Body([700, 500, 400] * u.m, 2 * u.g / u.cm**3, 1.5 * u.h),
+        "25 x 20 x 18 m, 2 g/cm3, 0.1 h": fs.Body([25, 20, 18] * u.m, 2 * u.g / u.cm**3, 0.1 * u.h),
+    }
+    for name, body in rotators.items():
+        bounds = cohesion_bounds(body)
+        elastic = elastic_stress(body).yield_region().required_cohesion.value
+        print(f"{name:37}  {bounds.necessary.value:9.1f}  {bounds.sufficient.value:10.1f}  {elastic:21.1f}")
 
 
 def timing():

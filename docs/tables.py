@@ -34,6 +34,7 @@ TABLES = {
     "kappa": "python benchmarks/stability.py kappa",
     "margin": "python benchmarks/margin.py",
     "minima": "python benchmarks/stability.py minima",
+    "population_answers": "python benchmarks/population.py answers",
     "population_binaries": "python benchmarks/population.py binaries",
     "population_convergence": "python benchmarks/population.py convergence",
     "population_counts": "python benchmarks/population.py counts",

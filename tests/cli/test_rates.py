@@ -80,6 +80,11 @@ def test_samples_and_figure_are_written(capsys, tmp_path):
     assert len(QTable.read(table)) == 16
     assert {r["planet"] for r in out["rows"]} == {"earth"}
     assert not (tmp_path / "samples.ecsv.journal").exists()
+    cells = tmp_path / "samples.csv"
+    document(capsys, *words, "--output", str(cells))
+    head, *rows = cells.read_text().splitlines()
+    assert len(rows) == 16
+    assert {"fragment_fractions_1", "fragment_fractions_12"} <= set(head.split(","))
     document(capsys, *words, "--output", str(figure))
     assert figure.read_bytes()[:4] == b"\x89PNG"
 

@@ -222,5 +222,17 @@ def test_grains_take_over_where_the_ellipsoid_ends():
     assert np.array_equal(carried.samples["model"] == "grains", ends)
     assert np.all(carried.samples["verdict"] != "BEYOND MODEL")
     assert np.all(carried.samples["fragments"][ends] >= 1)
+    fractions = np.asarray(carried.samples["fragment_fractions"])
+    total = fractions.sum(axis=1) + np.asarray(carried.samples["largest_fraction"])
+    assert np.all(total[ends] <= 1.0 + 1e-9)
+    assert np.all(fractions[~ends] == 0.0)
+    assert np.all(np.diff(fractions, axis=1) <= 0.0)
+    # a fragment of the mass fraction f has the diameter f^(1/3) of that of the body, 1 km
+    weight = carried.samples["weight"].to_value(1 / u.yr)
+    rate = carried.fragment_rate([0.01 ** (1 / 3), 0.999] * u.km)
+    assert rate[0].value == pytest.approx(weight @ np.sum(fractions >= 0.01, axis=1), rel=1e-12)
+    assert rate[0].value > 0.0
+    assert rate[1].value == 0.0
+    assert plain.fragment_rate(1 * u.m)[0].value == 0.0
     assert np.array_equal(carried.samples["verdict"][~ends], plain.samples["verdict"][~ends])
     assert carried.table["rate"].sum().value == pytest.approx(plain.table["rate"].sum().value, rel=1e-12)

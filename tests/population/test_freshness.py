@@ -5,11 +5,12 @@ from dataclasses import replace
 import astropy.units as u
 import numpy as np
 import pytest
+from astropy.table import QTable
 from astropy.time import Time
 
 import flybystab as fs
 from flybystab.errors import InvalidInput
-from flybystab.population.freshness import fresh_probability, freshness
+from flybystab.population.freshness import fresh_fraction, fresh_probability, freshness
 
 APOPHIS = fs.Asteroid.from_catalogue("Apophis")
 
@@ -69,3 +70,16 @@ def test_an_encounter_counts_with_the_share_of_the_orbits_that_have_it():
     bare = fs.Asteroid(orbit=replace(orbit, covariance=None), body=body)
     with pytest.raises(InvalidInput, match="covariance"):
         freshness(bare, limit, clones=6, **options)
+
+
+def test_the_fresh_share_of_a_population_is_the_mean_over_its_orbits():
+    orbits = QTable(
+        {"a": [1.2, 1.5] * u.au, "e": [0.45, 0.5], "i": [5.0, 10.0] * u.deg, "weight": [3.0, 1.0]}
+    )
+    rates = fs.encounter_rates(orbits, "earth", 16 * fs.R_earth).rate.to_value(1 / u.yr)
+    expected = np.average(1 - np.exp(-1e6 * rates), weights=[3.0, 1.0])
+    assert fresh_fraction(orbits, {"earth": 16.0}) == pytest.approx(expected, rel=1e-9)
+    both = fresh_fraction(orbits, {"earth": 16.0, "venus": 16.0})
+    assert expected < both < 1.0
+    with pytest.raises(InvalidInput, match="radii"):
+        fresh_fraction(orbits, {"earth": 0.5})

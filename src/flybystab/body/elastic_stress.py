@@ -110,8 +110,8 @@ class ElasticStress(Record):
             That of the body by default.
         """
         m = self.body.material if material is None else material
-        points, weights = _ball()
-        points = np.concatenate([points, _fibonacci(DIRECTIONS)])
+        points, weights = ball_quadrature()
+        points = np.concatenate([points, sphere_directions(DIRECTIONS)])
         weights = np.append(weights, np.zeros(DIRECTIONS))
         x = points * self.body.axes
         stress = _stress_rows(x, self.body.axes, self.poisson) @ self._coefficients
@@ -153,7 +153,7 @@ def elastic_stress(body: Body, tide: Quantity | None = None, *, poisson: float =
     # equilibrium holds for all x if it does for the three unit vectors: both sides are linear
     inside = np.diag(axes)
     force = -body.rho * inside @ field.T
-    surface = _fibonacci(SURFACE_POINTS) * axes
+    surface = sphere_directions(SURFACE_POINTS) * axes
     normals = surface / axes**2
     normals /= np.linalg.norm(normals, axis=1)[:, None]
     rows = np.einsum("nijk,nj->nik", _stress_rows(surface, axes, nu), normals)
@@ -164,7 +164,7 @@ def elastic_stress(body: Body, tide: Quantity | None = None, *, poisson: float =
     size = float(np.abs(right).max())
     if float(np.abs(matrix @ coefficients - right).max()) > RESIDUAL * size:
         raise NotConverged("the elastic stress: the equations of equilibrium are not satisfied to 1e-8")
-    points, weights = _ball()
+    points, weights = ball_quadrature()
     values = _stress_rows(points * axes, axes, nu) @ coefficients
     mean = np.einsum("n,nij->ij", weights, values) / weights.sum()
     return ElasticStress(body, float(nu), mean * u.Pa, coefficients)
@@ -176,7 +176,7 @@ def stress_change(first: ElasticStress, second: ElasticStress) -> Quantity:
         raise InvalidInput("second", second, "a state of the same body and Poisson's ratio")
     axes = first.body.axes
     # the difference is a polynomial of degree 2: its extremes lie inside or on the surface
-    points = np.concatenate([_ball()[0], _fibonacci(DIRECTIONS)]) * axes
+    points = np.concatenate([ball_quadrature()[0], sphere_directions(DIRECTIONS)]) * axes
     change = _stress_rows(points, axes, first.poisson) @ (second._coefficients - first._coefficients)
     deviator = change - np.trace(change, axis1=1, axis2=2)[:, None, None] / 3.0 * np.eye(3)
     return float(np.sqrt(1.5 * np.einsum("nij,nij->n", deviator, deviator)).max()) * u.Pa
@@ -228,7 +228,7 @@ def _divergence_rows(x: Array, axes: Array, poisson: float) -> Array:
     return out.reshape(len(x), 3, -1)
 
 
-def _fibonacci(count: int) -> Array:
+def sphere_directions(count: int) -> Array:
     """Unit vectors of a Fibonacci lattice."""
     i = np.arange(count) + 0.5
     z = 1.0 - 2.0 * i / count
@@ -237,10 +237,10 @@ def _fibonacci(count: int) -> Array:
     return np.column_stack([r * np.cos(longitude), r * np.sin(longitude), z])
 
 
-def _ball() -> tuple[Array, Array]:
+def ball_quadrature() -> tuple[Array, Array]:
     """Points (n, 3) and weights (n,) of a quadrature over the unit ball."""
     nodes, weights = np.polynomial.legendre.leggauss(SHELLS)
     radii = 0.5 * (nodes + 1.0)
-    directions = _fibonacci(DIRECTIONS)
+    directions = sphere_directions(DIRECTIONS)
     points = (radii[:, None, None] * directions).reshape(-1, 3)
     return points, np.repeat(0.5 * weights * radii**2, DIRECTIONS)

@@ -147,9 +147,9 @@ def surface_history_figure(
     left.axvline(0.0, color="0.5", lw=0.8, ls="--")
     left.set_xlabel("time from closest approach (h)")
     left.set_ylabel("change of slope (deg)")
-    left.legend(title="percentile of the facets", loc="upper left")
+    left.legend(title="percentile of the facets", loc="lower right")
     right.plot(hours, 100.0 * history.share_past(repose))
     right.set_xlabel("time (h)")
-    right.set_ylabel(f"steeper than {repose.to_value(u.deg):g} deg (% of area)")
+    right.set_ylabel(f"area above {repose.to_value(u.deg):g} deg (%)")
     right.set_ylim(bottom=0.0, top=None if np.any(history.share_past(repose)) else 1.0)
     return figure

@@ -25,7 +25,7 @@ from flybystab.errors import FlybystabWarning, InvalidInput
 from flybystab.flybys.verdict import Verdict
 from flybystab.orbit.planets import planet
 from flybystab.population.rates import EncounterRates, elements_table
-from flybystab.population.sampled_encounters import Plan, impact_and_total, sampled
+from flybystab.population.sampled_encounters import LISTED_FRAGMENTS, Plan, impact_and_total, sampled
 from flybystab.population.verdict_rates import DisruptionRates
 from flybystab.progress import Progressing, progress_bar
 from flybystab.screening.journal import Journal
@@ -260,6 +260,7 @@ def _no_samples() -> QTable:
         table[name] = np.empty(0) * unit
     for name in ("spin_ratio", "elongation_before", "elongation", "largest_fraction"):
         table[name] = np.empty(0)
+    table["fragment_fractions"] = np.empty((0, LISTED_FRAGMENTS))
     return table
 
 

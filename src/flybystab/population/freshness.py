@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import astropy.units as u
 import numpy as np
@@ -152,3 +153,41 @@ def freshness(
     probability = fresh_probability(ages, years, total, aged)
     share = float(np.mean([np.any(a <= aged) for a in ages]))
     return Freshness(probability, total / u.yr, years * u.yr, table, share, count)
+
+
+def fresh_fraction(
+    population: Any,
+    radii: Mapping[str, float],
+    *,
+    weathering: Quantity = WEATHERING,
+    workers: int | None = None,
+) -> float:
+    """Share of a population whose surface was refreshed by an encounter within the weathering time.
+
+    Parameters
+    ----------
+    population : table, or sequence of Orbit or Asteroid
+        As in :func:`flybystab.encounter_rates`.
+    radii : mapping of str to float
+        Refreshing distance of each planet in its radii.
+    weathering : Quantity
+        Time of space weathering.
+    workers : int, optional
+        Threads.
+
+    Returns
+    -------
+    float
+        Weighted mean of ``1 - exp(-rate weathering)``, the rates those of the present orbits.
+    """
+    if not radii:
+        raise InvalidInput("radii", radii, "at least one planet with its refreshing distance")
+    aged = to_si(weathering, u.yr, "weathering", low=0.0, open_low=True)
+    rate: Any = 0.0
+    weight: Any = 1.0
+    for name, factor in radii.items():
+        limit = to_si(factor, u.dimensionless_unscaled, f"radii[{name!r}]", low=1.0)
+        found = encounter_rates(population, name, workers=workers)
+        found = found.within(limit * found.planet.radius * u.m)
+        rate, weight = rate + found.rate.to_value(1 / u.yr), found.weight
+    return float(np.average(-np.expm1(-rate * aged), weights=weight))

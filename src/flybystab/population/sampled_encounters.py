@@ -30,8 +30,10 @@ ALBEDO = 0.14
 _ATTEMPTS = 20
 #: Verdicts of the ellipsoid after which a body is carried on by grains, if they are asked for.
 ENDS = (str(Verdict.BEYOND_MODEL), str(Verdict.MASS_LOSS), str(Verdict.DISRUPTED))
-#: Fragments of at least this mass fraction are listed.
+#: Fragments of at least this mass fraction are counted.
 LEAST_FRAGMENT = 0.01
+#: Fragments beside the largest whose mass fractions are kept.
+LISTED_FRAGMENTS = 12
 
 
 class Plan(NamedTuple):
@@ -101,6 +103,7 @@ def sampled(
     table["elongation"] = axes[:, 0] / axes[:, 2]
     table["largest_fraction"] = flown.bound_fraction
     table["fragments"] = np.zeros(count, dtype=int)
+    table["fragment_fractions"] = np.zeros((count, LISTED_FRAGMENTS))
     table["model"] = np.full(count, "ellipsoid", dtype="U9")
     if plan.grains:
         _carry_on(plan, table, bodies, encounters, turns)
@@ -128,7 +131,10 @@ def _carry_on(
         table["spin_period"][k] = 2.0 * np.pi * u.rad / run.spin
         table["elongation"][k] = float((run.semi_axes[0] / run.semi_axes[2]).to_value(u.one))
         table["largest_fraction"][k] = run.largest_fraction
-        table["fragments"][k] = int(np.sum(run.fragments["mass_fraction"] >= LEAST_FRAGMENT))
+        fractions = np.sort(np.asarray(run.fragments["mass_fraction"]))[::-1]
+        table["fragments"][k] = int(np.sum(fractions >= LEAST_FRAGMENT))
+        others = fractions[1 : 1 + LISTED_FRAGMENTS]
+        table["fragment_fractions"][k, : len(others)] = others
         table["model"][k] = "grains"
 
 

@@ -36,7 +36,8 @@ class DisruptionRates(Collection):
         Every sampled encounter: ``planet``, ``orbit`` (row), ``periapsis``, ``v_inf``, ``diameter``, ``verdict``,
         ``spin_ratio`` and ``spin_period`` (after the encounter), ``elongation`` (longest over shortest axis, also
         ``elongation_before``), ``largest_fraction`` of the mass, ``fragments`` (clumps of 1 % of the mass or more, by
-        grains only), ``model`` (ellipsoid or grains) and ``weight`` (1/yr: its contribution to the rate).
+        grains only), ``fragment_fractions`` (mass fractions of the fragments beside the largest, greatest first, zero
+        where there are none), ``model`` (ellipsoid or grains) and ``weight`` (1/yr: its contribution to the rate).
     bodies : float
         Number of asteroids of the population.
     diameter : Quantity or None
@@ -87,6 +88,17 @@ class DisruptionRates(Collection):
         mask, weight = self._mask(verdicts or CHANGED), self.samples["weight"].to_value(1 / u.yr)
         own = self.samples["diameter"].to_value(u.m)
         return np.array([weight[mask & (own >= size)].sum() for size in sizes]) / u.yr
+
+    def fragment_rate(self, diameters: Quantity) -> Quantity:
+        """Rate, 1/yr, at which fragments larger than each of the diameters are made, the largest remnants left out.
+
+        Only bodies carried on by grains have fragments, and of each the dozen largest are known: the rate is a lower
+        limit where small ones count.
+        """
+        sizes = np.atleast_1d(to_si(diameters, u.m, "diameters", shape=None, low=0.0, open_low=True))
+        own = np.cbrt(self.samples["fragment_fractions"]) * self.samples["diameter"].to_value(u.m)[:, None]
+        weight = self.samples["weight"].to_value(1 / u.yr)
+        return np.array([weight @ np.sum(own >= size, axis=1) for size in sizes]) / u.yr
 
     def contributors(self, *verdicts: str, most: int = 10) -> QTable:
         """Orbits with the largest rates of the verdicts: ``orbit`` (row of the population), ``rate``, ``samples``.

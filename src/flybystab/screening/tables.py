@@ -18,7 +18,8 @@ from flybystab.screening.table_files import check_output, write_rows, write_whol
 def write_table(table: QTable, path: str | Path) -> None:
     """Write a table in the format of its suffix, with units and provenance.
 
-    In Parquet and CSV a time becomes text (ISO, TDB) and a vector three columns ``name_x``, ``name_y``, ``name_z``;
+    In Parquet and CSV a time becomes text (ISO, TDB) and a vector three columns ``name_x``, ``name_y``, ``name_z``
+    (an array of another length ``name_1``, ``name_2``, ...);
     :func:`flybystab.screening.results.read_results` reads ECSV and Parquet.
     CSV has the unit in the name of each column and no provenance.
 
@@ -48,9 +49,11 @@ def write_table(table: QTable, path: str | Path) -> None:
             unit = None if column.unit == u.dimensionless_unscaled else column.unit
             column = column.value
         array = np.asarray(column)
-        parts = (
-            {name: array} if array.ndim == 1 else {f"{name}_{x}": array[:, k] for k, x in enumerate("xyz")}
-        )
+        if array.ndim == 1:
+            parts = {name: array}
+        else:
+            labels = "xyz" if array.shape[1] == 3 else [str(k + 1) for k in range(array.shape[1])]
+            parts = {f"{name}_{label}": array[:, k] for k, label in enumerate(labels)}
         kind = {"f": float, "i": int, "b": bool}.get(array.dtype.kind, str)
         for key, part in parts.items():
             columns[key], values[key] = Column(kind, unit, ""), part
