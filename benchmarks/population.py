@@ -179,10 +179,7 @@ def answers():
             for w in (0.1, 1.0)
         ]
         print(f"{radii:5.1f} {100 * cells[0]:7.1f} % {100 * cells[1]:5.1f} %")
-    print(
-        "published: 5 radii with less than 1 Myr (Nesvorny et al. 2010), 16 radii (Binzel et al. 2010) for the"
-    )
-    print("Q types, about a fifth of the S complex and Q types among near-Earth asteroids")
+    print("published refreshing distances: 5 radii (Nesvorny et al. 2010) to 16 radii (Binzel et al. 2010)")
 
 
 def nbody(years=3000.0, particles=200, within=0.1):
