@@ -13,6 +13,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from flybystab.catalogues.readers import decoded
 from flybystab.catalogues.spin_solutions import SpinSolution, solution_columns
 from flybystab.errors import InvalidInput
 from flybystab.files import read_bytes
@@ -100,10 +101,7 @@ def read_physical(path: str | Path) -> list[PhysicalData]:
         The file cannot be read, or has no known format.
     """
     raw = read_bytes(path, "file of physical parameters")
-    try:
-        text = raw.decode("utf-8-sig").replace("\r\n", "\n")
-    except UnicodeDecodeError as error:
-        raise InvalidInput("file of physical parameters", path, f"a text ({error})") from None
+    text = decoded(raw, "file of physical parameters", path)
     for reader in (PHYSICAL_READERS[name] for name in physical_reader_names()):
         if reader.identify(text):
             return reader.read(text, Path(path).name)

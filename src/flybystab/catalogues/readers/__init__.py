@@ -123,14 +123,30 @@ def text_of(path: str | Path) -> str:
             "a file of orbits: an orbit ephemeris message is a trajectory; fs.Encounter.from_oem(path, planet) "
             "follows it",
         )
+    return decoded(raw, "catalogue file", path)
+
+
+def decoded(raw: bytes, what: str, path: str | Path) -> str:
+    """Text of the bytes of a file: UTF-8 or, with a mark, UTF-16; lines end with a line feed, and none is blank before.
+
+    Raises
+    ------
+    InvalidInput
+    """
     try:
-        return raw.decode("utf-8-sig")
+        text = raw.decode("utf-16" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InvalidInput("catalogue file", path, f"a readable CSV file ({error})") from None
+        raise InvalidInput(what, path, f"a readable text file ({error})") from None
+    if "\r" in text:
+        text = text.replace("\r\n", "\n").replace("\r", "\n")
+    text = text.rstrip("\x1a")  # the end of a file in DOS
+    return re.sub(r"\A(?:[ \t]*\n)+", "", text)
 
 
 def header_of(text: str) -> Sequence[str]:
     """Column names of the first line of a CSV text; none if it is not a line of CSV."""
+    if text[:1] in "{[":
+        return []
     try:
         return [c.strip() for c in next(csv_rows(text.partition("\n")[0], "header", "text"), [])]
     except InvalidInput:
@@ -149,7 +165,7 @@ def rows_of(text: str, file: str) -> list[dict[str, str]]:
     columns = [c.strip() for c in next(rows, [])]
     out = []
     for line, row in enumerate(rows, start=2):
-        if not row:
+        if not any(cell.strip() for cell in row):
             continue
         if len(row) != len(columns):
             raise InvalidInput("row", f"line {line} of {file}", f"{len(columns)} cells, as in the header")

@@ -71,6 +71,8 @@ def _lines(text: str) -> Iterator[str]:
 
 
 def _cells(line: str) -> list[str]:
+    if "\t" in line:
+        return [c.strip() for c in line.split("\t")]
     if "," in line:
         return [c.strip() for c in next(csv_rows(line, "catalogue file", ""))]
     return line.split("|") if "|" in line else line.split()
@@ -80,7 +82,7 @@ def _is_table(text: str) -> bool:
     first = next(_lines(text[:20000]), "")
     if len(first) > 5000 or text[:1] in "{[":
         return False
-    cells = [c.strip() for c in first.replace(",", " ").replace("|", " ").split()]
+    cells = [c.strip('"') for c in re.split(r"[,|\s]+", first.strip())]
     return "FORMAT" in cells or (len(cells) > 9 and cells[1] in FORMATS)
 
 
