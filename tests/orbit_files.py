@@ -1,5 +1,7 @@
 """Orbit files of every reader: small texts, and the same with a parameter that no force model has."""
 
+import csv
+import io
 import json
 from pathlib import Path
 
@@ -97,3 +99,72 @@ UNKNOWN = {
     .replace(" Q P\n", " Q XYZ P\n")
     .replace(" 1680.711199557247", " 3.0 1680.711199557247"),
 }  # fmt: skip
+
+
+def without_sigmas(name):
+    """The elements of Find_Orb without their errors."""
+    document = json.loads(text(name))
+    for thing in document["objects"].values():
+        thing["elements"] = {k: v for k, v in thing["elements"].items() if "sigma" not in k}
+    return json.dumps(document)
+
+
+def answer():
+    """An answer of SBDB without covariance, errors and condition code."""
+    document = json.loads(text("2001VB.json"))
+    document["orbit"].pop("covariance")
+    document["orbit"]["condition_code"] = None
+    for item in document["orbit"]["elements"]:
+        item["sigma"] = None
+    return json.dumps(document)
+
+
+def orbit_of_mpc():
+    document = json.loads(text("2020AB.json"))
+    for part in ("CAR", "COM"):
+        document[part]["covariance"] = {}
+    return json.dumps(document)
+
+
+def oef():
+    lines = text("2018VP1.eq0").splitlines()
+    return "\n".join(x for x in lines if not x.strip().startswith(("COV", "NOR", "! RMS", "! EIG", "! WEA")))
+
+
+def query(name):
+    """A query without condition code and 1-sigmas."""
+    rows = list(csv.DictReader(io.StringIO(text(name))))
+    kept = [c for c in rows[0] if c != "condition_code" and not c.startswith("sigma")]
+    out = io.StringIO()
+    writer = csv.DictWriter(out, kept, extrasaction="ignore")
+    writer.writeheader()
+    writer.writerows(rows)
+    return out.getvalue()
+
+
+MPC_PLAIN = (
+    "principal_desig,epoch_jd_tt,a_au,e,i_deg,node_deg,peri_deg,M_deg\n2020 AB,2461000.5,1.0,.1,2,3,4,5\n"
+)
+#: Texts of orbits without errors, for every reader but that of the covariance of Find_Orb.
+PLAIN = {
+    "OEF2.0": oef,
+    "SBDB query (CSV)": lambda: query("sbdb_query_results.csv"),
+    "SBDB query (JSON)": lambda: text("sbdb_query.json"),
+    "SBDB answer": answer,
+    "MPC table": lambda: MPC_PLAIN,
+    "MPCORB": lambda: text("apophis_2010.dat")[:105] + " " + text("apophis_2010.dat")[106:],
+    "MPC orbit (JSON)": orbit_of_mpc,
+    "MPC table (JSON)": lambda: json.dumps([EXTENDED]),
+    "MPC web service (JSON)": lambda: json.dumps([SERVICE]),
+    "MPC CometEls": lambda: text("CometEls.txt"),
+    "MPC comets (JSON)": lambda: json.dumps([COMET]),
+    "JPL elements": lambda: text("ELEMENTS.COMET"),
+    "JPL Horizons": lambda: text("ceres_elements.txt"),
+    "Sorcha, layup, OpenOrb": lambda: text("sorcha_kep.csv"),
+    "NASA NeoWs": lambda: json.dumps(
+        NEOWS | {"orbital_data": NEOWS["orbital_data"] | {"orbit_uncertainty": None}}
+    ),
+    "OpenOrb orbits": lambda: OPENORB,
+    "Find_Orb elements": lambda: without_sigmas("find_orb_total.json"),
+    "ECSV table": lambda: text("ceres_elements.ecsv"),
+}

@@ -86,13 +86,24 @@ def name_columns(text: str) -> dict[str, str]:
     """
     full = " ".join(text.split())
     plain = unpacked(full)
+    # Without a space, or with an underscore: 2010TU149, 2010_TU149, 2040P-L.
+    if compact := re.fullmatch(r"(\d{4})_?([A-HJ-Y][A-HJ-Z]\d{0,3}|P-L|T-[123])", plain):
+        plain = f"{compact[1]} {compact[2]}"
+    if hyperbolic := re.match(r"(A/\d{4} [A-Z]{1,2}\d*)", plain):
+        return {"number": "", "name": plain, "designation": hyperbolic[1]}
     if is_comet(plain):
         kept = re.match(
             r"(\d+[PCDI](?:-[A-Z]{1,2})?|[PCDXI]/-?\d+ [A-Z]{1,2}\d*(?:-[A-Z]{1,2})?)(?:/|\s*\(|$)", plain
         )
         if kept is None:
             return {"number": "", "name": plain, "designation": plain}
-        return {"number": "", "name": plain, "designation": kept[1]}  # many comets are called LINEAR or SOHO
+        fragment = re.search(r"/.*-([A-Z]{1,2})$", plain) if "-" not in kept[1] else None
+        designation = f"{kept[1]}-{fragment[1]}" if fragment and kept[1][:1].isdigit() else kept[1]
+        return {
+            "number": "",
+            "name": plain,
+            "designation": designation,
+        }  # many comets are called LINEAR or SOHO
     provisional = r"(?:[A-Z]?\d{3,4} [A-Z]{2}\d*|\d{4} (?:P-L|T-[123]))"
     if bare := re.fullmatch(rf"\(?({provisional})\)?", plain):
         return {"number": "", "name": bare[1], "designation": bare[1]}

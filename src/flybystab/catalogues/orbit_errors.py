@@ -44,7 +44,7 @@ def error_of(row: Mapping[str, str], epoch: Time) -> Covariance | None:
         Of its elements.
     """
     axis, ecc = float(row["a_au"]) * AU, float(row["e"])
-    if axis <= 0.0:
+    if axis <= 0.0 or not 0.0 <= ecc < 1.0:
         return None
     one = np.radians(1.0)
     angles = [float(row[c]) * one for c in ("i_deg", "node_deg", "peri_deg", "M_deg")]

@@ -103,7 +103,7 @@ LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType(
     | {c: (0.0, np.inf) for c in UNITS if "sigma" in c}
     | {"density_kg_m3": DENSITY_RANGE, "e": (0.0, np.inf), "amplitude_mag": (0.0, 5.0)}
     | {"i_deg": (0.0, 180.0), "pole_ecl_lat_deg": (-90.0, 90.0)}
-    | {"H_mag": (-5.0, 45.0), "a_au": (-1e6, 1e6), "epoch_jd_tdb": (0.0, 1e7)}
+    | {"H_mag": (-5.0, 45.0), "a_au": (-1e6, 1e6), "epoch_jd_tdb": (1e6, 1e7)}
     | {"q_au": (0.0, 1e4), "tp_jd_tdb": (-1e7, 1e7)}
     # A third of the Sun's gravity at 1 au; the largest accelerations of comets are 1e-6 au/d2.
     | dict.fromkeys(("A1_au_d2", "A2_au_d2", "A3_au_d2"), (-1e-4, 1e-4))

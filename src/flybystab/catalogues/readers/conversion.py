@@ -340,6 +340,7 @@ def printed_covariance(
         What is subtracted from the text of ``tp``.
     """
     values = [float(t) - (offset if n == "tp" else 0.0) for n, t in zip(names, texts, strict=True)]
+    _check_conic(dict(zip(names, values, strict=True)), source)
     sigma = printed_sigmas(names, texts)
     if _displacement(names, values, sigma) < _NEGLIGIBLE:
         return None
@@ -355,6 +356,16 @@ def printed_covariance(
     return Covariance(
         _time(jd), tuple(names), np.array(values) * scale, np.diag((sigma * scale) ** 2), what, False, caveat
     )
+
+
+def _check_conic(at: Mapping[str, float], source: str) -> None:
+    """Refuse eccentricities that no conic with this axis or perihelion distance has."""
+    e = at.get("e", 0.0)
+    if e < 0.0 or at.get("q", 1.0) <= 0.0 or ("a" in at and (at["a"] == 0.0 or (at["a"] > 0.0) != (e < 1.0))):
+        given = ", ".join(f"{n} = {at[n]:g}" for n in ("a", "q", "e") if n in at)
+        raise InvalidInput(
+            "elements", given, f"e of 0 or more, below 1 for a > 0, above 1 for a < 0, q > 0 in {source}"
+        )
 
 
 def _displacement(names: Sequence[str], values: Sequence[float], sigma: Array) -> float:

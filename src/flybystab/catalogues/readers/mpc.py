@@ -85,7 +85,7 @@ def read_mpc(text: str, file: str) -> list[Entry]:
 
 
 #: Packed designation, H and G (may be blank), packed epoch, then M in degrees.
-_MPCORB = re.compile(r"^[0-9A-Za-z~][0-9A-Za-z ]{6} .{5} .{5} [IJK]\d\d[1-9A-C][1-9A-V] [ \d]{3}\.\d{5} ")
+_MPCORB = re.compile(r"^[0-9A-Za-z~_][0-9A-Za-z ]{6} .{5} .{5} [IJK]\d\d[1-9A-C][1-9A-V] [ \d]{3}\.\d{5} ")
 
 
 def _body(text: str) -> list[str]:

@@ -113,8 +113,7 @@ def _blocks(body: str) -> Iterator[tuple[str, list[str]]]:
 
 def _identity(text: str) -> dict[str, str]:
     """Name columns of an OrbFit name, which has no spaces: 2018VP1, 433, 2040P-L."""
-    spaced = re.sub(r"^(\d{4})([A-Z]{2}\d*|P-L|T-[123])$", r"\1 \2", text.strip("' "))
-    return name_columns(spaced)
+    return name_columns(text.strip("' "))
 
 
 def _solution(name: str, lines: Sequence[str], file: str) -> Entry:
@@ -131,7 +130,7 @@ def _solution(name: str, lines: Sequence[str], file: str) -> Entry:
     if any(k in words for k in ("COR", "NOR")) and "COV" not in words:
         raise InvalidInput("orbit file", file, "COV lines (not COR or NOR alone)")
     jd = number(day, "epoch", file) + MJD
-    names, texts = _SETS[kinds[0]], words[kinds[0]]
+    names, texts = _SETS[kinds[0]], [t.upper().replace("D", "E") for t in words[kinds[0]]]
     values = [number(t, n, file) for n, t in zip(names, texts, strict=True)]
     if "tp" in names:
         values[5] += MJD - jd

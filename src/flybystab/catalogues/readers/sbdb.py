@@ -130,8 +130,9 @@ def _check(row: Mapping[str, str], file: str) -> None:
 def _key_of(full: str, spkid: str) -> str:
     """Number or designation from the full name, else from the identifier of a numbered asteroid (20000000 + n)."""
     if full:
-        first = full.split()[0].strip("()")
-        return first if first.isdigit() and not re.match(r"\d{4} [A-Z]{2}", full) else full.strip("() ")
+        bare = full.strip("() ")
+        first = bare.split()[0].strip("()") if bare else ""
+        return first if first.isdigit() and not re.match(r"\d{4} ([A-Z]{2}|P-L|T-)", bare) else bare
     text = spkid.lstrip("abcdefghijklmnopqrstuvwxyz")  # the column id is a0000433
     n = int(text) if text.isdigit() else 0
     if text != spkid:
