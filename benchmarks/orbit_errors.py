@@ -1,7 +1,7 @@
 """What digits and U of a catalogue say of its orbits, held against later and better orbits, as tables.
 
-Usage: ``python benchmarks/orbit_errors.py [runoff] [digits] [impacts] [model]``. Reference data are read from
-``../shared/data`` (or ``$FLYBYSTAB_SHARED/data``); nothing is downloaded.
+Usage: ``python benchmarks/orbit_errors.py [runoff] [digits] [impacts] [model] [coverage]``. Reference data are read
+from ``../shared/data`` (or ``$FLYBYSTAB_SHARED/data``); nothing is downloaded.
 """
 
 from __future__ import annotations
@@ -179,6 +179,71 @@ def impacts() -> list[str]:
     return out
 
 
+def deviation(orbit: Orbit, truth: Orbit, time: Time, window: Window) -> float:
+    """Distance of an orbit from the truth along the direction least known, in its sigma, at a time."""
+    pairs = orbit.sigma_points("de440")
+    points = places([x for pair in pairs for x in pair] + [orbit, truth], time, window)
+    columns = 0.5 * (points[0:-2:2] - points[1:-2:2])
+    values, axes = np.linalg.eigh(columns.T @ columns)
+    return float((points[-1] - points[-2]) @ axes[:, -1] / np.sqrt(values[-1]))
+
+
+def pairs(size: int = 300) -> dict[str, list[tuple[Orbit, Orbit]]]:
+    """Orbits with their stated errors, and later or better orbits of the same asteroids, by source of the errors."""
+    old, new, mpc = read(OLD), read(NEW), read(MPC)
+    late = {k: a.orbit for k, a in new.items() if abs(seconds(a.epoch, MEETING)) < 2.0 * YEAR}
+    rng = np.random.default_rng(2)
+
+    def some(keys: Sequence[str]) -> list[str]:
+        return [keys[i] for i in rng.permutation(len(keys))[:size]]
+
+    def plain(asteroid: Asteroid) -> Orbit:
+        """The orbit by its digits and U alone."""
+        row = {c: v for c, v in asteroid.row.items() if not c.startswith("sigma")}
+        return Asteroid(row, file=asteroid.file).orbit
+
+    near = [k for k, a in old.items() if k in late and abs(seconds(a.epoch, MEETING)) < 7.0 * YEAR]
+    given = [k for k in near if old[k].orbit.covariance is not None]
+    out = {}
+    for label, low, high in (("0", 0, 0), ("1 to 9", 1, 9)):
+        code = [
+            k
+            for k in given
+            if old[k].row["condition_code"] and low <= int(old[k].row["condition_code"]) <= high
+        ]
+        chosen = some(code)
+        out[f"JPL 2020, 1-sigmas, code {label}"] = [(old[k].orbit, late[k]) for k in chosen]
+        out[f"JPL 2020, code {label} alone"] = [(plain(old[k]), late[k]) for k in chosen]
+    for label, low, high in (("0", 0, 0), ("1-2", 1, 2), ("3-5", 3, 5), ("6-9", 6, 9)):
+        keys = [k for k in mpc if k in late and mpc[k].row["condition_code"].isdigit()]
+        keys = [k for k in keys if low <= int(mpc[k].row["condition_code"]) <= high]
+        out[f"MPC 2026, digits and U {label}"] = [(mpc[k].orbit, late[k]) for k in some(keys)]
+    files = sorted((DATA / "neocc").glob("*.ke1"))
+    own = [catalogue(f)[0] for f in files]
+    out["NEOCC, covariances"] = [(a.orbit, late[identity(a)]) for a in own if identity(a) in late]
+    return out
+
+
+def coverage() -> list[str]:
+    """Stated errors of orbits against later orbits, along the direction least known: shares within 1 and 3 sigma."""
+    window = ephemeris("de440").window(MEETING, -8.0 * YEAR, 2.0 * YEAR)
+    out = [
+        "Stated errors against JPL's orbits of 2026-07 at their epoch, along the direction least known",
+        "source                          orbits  median |z|  within 1 sigma  within 3 sigma",
+        "normal distribution                          0.67            68 %            99.7 %",
+    ]
+    for label, found in pairs().items():
+        z = np.array([abs(deviation(a, b, later(MEETING, 1.0), window)) for a, b in found])
+        z = z[np.isfinite(z)]
+        shares = [np.mean(z < n) for n in (1.0, 3.0)]
+        spreads = [np.sqrt(max(p * (1.0 - p), 0.25 / len(z)) / len(z)) for p in shares]
+        cells = "   ".join(
+            f"{100 * p:5.0f} +- {100 * s:3.0f} %" for p, s in zip(shares, spreads, strict=True)
+        )
+        out.append(f"{label:31s} {len(z):6d} {np.median(z):11.2f} {cells}")
+    return out
+
+
 def model() -> list[str]:
     """Closest approaches of 400 asteroids with DE421 and DE440: how far apart they are, by the time from the epoch."""
     asteroids = list(catalogue(DATA / f"{NEW}.csv.gz"))
@@ -217,7 +282,7 @@ def model() -> list[str]:
 
 def main(arguments: list[str]) -> int:
     """Print the tables that were asked for, by default all."""
-    known = {"runoff": runoff, "digits": digits, "impacts": impacts, "model": model}
+    known = {"runoff": runoff, "digits": digits, "impacts": impacts, "model": model, "coverage": coverage}
     for name in arguments or list(known):
         if name not in known:
             print(f"no table {name!r}: there are {', '.join(known)}", file=sys.stderr)

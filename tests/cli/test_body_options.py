@@ -103,3 +103,32 @@ def test_stability_and_infer_take_a_body(capsys):
     assert json.loads(capsys.readouterr().out)["admissible"]
     assert main(["infer", file, *BODY, "--from", "2023-01-01", "--to", "2023-02-01", "--attitudes", "2"]) == 0
     assert "2000 kg/m3" in capsys.readouterr().out
+
+
+def test_size_and_magnitude_of_an_object_without_either(tmp_path, capsys):
+    """An orbit of the MPC without H: the size is given, or H with --assume."""
+    (tmp_path / "x").write_text((FILES / "2020AB.json").read_text())
+    words = ["stability", str(tmp_path / "x")]
+    assert main([*words, "--assume"]) == 1
+    assert "--diameter, --H" in capsys.readouterr().err
+    assert main([*words, "--assume", "--H", "27.5"]) == 0
+    by_magnitude = capsys.readouterr().out
+    assert main([*words, "--assume", "--diameter", "12+-3 m"]) == 0
+    by_size = capsys.readouterr().out
+    assert by_magnitude != by_size
+    assert main(["stability", "Bennu", "--diameter", "12 m", "--axes", "5 m"]) == 2
+    assert "not both" in capsys.readouterr().err
+
+
+def test_a_diameter_scales_the_known_shape():
+    from argparse import Namespace
+
+    from flybystab.catalogues.asteroid import Asteroid
+    from flybystab.cli.body_options import with_body_options
+
+    bennu = Asteroid.from_catalogue("Bennu")
+    half = with_body_options(bennu, Namespace(diameter="0.25+-0.02 km"))
+    ratio = half.semi_axes.value / bennu.semi_axes.value
+    assert ratio == pytest.approx([ratio[0]] * 3)
+    assert 2.0 * half.semi_axes.value.prod() ** (1 / 3) == pytest.approx(250.0)
+    assert half.row["diameter_sigma_m"] == "20.0"

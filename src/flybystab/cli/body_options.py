@@ -1,4 +1,4 @@
-"""Options for the body of an asteroid: ``--axes --density --period --pole --assume``, with errors (``200+-20 m``)."""
+"""Options for the body of an asteroid: ``--axes --diameter --H --density ...``, with errors (``200+-20 m``)."""
 
 from __future__ import annotations
 
@@ -69,6 +69,8 @@ def body_arguments(sub: argparse.ArgumentParser) -> None:
         "may be repeated",
     )
     sub.add_argument("--axes", metavar="AxBxC", help="semi-axes, with errors: '200x170x150+-10 m', '0.2 km'")
+    sub.add_argument("--diameter", metavar="D", help="diameter, which scales a known shape: '340+-40 m'")
+    sub.add_argument("--H", metavar="H", help="absolute magnitude, from which --assume takes a size")
     sub.add_argument("--density", metavar="RHO", help="density: '2000+-300 kg/m3', '2 g/cm3'")
     sub.add_argument("--period", metavar="P", help="spin period: '5.3+-0.1 h'")
     sub.add_argument(
@@ -128,6 +130,16 @@ def _given(options: argparse.Namespace) -> tuple[dict[str, str], list[str]]:
         sigmas["axes"] = errors * u.m
         names += ["axes"]
         row["semi_axes_source"] = "--axes"
+    if getattr(options, "H", None) is not None:
+        row["H_mag"] = repr(float(measured(options.H, "mag", "--H")))
+        names += ["H"]
+    if getattr(options, "diameter", None) is not None:
+        if "axes" in names:
+            raise InvalidInput("--diameter", options.diameter, "a diameter or --axes, not both")
+        size = measured(options.diameter, "m", "--diameter")
+        row |= {"diameter_m": repr(float(size)), "diameter_source": "--diameter"}
+        row["diameter_sigma_m"] = repr(size.sigma) if size.sigma else ""
+        names += ["diameter"]
     for key, column, unit in (
         ("density", "density_kg_m3", "kg/m3"),
         ("period", "spin_period_h", "h"),
@@ -168,6 +180,10 @@ def with_body_options(asteroid: Any, options: argparse.Namespace) -> Any:
         return asteroid
     if "period" in names or "pole" in names:
         row["spin_solutions"] = ""
+    if "diameter" in names:
+        from flybystab.catalogues.physical import body_of
+
+        row = body_of(asteroid, row)
     columns = {**asteroid.row, **row}
     columns["assumed"] = ";".join(c for c in asteroid.assumed if c not in row)
     return replace(asteroid, row=columns)

@@ -207,7 +207,7 @@ def _draws(asteroid: Asteroid, x: Array, population: Population, *, keep: bool) 
         raise InvalidInput(
             "diameter_m",
             "(empty)",
-            f"a size (--axes, Asteroid(body=...)) or H_mag for {asteroid.label} in {asteroid.file}",
+            f"a size (--axes, --diameter, --H; Asteroid(body=...)) for {asteroid.label} in {asteroid.file}",
         )
 
     # Shape, then scaled to the size

@@ -137,7 +137,7 @@ def with_physical(asteroid: Asteroid, *paths: str | Path) -> Asteroid:
         for body in mine:
             given |= {c: v for c, v in body.row.items() if v}
             spins += body.spins
-    row = dict(asteroid.row) | _scaled(asteroid, given)
+    row = dict(asteroid.row) | body_of(asteroid, given)
     if spins:
         row |= solution_columns(spins)
         row["spin_state"] = given.get("spin_state") or row["spin_state"]
@@ -146,8 +146,8 @@ def with_physical(asteroid: Asteroid, *paths: str | Path) -> Asteroid:
     return replace(asteroid, row=row)
 
 
-def _scaled(asteroid: Asteroid, given: Mapping[str, str]) -> dict[str, str]:
-    """The columns given, with the semi-axes of the asteroid scaled to a new diameter."""
+def body_of(asteroid: Asteroid, given: Mapping[str, str]) -> dict[str, str]:
+    """Columns of new values of a body: known semi-axes are scaled to a new diameter, and its old errors are gone."""
     from flybystab.catalogues.record import SHAPE
 
     out = dict(given)
