@@ -54,7 +54,11 @@ def test_a_comet_with_a_delayed_maximum_meets_jupiter_where_jpl_has_it():
     assert a.orbit.covariance.names[-1] == "DT"
     assert a.orbit.covariance.sigma[-1] > 0.0
     t = fs.find_encounters(
-        a.orbit, Time("1958-06-01"), Time("1959-10-01"), ["jupiter"], 0.1 * u.au, ephemeris="de440"
+        a.orbit,
+        *(Time(x, scale="tdb") for x in ("1958-06-01", "1959-10-01")),
+        ["jupiter"],
+        0.1 * u.au,
+        ephemeris="de440",
     )
     assert t["distance"][0].to_value(u.km) == pytest.approx(0.0515584492070597 * AU_KM, abs=100.0)
 

@@ -22,16 +22,16 @@ def read_native(text: str, file: str) -> list[Entry]:
     """
     columns = header_of(text)
     known = (*TEXTS, *UNITS)
+    if any(";" in c or "\t" in c for c in columns):
+        raise InvalidInput("columns", ", ".join(columns), f"commas between the columns of {file}")
+    if text.strip() and not set(known) & set(columns):
+        raise InvalidInput(
+            "catalogue file",
+            file,
+            f"the columns of the catalogue, or a file of one of {', '.join(reader_names())}",
+        )
     for c in columns:
         if c not in known:
-            if ";" in c or "\t" in c:
-                raise InvalidInput("columns", c, f"commas between the columns of {file}")
-            if not set(known) & set(columns):
-                raise InvalidInput(
-                    "catalogue file",
-                    file,
-                    f"the columns of the catalogue, or a file of one of {', '.join(reader_names())}",
-                )
             raise UnknownName("column", c, get_close_matches(c, known, cutoff=0.6), f"(in {file})")
     if not {"name", "designation", "number"} & set(columns):
         raise InvalidInput("columns", columns, f"at least one of name, designation, number in {file}")
