@@ -19,10 +19,15 @@ from flybystab.plots.outcome_map import outcome_plot, target_plot
 from flybystab.plots.population import population_figure
 from flybystab.plots.scene import animation, scene_plot
 from flybystab.plots.shape_map import surface_history_figure
+from flybystab.plots.style import figure_style
 
 DOCS = Path(__file__).resolve().parent
 IMAGES = DOCS / "images"
 PILE = fs.Body(semi_axes=[1400, 850, 750] * u.m, density=2000 * u.kg / u.m**3, spin_period=6 * u.h)
+
+
+STYLE = figure_style()
+STYLE.__enter__()  # for all figures of this script
 
 
 def save(name, figure):

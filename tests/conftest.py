@@ -10,6 +10,12 @@ from reference import SHARED
 from flybystab.orbit.orbit import Orbit
 
 
+@pytest.fixture(autouse=True)
+def no_defaults_of_the_user(monkeypatch):
+    """Commands do not read the file of defaults of whoever runs the tests."""
+    monkeypatch.setenv("FLYBYSTAB_CONFIG", "")
+
+
 @pytest.fixture(scope="session")
 def shared():
     """Folder of reference data."""

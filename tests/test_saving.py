@@ -87,6 +87,7 @@ MAKERS = {
     "LinearPlane": lambda: LinearPlane(
         [1, 2] * u.km, np.eye(2) * u.km**2, 3 * u.km, 4 * u.s, np.float64(0.5), np.nan
     ),
+    "StateTransition": lambda: orbits()[0].state_transition("2029-03-01"),
     "EncounterRates": lambda: fs.encounter_rates(orbits(), "earth"),
     "DisruptionRates": rates,
     "Freshness": lambda: fs.freshness(
@@ -191,7 +192,7 @@ def test_every_public_class_of_results_has_the_methods():
 
 
 def test_all_results_are_listed():
-    for package in ("body", "encounter", "flybys", "population", "screening"):
+    for package in ("body", "encounter", "flybys", "orbit", "population", "screening"):
         folder = Path(fs.__file__).parent / package
         for module in folder.glob("[a-z]*.py"):
             import_module(f"flybystab.{package}.{module.stem}")

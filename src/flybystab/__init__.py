@@ -55,6 +55,7 @@ _HOME = {
     "SpinSample": "flybys.spin_sample",
     "SpinState": "body.spin_state",
     "Stability": "body.stability",
+    "StateTransition": "orbit.state_transition",
     "Survival": "flybys.survival",
     "Tabular": "tabular",
     "Verdict": "flybys.verdict",
@@ -160,6 +161,7 @@ if TYPE_CHECKING:
     from flybystab.orbit.orbit import Orbit
     from flybystab.orbit.predictability import Predictability
     from flybystab.orbit.search.encounter_finder import find_encounters
+    from flybystab.orbit.state_transition import StateTransition
     from flybystab.plots.population import population_figure
     from flybystab.plots.results import plot_result
     from flybystab.plots.shape_map import shape_map, slope_change_figure

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, ClassVar, Self
 
 import numpy as np
+from astropy.time import Time
 from astropy.units import Quantity
 
 from flybystab import saving
@@ -272,7 +273,10 @@ class Collection(Record):
 
 
 def _put(columns: dict[str, Any], name: str, value: Any) -> None:
-    """Append a value as columns of length 1; None and bodies are left out."""
+    """Append a value as columns of length 1, times as text (TDB); None and bodies are left out."""
+    if isinstance(value, Time):
+        columns[f"{name}_tdb"] = np.asarray([value.tdb.isot])
+        return
     if isinstance(value, Quantity | np.ndarray | bool | int | float | str | np.generic):
         if isinstance(value, str):
             value = str(value)

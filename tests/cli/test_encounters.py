@@ -2,6 +2,7 @@
 
 import json
 from importlib import resources
+from pathlib import Path
 
 import astropy.units as u
 import numpy as np
@@ -9,6 +10,8 @@ import pytest
 
 from flybystab.cli.main import main
 from flybystab.screening.results import read_results
+
+EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
 YEAR = ("--from", "2029-01-01", "--to", "2030-01-01")
 
@@ -120,3 +123,27 @@ def test_many_encounters_are_cut_to_the_closest(capsys):
     lines = out.splitlines()
     assert lines[-1].startswith("the closest 100 of ")
     assert len(lines) == 103
+
+
+def test_several_names_and_files(capsys, tmp_path):
+    span = ["--from", "2029-01-01", "--to", "2030-01-01", "--json"]
+    file = str(EXAMPLES / "2024YR4.ke1")
+    assert main(["encounters", "Apophis", file, "YORP", *span]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert "Apophis" in {row["asteroid"] for row in found["rows"]}
+    assert main(["encounters", "Apophis", "YORP", "--from", "2029-01-01", "--to", "2030-01-01"]) == 0
+    assert capsys.readouterr().out.startswith("Apophis, YORP (2 asteroids): ")
+
+
+def test_an_asteroid_of_a_catalogue_file(capsys):
+    file = str(EXAMPLES / "2024YR4.ke1")
+    span = ["--from", "2032-12-01", "--to", "2033-01-01", "--planet", "moon", "--planet", "earth"]
+    assert main(["encounters", "2024 YR4", "--catalogue", file, *span, "--json"]) == 0
+    alone = json.loads(capsys.readouterr().out)["rows"]
+    assert main(["encounters", file, *span, "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["rows"] == alone
+    assert len(alone) >= 1
+    assert main(["encounters", "Apophis", "--catalogue", file, *span]) == 1
+    assert "unknown asteroid 'Apophis'" in capsys.readouterr().err
+    assert main(["encounters", "--all", "--catalogue", file, *span]) == 0
+    assert "determined" not in capsys.readouterr().out

@@ -5,26 +5,30 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from flybystab.cli.common import check_table, names_a_file, show, span_arguments, tdb
+from flybystab.cli.common import catalogue_argument, check_table, names_a_file, show, span_arguments, tdb
 from flybystab.errors import WrongUsage
 
 HELP = "close approaches of an asteroid or of a catalogue"
 #: Number of encounters printed at most: the closest ones.
 SHOWN = 100
-EXAMPLE = "flybystab encounters Apophis --to 2030-01-01 --clones 1000"
+EXAMPLE = (
+    "flybystab encounters Apophis --to 2030-01-01 --clones 1000\n"
+    "  flybystab encounters a.ke1 b.ke1 99942 --output table.csv"
+)
 
 
 def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     sub.add_argument(
         "name",
-        nargs="?",
-        help="number, name or designation; or a file of orbits (docs/inputs.md)",
+        nargs="*",
+        help="numbers, names or designations, and files of orbits (docs/inputs.md)",
     )
+    catalogue_argument(sub)
     sub.add_argument(
         "--all",
         action="store_true",
-        help="the whole embedded catalogue or file (own CSV or a format of docs/inputs.md), without predictability",
+        help="the whole embedded catalogue, or that of --catalogue, or all files, without predictability",
     )
     span_arguments(sub, "2020-01-01", "2050-01-01")
     sub.add_argument(
@@ -41,18 +45,17 @@ def run(options: argparse.Namespace) -> None:
     """Execute the command."""
     import astropy.units as u
 
-    from flybystab.catalogues.catalogue import catalogue
     from flybystab.flybys.document import table_document
     from flybystab.orbit.search.encounter_finder import find_encounters
     from flybystab.progress import Bar
     from flybystab.screening.tables import write_table
 
-    if options.name is None and not options.all:
+    if not options.name and not options.all:
         raise WrongUsage("NAME: expected an asteroid, or --all for the whole catalogue")
     if options.clones and options.all:
         raise WrongUsage("--clones: expected one asteroid or a file of a few, not --all")
     check_table(options.output)
-    asteroids = list(catalogue()) if options.name is None else _asteroids(options.name)
+    asteroids = _asteroids(options.name, options.catalogue)
     bar = Bar(len(asteroids), "asteroids") if len(asteroids) > SHOWN else None
     table = find_encounters(
         asteroids,
@@ -71,14 +74,13 @@ def run(options: argparse.Namespace) -> None:
     if options.output:
         write_table(table, options.output)
     many = len(asteroids) > 1
+    source = ", ".join(options.name) or options.catalogue or "embedded catalogue"
     head = f"{len(table)} encounters within {options.within:g} au"
     show(
         options,
         lambda: table_document(table),
         lambda: [
-            f"{asteroids[0].label}: {head}"
-            if not many
-            else f"{options.name or 'embedded catalogue'} ({len(asteroids)} asteroids): {head}",
+            f"{asteroids[0].label}: {head}" if not many else f"{source} ({len(asteroids)} asteroids): {head}",
             *_lines(table, many),
             *[f"not integrated: {one['why']}" for one in table.meta["failed"][:SHOWN]],
             *([f"table      {options.output}"] if options.output else []),
@@ -86,16 +88,25 @@ def run(options: argparse.Namespace) -> None:
     )
 
 
-def _asteroids(name: str) -> list[Any]:
-    """The asteroid of this name, or the asteroids of this file."""
+def _asteroids(words: list[str], file: str | None) -> list[Any]:
+    """Asteroids of names and files; without any, all of a catalogue file or of the embedded catalogue."""
     from pathlib import Path
 
     from flybystab.catalogues.asteroid import Asteroid
-    from flybystab.catalogues.catalogue import catalogue
+    from flybystab.catalogues.catalogue import catalogue, find
 
-    if names_a_file(name):
-        return list(catalogue(Path(name)))
-    return [Asteroid.from_catalogue(name)]
+    rows = catalogue() if file is None else catalogue(Path(file))
+    if not words:
+        return list(rows)
+    found: list[Any] = []
+    for word in words:
+        if file is not None:
+            found.append(find(rows, word, file))
+        elif names_a_file(word):
+            found += catalogue(Path(word))
+        else:
+            found.append(Asteroid.from_catalogue(word))
+    return found
 
 
 def _with_clones(table: Any, asteroids: list[Any], clones: int, seed: int) -> Any:

@@ -19,6 +19,7 @@ from flybystab._version import __version__
 from flybystab.cli import COMMANDS
 from flybystab.cli.arguments import check_arguments
 from flybystab.cli.common import printable
+from flybystab.cli.config import default_words
 from flybystab.cli.tab_completion import ASTEROID, FILE
 from flybystab.errors import FlybystabError, WrongUsage
 
@@ -35,7 +36,12 @@ def main(argv: Sequence[str] | None = None) -> int:
         )
         return 2
     try:
+        if arguments and arguments[0] in COMMANDS and not {"-h", "--help"} & set(arguments):
+            arguments[1:1] = default_words(arguments[0], command_parsers(parser), arguments[1:])
         options = parser.parse_args(arguments)
+    except WrongUsage as reason:
+        print(printable(f"flybystab: {reason}"), file=sys.stderr)
+        return 2
     except SystemExit as stop:  # argparse has printed the help or the error
         return int(stop.code or 0)
     options.words = arguments
@@ -107,13 +113,20 @@ class _Help(argparse.RawDescriptionHelpFormatter):
         self._action_max_length = 16  # argparse ignores the indent of the commands
 
 
+def command_parsers(parser: argparse.ArgumentParser) -> dict[str, argparse.ArgumentParser]:
+    """The parsers of the commands by name."""
+    actions = [a for a in parser._actions if isinstance(a, argparse._SubParsersAction)]
+    return dict(actions[0].choices)
+
+
 def command_parser() -> argparse.ArgumentParser:
     """Argument parser of all commands."""
     parser = _Parser(
         prog="flybystab",
         description="Do rubble-pile asteroids survive their close planetary encounters?",
         epilog="examples:\n  flybystab flyby Apophis --output apophis.png\n  flybystab scenario p2.toml --json\n"
-        "  flybystab screen --from 2026-01-01 --to 2036-01-01",
+        "  flybystab screen --from 2026-01-01 --to 2036-01-01\n"
+        "defaults of options by command: ~/.config/flybystab/config.toml, or the file in FLYBYSTAB_CONFIG",
         formatter_class=_Help,
     )
     parser.add_argument("--version", action="version", version=f"flybystab {__version__}")

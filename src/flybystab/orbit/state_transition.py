@@ -35,6 +35,7 @@ from flybystab.orbit.forces import (
     push,
 )
 from flybystab.orbit.ias15 import EPSILON, TIGHT, _address, _pointer, set_step_control
+from flybystab.tabular import Record
 from flybystab.typing import Array
 
 #: Directions of phase space and non-gravitational parameters.
@@ -226,7 +227,7 @@ def _size(away: Array) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
-class StateTransition:
+class StateTransition(Record):
     """Derivatives of the state of an orbit at one time by its state at the epoch and by its parameters.
 
     ICRF axes, relative to a body of the ephemeris: it moves as prescribed, so that every centre gives the same.
