@@ -1,7 +1,7 @@
 """Encounter rates of the known near-Earth asteroids, against counts and published figures; and what encounters do.
 
-Usage: ``python benchmarks/population.py counts|published|answers|nbody|verdicts|convergence|scale|binaries``. The MPC
-catalogue and CNEOS's list of close approaches are read from ``../shared/data`` (or ``FLYBYSTAB_SHARED``).
+Usage: ``python benchmarks/population.py counts|search|published|answers|nbody|verdicts|convergence|scale|binaries``.
+The MPC catalogue and CNEOS's list of close approaches are read from ``../shared/data`` (or ``FLYBYSTAB_SHARED``).
 """
 
 import argparse
@@ -14,6 +14,7 @@ from pathlib import Path
 import astropy.units as u
 import numpy as np
 from astropy.table import QTable
+from astropy.time import Time
 
 import flybystab as fs
 
@@ -65,6 +66,44 @@ def counts():
     print(
         f"\n{len(orbits)} orbits and one planet: {wall:.2f} s on all cores, {1e6 * wall / len(orbits):.0f} us an orbit"
     )
+
+
+def search(limit="17.75"):
+    """Passages from 1950 to 2050 found by the search of the package, by planet, and the expected numbers."""
+    limit = float(limit)
+    rows = [r for r in read("nea_mpc_2026-02.csv.gz") if float(r["H"] or "nan") < limit]
+    table, h = catalogue()
+    table = table[h < limit]
+    orbits = [
+        fs.Orbit.from_elements(
+            Time(float(r["epoch_jd_tt"]), format="jd", scale="tt"),
+            float(r["a_au"]) * u.au,
+            float(r["e"]),
+            *(float(r[k]) * u.deg for k in ("i_deg", "node_deg", "peri_deg", "M_deg")),
+        )
+        for r in rows
+    ]
+    planets = ("mercury", "venus", "earth", "mars")
+    start = time.perf_counter()
+    found = fs.find_encounters(
+        orbits,
+        Time("1950-01-01", scale="tdb"),
+        Time("2050-01-01", scale="tdb"),
+        planets=planets,
+        within=0.05 * u.au,
+    )
+    wall = time.perf_counter() - start
+    print(f"{len(orbits)} known asteroids of H < {limit:g}, 1950 to 2050, all forces: search in {wall:.0f} s")
+    print("planet   within (au)  found  expected  ratio  (1 sigma of counting)")
+    for name in planets:
+        distance = found["distance"][found["planet"] == name].to_value(u.au)
+        rates = fs.encounter_rates(table, name, 0.05 * u.au)
+        for q in (0.05, 0.01):
+            n = int(np.sum(distance < q))
+            expected = 100.0 * rates.within(q * u.au).total.value
+            print(
+                f"{name:8s} {q:11.2f} {n:6d} {expected:9.1f} {n / expected:6.2f}  ({1 / np.sqrt(expected):.2f})"
+            )
 
 
 def verdicts():
@@ -340,7 +379,9 @@ def binaries():
 
 
 if __name__ == "__main__":
-    commands = (counts, published, answers, nbody, verdicts, convergence, scale, binaries)
+    commands = (counts, search, published, answers, nbody, verdicts, convergence, scale, binaries)
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("what", choices=[c.__name__ for c in commands])
-    {c.__name__: c for c in commands}[parser.parse_args().what]()
+    parser.add_argument("arguments", nargs="*", help="search: limit of the absolute magnitude (17.75)")
+    options = parser.parse_args()
+    {c.__name__: c for c in commands}[options.what](*options.arguments)

@@ -41,6 +41,7 @@ TABLES = {
     "population_nbody": "python benchmarks/population.py nbody",
     "population_published": "python benchmarks/population.py published",
     "population_scale": "python benchmarks/population.py scale",
+    "population_search": "python benchmarks/population.py search",
     "population_verdicts": "python benchmarks/population.py verdicts",
     "push": "python benchmarks/stability.py push",
     "sky": "flybystab bench sky",

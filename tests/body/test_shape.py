@@ -205,10 +205,27 @@ def test_vtk_holds_the_mesh_and_its_fields(tmp_path):
     assert np.loadtxt(lines[k + 1 : k + 9]) == pytest.approx(shape.vertices.value)
     k = lines.index("SCALARS area_m2 double 1")
     assert sum(map(float, lines[k + 2 : k + 14])) == pytest.approx(22.0)
+    shape.write(tmp_path / "box.ply", {"area": shape.facet_area})
+    again = fs.Shape.read(tmp_path / "box.ply", unit=u.m)
+    assert again.volume.value == pytest.approx(shape.volume.value, rel=1e-9)
+    body = (tmp_path / "box.ply").read_text().split("end_header\n")[1].splitlines()
+    assert "property double area_m2" in (tmp_path / "box.ply").read_text()
+    assert sum(float(line.split()[4]) for line in body[8:]) == pytest.approx(22.0)
+    shape.write(tmp_path / "bare.ply")
+    assert fs.Shape.read(tmp_path / "bare.ply", unit=u.m).area.value == pytest.approx(22.0)
     with pytest.raises(InvalidInput, match="one for each facet"):
         shape.write(tmp_path / "box.vtk", {"area": shape.facet_area[:5]})
     with pytest.raises(InvalidInput, match=r"\.vtk"):
         shape.write(tmp_path / "box.stl")
+
+
+def test_pyvista_reads_the_fields(tmp_path):
+    pyvista = pytest.importorskip("pyvista")
+    shape = box()
+    shape.write(tmp_path / "box.vtk", {"area": shape.facet_area})
+    mesh = pyvista.read(tmp_path / "box.vtk")
+    assert mesh.cell_data["area_m2"] == pytest.approx(shape.facet_area.value, rel=1e-8)
+    assert mesh.volume == pytest.approx(6.0, rel=1e-6)
 
 
 @pytest.mark.parametrize("text", ["", "hello world\n", "4 4\n0 0 0\n1 0 0\n", "v 0 0 0\nv 1 0 0\nf 1 2 3\n"])

@@ -14,7 +14,7 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.body.mesh import MassProperties, edges_of, mass_properties, self_intersections
-from flybystab.body.shape_files import read_mesh, write_vtk
+from flybystab.body.shape_files import read_mesh, write_mesh
 from flybystab.constants import G
 from flybystab.core.polyhedron.gravity import polyhedron_gravity
 from flybystab.core.polyhedron.moments import third_moments
@@ -310,16 +310,16 @@ class Shape:
         return potential.value, acceleration.value
 
     def write(self, path: str | Path, fields: Mapping[str, Quantity] | None = None) -> None:
-        """Write the mesh and quantities by facet as a legacy VTK file, which ParaView and pyvista read.
+        """Write the mesh and quantities by facet, as legacy VTK (for ParaView and pyvista) or PLY.
 
         Parameters
         ----------
         path : path
-            Ends in ``.vtk``.
+            Ends in ``.vtk`` or ``.ply``.
         fields : mapping of str to Quantity, shape (f,), optional
             Names without spaces; the unit is appended to the name. Coordinates are in m, principal frame.
         """
-        write_vtk(Path(path), self.vertices.value, self.facets, fields or {})
+        write_mesh(Path(path), self.vertices.value, self.facets, fields or {})
 
     def __repr__(self) -> str:
         return f"<Shape {len(self.facets)} facets, {brief(self.ellipsoid())} (equivalent semi-axes)>"

@@ -53,31 +53,55 @@ def read_mesh(path: Path) -> Mesh:
     raise InvalidInput("path", path, f"a mesh in one of the formats {', '.join(FORMATS)}")
 
 
-def write_vtk(path: Path, vertices: Array, facets: Integers, fields: Mapping[str, Quantity]) -> None:
-    """Write a mesh with one number a facet and field (legacy VTK 3.0, ASCII polydata).
+def write_mesh(path: Path, vertices: Array, facets: Integers, fields: Mapping[str, Quantity]) -> None:
+    """Write a mesh with one number a facet and field: legacy VTK or PLY, both as text, by the suffix.
 
     Raises
     ------
     InvalidInput
         For another suffix, a name with spaces, or a field of another length.
     """
-    if path.suffix.lower() != ".vtk":
-        raise InvalidInput("path", path, "a name that ends in .vtk")
+    writer = MESHES.get(path.suffix.lower())
+    if writer is None:
+        raise InvalidInput("path", path, f"a name that ends in {' or '.join(MESHES)}")
+    values = {}
+    for name, field in fields.items():
+        quantity = Quantity(field)
+        if len(name.split()) != 1 or quantity.shape != (len(facets),):
+            raise InvalidInput(
+                "fields", name, f"a name without spaces and {len(facets)} values, one for each facet"
+            )
+        unit = quantity.unit.to_string().replace(" ", "")
+        values[f"{name}_{unit}" if unit else name] = np.asarray(quantity.value)
+    path.write_text("\n".join(writer(vertices, facets, values)) + "\n", encoding="ascii")
+
+
+def _vtk(vertices: Array, facets: Integers, fields: Mapping[str, Array]) -> list[str]:
     lines = ["# vtk DataFile Version 3.0", "flybystab shape, m", "ASCII", "DATASET POLYDATA"]
     lines += [f"POINTS {len(vertices)} double", *(f"{x:.9g} {y:.9g} {z:.9g}" for x, y, z in vertices)]
     lines += [f"POLYGONS {len(facets)} {4 * len(facets)}", *(f"3 {a} {b} {c}" for a, b, c in facets)]
     if fields:
         lines.append(f"CELL_DATA {len(facets)}")
     for name, values in fields.items():
-        quantity = Quantity(values)
-        if len(name.split()) != 1 or quantity.shape != (len(facets),):
-            raise InvalidInput(
-                "fields", name, f"a name without spaces and {len(facets)} values, one for each facet"
-            )
-        unit = quantity.unit.to_string().replace(" ", "")
-        lines += [f"SCALARS {name}{'_' + unit if unit else ''} double 1", "LOOKUP_TABLE default"]
-        lines += [f"{x:.9g}" for x in quantity.value]
-    path.write_text("\n".join(lines) + "\n", encoding="ascii")
+        lines += [f"SCALARS {name} double 1", "LOOKUP_TABLE default", *(f"{x:.9g}" for x in values)]
+    return lines
+
+
+def _ply(vertices: Array, facets: Integers, fields: Mapping[str, Array]) -> list[str]:
+    lines = ["ply", "format ascii 1.0", "comment flybystab shape, m", f"element vertex {len(vertices)}"]
+    lines += [f"property double {x}" for x in "xyz"]
+    lines += [f"element face {len(facets)}", "property list uchar int vertex_indices"]
+    lines += [f"property double {name}" for name in fields]
+    lines += ["end_header", *(f"{x:.9g} {y:.9g} {z:.9g}" for x, y, z in vertices)]
+    columns = np.array(list(fields.values())).reshape(len(fields), len(facets)).T
+    return lines + [
+        " ".join([f"3 {a} {b} {c}", *(f"{x:.9g}" for x in row)])
+        for (a, b, c), row in zip(facets, columns, strict=True)
+    ]
+
+
+#: Formats in which a mesh is written, by suffix.
+MESHES: dict[str, Callable[[Array, Integers, Mapping[str, Array]], list[str]]] = {".vtk": _vtk, ".ply": _ply}
 
 
 def _lines(data: bytes) -> list[list[str]]:

@@ -33,7 +33,7 @@ def map_argument(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
         "--map",
         metavar="FILE",
-        help="with --shape: map of the slopes (.png, .svg, .pdf) or mesh with fields (.vtk)",
+        help="with --shape: map of the slopes (.png, .svg, .pdf) or mesh with fields (.vtk, .ply)",
     )
 
 
@@ -64,7 +64,7 @@ def check_map(options: argparse.Namespace) -> None:
 
     if options.map is not None and options.shape is None:
         raise WrongUsage("--map: expected --shape with it")
-    check_picture(options.map, (*FIGURES, ".vtk"))
+    check_picture(options.map, (*FIGURES, ".vtk", ".ply"))
 
 
 def surface_of(options: argparse.Namespace, result: Any) -> Any:
@@ -80,7 +80,7 @@ def write_map(options: argparse.Namespace, surface: Any) -> None:
     """Write the map of ``--map``."""
     if options.map is None:
         return
-    if options.map.lower().endswith(".vtk"):
+    if options.map.lower().endswith((".vtk", ".ply")):
         surface.shape.write(options.map, surface.fields())
     else:
         from flybystab.io.surface_text import REPOSE
