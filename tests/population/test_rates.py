@@ -12,6 +12,7 @@ import flybystab as fs
 from flybystab.constants import AU
 from flybystab.errors import InvalidInput, UnitMismatch, UnknownName
 from flybystab.orbit.elements import GM_SUN, state_from_elements
+from flybystab.orbit.planets import Planet
 from flybystab.population.rates import elements_of
 
 ORBIT = QTable({"a": [1.3] * u.au, "e": [0.4], "i": [10.0] * u.deg})
@@ -178,3 +179,27 @@ def test_impacts_of_kilometre_sized_asteroids(catalogue):
     table, h = catalogue
     interval = 1e-6 / fs.encounter_rates(table[h < 17.75], "earth").total.value
     assert 0.5 < interval < 1.0
+
+
+def test_collisions_in_the_main_belt_have_the_published_probability():
+    """Bottke et al. (1994): 2.86e-18/km2/yr, ``pi`` included, 5.3 km/s; here six large asteroids (a, e, i)."""
+    belt = np.array(
+        [
+            [2.767, 0.078, 10.59],  # Ceres
+            [2.644, 0.187, 11.75],  # Eunomia
+            [2.386, 0.230, 5.52],  # Iris
+            [2.922, 0.137, 3.09],  # Psyche
+            [2.768, 0.164, 5.22],  # Thisbe
+            [2.669, 0.257, 12.98],  # Juno
+        ]
+    )
+    table = QTable({"a": belt[:, 0] * u.au, "e": belt[:, 1], "i": belt[:, 2] * u.deg})
+    chance = np.zeros((6, 6))
+    for k, (a, e, i) in enumerate(belt):
+        target = Planet("asteroid", 1e-9, 1e3, 0.0, (0.0, 0.0, 1.0), 0.0, 0, a * AU)
+        rates = fs.encounter_rates(table, target, 1 * u.km, planet_orbit=(a * u.au, e, i * u.deg))
+        chance[k] = rates.rate.to_value(1 / u.yr)
+    # each of the two may be the target: two ways through the quadrature
+    assert chance == pytest.approx(chance.T, rel=0.05)
+    pairs = chance[np.triu_indices(6, 1)]
+    assert np.mean(pairs[pairs > 0.0]) == pytest.approx(2.86e-18, rel=0.5)  # a factor pi would be 3.1

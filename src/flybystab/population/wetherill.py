@@ -111,6 +111,8 @@ def rate_at_speeds(
                         + (east - p_east) ** 2
                         + (north + sign_n * p_north) ** 2
                     )
+                    if u == 0.0:  # the same orbit: no relative motion, no encounters
+                        continue
                     speeds[count] = u
                     weights[count] = 0.25 * share * density * u
                     count += 1
