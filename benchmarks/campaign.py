@@ -264,13 +264,13 @@ def stepped(
     y[12:15] = turn @ body.omega * t0
     e = encounter.tide
     tide = TidePanels(e.tau / t0, e.start, e.width, e.coefficients * t0**2)
-    summary = np.zeros(4)
     span = encounter.t_start / t0, encounter.t_stop / t0
-    if not follow_steps(*span, n, y, par.material, tide, m.brittle, summary):
+    steps = follow_steps(*span, n, y, par.material, tide, m.brittle)
+    if not steps.done:
         return None
     w = y[12:15]
     spin = np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
-    return tensor(y[:6]) * a0**2, (tensor(y[6:12]) + spin) / t0, summary[2] + summary[3] > 0.0
+    return tensor(y[:6]) * a0**2, (tensor(y[6:12]) + spin) / t0, steps.flowing + steps.free > 0
 
 
 def verdict_of(body: fs.Body, shape: np.ndarray, gradient: np.ndarray, yielded: bool) -> str:

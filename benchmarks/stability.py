@@ -26,7 +26,15 @@ from flybystab.body.stability_regions import DEPTHS, stability_many, stability_m
 from flybystab.constants import G
 from flybystab.core.energy import stability_row as columns
 from flybystab.core.energy.direction_search import BARRIER, SECOND, THIRD, level
-from flybystab.core.energy.perturbation import LONGEST, Pile, barrier, pile, powers, second_order, third_order
+from flybystab.core.energy.perturbation import (
+    LONGEST,
+    Ellipsoid,
+    barrier,
+    ellipsoid,
+    powers,
+    second_order,
+    third_order,
+)
 from flybystab.core.energy.stability_row import classify
 from flybystab.core.numerics.jit import kernel
 
@@ -87,7 +95,7 @@ def brute(b, x, enough, out):  # type: ignore[no-untyped-def]
         out[2, i] = barrier(b, x[i], LONGEST, enough)[0]
 
 
-def polished(b: Pile, starts: Array, order: int, ball: bool) -> float:
+def polished(b: Ellipsoid, starts: Array, order: int, ball: bool) -> float:
     """Least critical energy at an order that SciPy's simplex reaches from the starts."""
 
     def energy(x: Array) -> float:
@@ -130,7 +138,7 @@ def minima() -> None:
             for dilatancy in (0.0, 0.5, 1.0):
                 spin = np.array([0.0, 0.0, np.sqrt(w2)])
                 given = (*np.square(axes), spin, code, np.deg2rad(40.0), 0.0, dilatancy, 0.0)
-                b = pile(*given)
+                b = ellipsoid(*given)
                 classify(*given[:7], *given[6:], 5, row, found)
                 ours = row[[columns.ENERGY_2, columns.ENERGY_3, columns.ENERGY_B]]
                 if row[columns.LEVEL] < 1:

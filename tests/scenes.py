@@ -138,7 +138,7 @@ def stepped(
     y[12:15] = body.omega * t0
     panels = no_tide() if tide is None else tide
     scaled = TidePanels(panels.tau / t0, panels.start, panels.width, panels.coefficients * t0**2)
-    assert follow_steps(t_start / t0, t_stop / t0, n, y, par.material, scaled, m.brittle, np.zeros(4))
+    assert follow_steps(t_start / t0, t_stop / t0, n, y, par.material, scaled, m.brittle).done
     gradient = tensor(y[6:12])
     w = y[12:15]
     gradient += np.array([[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])

@@ -355,7 +355,7 @@ def test_looking_out_for_the_ground_changes_nothing():
 
 def test_frictionless_impulse_is_the_closed_form():
     """beta = 0 and no friction: L += -(tr L/tr S^-1) S^-1."""
-    from flybystab.core.dynamics.impulse import SLIDING, friction_impulse
+    from flybystab.core.dynamics.impulse import SLIDING, friction_impulse, impulse_room
     from flybystab.core.dynamics.run import parameters
     from flybystab.core.dynamics.state import empty_buffers
     from flybystab.core.ellipsoid.tide import components
@@ -378,9 +378,7 @@ def test_frictionless_impulse_is_the_closed_form():
         0.0,
         np.zeros(6),
         work,
-        np.zeros((15, 15)),
-        np.zeros(15, dtype=np.int64),
-        np.zeros(36),
+        impulse_room(),
     )
     assert did.outcome == SLIDING
     inverse = np.linalg.inv(s)

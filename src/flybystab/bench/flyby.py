@@ -117,7 +117,7 @@ def rows(figure: str | Path | None = None, repeat: int = 5) -> list[dict[str, An
         y = np.zeros(15)
         y[:3] = (body.axes / a0) ** 2
         y[12:15] = body.omega * t0
-        follow_steps(e.t_start / t0, e.t_stop / t0, n, y, par.material, tide, False, np.zeros(4))
+        follow_steps(e.t_start / t0, e.t_stop / t0, n, y, par.material, tide, False)
         return tensor(y[:6]) * a0**2
 
     for n in (2000, 8000, 32000):

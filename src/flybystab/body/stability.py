@@ -43,7 +43,14 @@ from flybystab.constants import G
 from flybystab.core.ellipsoid.potential import carlson_fd
 from flybystab.core.ellipsoid.tide import tensor
 from flybystab.core.energy import stability_row as columns
-from flybystab.core.energy.perturbation import loss_at, loss_rate, pile, powers, rate_of_strain, slope_of_flow
+from flybystab.core.energy.perturbation import (
+    ellipsoid,
+    loss_at,
+    loss_rate,
+    powers,
+    rate_of_strain,
+    slope_of_flow,
+)
 from flybystab.core.energy.potential import MASS
 from flybystab.core.energy.stability_row import classify
 from flybystab.errors import InvalidInput
@@ -255,7 +262,7 @@ def stability(body: Body, *, dilatancy: float | None = 1.0) -> Stability:
         row[columns.LEVEL] = 0
         row[columns.ENERGY_2 : columns.STRAIN_B + 1] = 0.0
     arguments = (*shape, *flow)
-    scene = pile(*arguments)
+    scene = ellipsoid(*arguments)
     energies = Orders(
         *(row[i] * units.energy * u.J for i in (columns.ENERGY_2, columns.ENERGY_3, columns.ENERGY_B))
     )
@@ -364,7 +371,7 @@ def push(body: Body, direction: Any, strain: Any, *, dilatancy: float = 1.0) -> 
         to_si(dilatancy, u.dimensionless_unscaled, "dilatancy", low=0.0, high=1.0),
         0.0 if m.bulk_modulus is None else m.bulk_modulus.to_value(u.Pa) / units.stress,
     )
-    scene = pile(*arguments)
+    scene = ellipsoid(*arguments)
     p1, p2, p3 = powers(scene, x)
     t = np.asarray(strain, dtype=float)
     second = -(t * p1 + t**2 / 2 * p2)

@@ -20,7 +20,7 @@ from flybystab.body.stability import body_units, flow_cohesion
 from flybystab.body.stability_regions import stability_many
 from flybystab.core.ellipsoid.tide import tensor
 from flybystab.core.energy.newmark import driving_stress, slide
-from flybystab.core.energy.perturbation import pile, rate_of_strain, slope_of_flow
+from flybystab.core.energy.perturbation import ellipsoid, rate_of_strain, slope_of_flow
 from flybystab.core.energy.potential import MASS
 from flybystab.core.energy.stability_row import first_to_flow
 from flybystab.encounter.encounter import Encounter
@@ -128,7 +128,7 @@ def flyby_margin(
     way = np.full((3, 3), np.nan)
     yields = bool(excess[worst] > 0.0)
     if yields:
-        scene = pile(
+        scene = ellipsoid(
             s[0], s[1], s[2], spin[0], m.surface_code, m.phi, flow_cohesion(body) / units.stress, beta, 0.0
         )
         x = np.empty(5)

@@ -8,7 +8,14 @@ import pytest
 from flybystab.core.dynamics.run import integrate
 from flybystab.core.ellipsoid.tide import no_tide
 from flybystab.core.energy.flow_work import LARGEST_VOLUME, gauss, gauss_up_to, growth_at, volume_at
-from flybystab.core.energy.perturbation import barrier, loss_at, pile, powers, rate_of_strain, slope_of_flow
+from flybystab.core.energy.perturbation import (
+    barrier,
+    ellipsoid,
+    loss_at,
+    powers,
+    rate_of_strain,
+    slope_of_flow,
+)
 from flybystab.core.energy.potential import MASS, velocity_gradient
 
 SLOW = np.bool_(True)
@@ -45,7 +52,7 @@ def test_first_power_is_that_of_the_dynamics_of_a_small_perturbation(code, dilat
     rate = np.sqrt(np.pi * 6.6743e-11 * 2000.0)
     spin = np.array([0.0, 0.0, 2 * np.pi / (6 * 3600.0) / rate])
     phi = np.deg2rad(35.0)
-    b = pile(*PILE**2, spin, code, phi, 0.0, dilatancy, 0.0)
+    b = ellipsoid(*PILE**2, spin, code, phi, 0.0, dilatancy, 0.0)
     x = components_of(direction)
     _, trace = slope_of_flow(b, x)
     d, gradient = np.empty(6), np.empty((3, 3))
@@ -102,7 +109,7 @@ def test_gauss_rule_and_its_partial_integrals():
 @pytest.mark.parametrize("code", range(4))
 @pytest.mark.parametrize(("dilatancy", "cohesion"), [(0.0, 0.02), (0.4, 0.0), (1.0, 0.02)])
 def test_powers_with_the_reaction_pressure_are_the_derivatives_along_the_path(code, dilatancy, cohesion):
-    b = pile(1.0, 0.49, 0.25, np.array([0.1, 0.2, 0.6]), code, 0.6, cohesion, dilatancy, 0.0)
+    b = ellipsoid(1.0, 0.49, 0.25, np.array([0.1, 0.2, 0.6]), code, 0.6, cohesion, dilatancy, 0.0)
     rng = np.random.default_rng(4)
     h = 0.02
     for x in rng.standard_normal((6, 5)):
@@ -115,7 +122,7 @@ def test_powers_with_the_reaction_pressure_are_the_derivatives_along_the_path(co
 
 
 def test_inertia_raises_the_energy_of_a_fast_path_and_not_of_a_slow_one():
-    b = pile(1.0, 0.64, 0.49, np.array([0.0, 0.0, 0.6]), 0, 0.5, 0.0, 0.0, 0.0)
+    b = ellipsoid(1.0, 0.64, 0.49, np.array([0.0, 0.0, 0.6]), 0, 0.5, 0.0, 0.0, 0.0)
     x = components_of(DIRECTIONS["extends a1"])
     for t, share in ((1e-3, 1e-3), (0.5, 0.5)):
         slow, whole = loss_at(b, x, t, SLOW), loss_at(b, x, t, np.bool_(False))
@@ -126,7 +133,7 @@ def test_inertia_raises_the_energy_of_a_fast_path_and_not_of_a_slow_one():
 
 def test_a_jammed_flow_loses_its_energy_at_once():
     """A flat body under the compression cone, beyond phi = 36.87 deg: the pressure has no finite value."""
-    b = pile(36.0, 36.0, 1.0, np.zeros(3), 0, np.deg2rad(45.0), 0.0, 0.0, 0.0)
+    b = ellipsoid(36.0, 36.0, 1.0, np.zeros(3), 0, np.deg2rad(45.0), 0.0, 0.0, 0.0)
     x = components_of([-0.5, -0.5, 1.0, 0, 0, 0])
     assert powers(b, x)[0] == -np.inf
     assert barrier(b, x, 3.0, np.inf) == (np.inf, np.inf)

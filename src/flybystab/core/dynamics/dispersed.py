@@ -10,7 +10,13 @@ from flybystab.core.dynamics.flow_events import axis_ratio2
 from flybystab.core.dynamics.ground import Ground, Step, contact_time
 from flybystab.core.dynamics.rates import rate
 from flybystab.core.dynamics.state import DISPERSED, FLUID, N_FULL, PRESSURE, Parameters
-from flybystab.core.dynamics.steppers import explicit_at, explicit_dense, explicit_step
+from flybystab.core.dynamics.steppers import (
+    explicit_at,
+    explicit_dense,
+    explicit_growth,
+    explicit_reduction,
+    explicit_step,
+)
 from flybystab.core.dynamics.workspace import (
     BEYOND,
     CONTACT,
@@ -29,6 +35,7 @@ from flybystab.core.dynamics.workspace import (
     record,
 )
 from flybystab.core.ellipsoid.tide import TidePanels
+from flybystab.core.numerics.dop853 import N_STAGES
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import determinant
 from flybystab.typing import Array
@@ -151,7 +158,7 @@ def follow_free(
         count_step(log)
         if not error <= 1.0:
             count_rejected(log)
-            h *= max(0.2, 0.9 * error ** (-0.125)) if np.isfinite(error) else 0.2
+            h *= explicit_reduction(error)
             if h < 1e-14 * max(1.0, abs(t)):
                 return STUCK, t
             continue
@@ -170,8 +177,8 @@ def follow_free(
             return reason, t
         t = t1 if last else t + h
         copy(ws.y1, y, N_FULL)
-        k[0] = k[12]
-        h *= min(5.0, max(0.3, 0.9 * error ** (-0.125))) if error > 0.0 else 5.0
+        k[0] = k[N_STAGES]
+        h *= explicit_growth(error)
         if tide.coefficients.shape[0] > 0:
             h = min(h, 0.4 * np.sqrt(t * t + tide.tau * tide.tau))
     record(t, regime, y, par, ws.work.s[PRESSURE] if regime == FLUID else 0.0, 0.0, 0.0, ws, log)

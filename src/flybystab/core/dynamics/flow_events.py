@@ -45,6 +45,10 @@ from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import eigensystem
 from flybystab.typing import Array
 
+# Rows of `Workspace.ends`: distance from the largest axis ratio, denominator of the pressure, strength, and distance
+# from the end of the part of the yield section.
+_RATIO, _DENOMINATOR, _STRENGTH, _PART = range(4)
+
 
 class Flow(NamedTuple):
     """Parameters of a flow, and where it ends."""
@@ -101,7 +105,12 @@ def least_event(t: float, y: Array, dy: Array, flow: Flow, ws: Workspace) -> tup
             inside = min(place, 1.0 - place)
         else:
             inside = material.fan_limit + (beyond if material.part == COMPRESSION_CORNER else -beyond)
-    ends[0, -1], ends[1, -1], ends[2, -1], ends[3, -1] = below, denominator, strength, inside
+    ends[_RATIO, -1], ends[_DENOMINATOR, -1], ends[_STRENGTH, -1], ends[_PART, -1] = (
+        below,
+        denominator,
+        strength,
+        inside,
+    )
     least, code = below, BEYOND
     if denominator < least:
         least, code = denominator, JAM
@@ -135,7 +144,7 @@ def interpolate(x: float, step: FlowStep, ws: Workspace) -> None:
 def _least_inside(x: float, step: FlowStep, flow: Flow, ws: Workspace) -> float:
     """Least event function at the fraction `x` of a step."""
     interpolate(x, step, ws)
-    least, _ = least_event(step.t + x * step.h, ws.ys, ws.spare[:15], flow, ws)
+    least, _ = least_event(step.t + x * step.h, ws.ys, ws.inner_rate, flow, ws)
     return least
 
 
@@ -224,7 +233,7 @@ def first_event(step: FlowStep, f0: Array, flow: Flow, ws: Workspace) -> tuple[f
         else:
             low = mid
     interpolate(high, step, ws)
-    _, code = least_event(t + high * h, ws.ys, ws.spare[:15], flow, ws)
+    _, code = least_event(t + high * h, ws.ys, ws.inner_rate, flow, ws)
     return high, code
 
 

@@ -66,7 +66,7 @@ _TIGHT = 1e-8
 
 
 class Method(NamedTuple):
-    """State of the choice between explicit and implicit steps.
+    """Method of the next step, and what the choice between explicit and implicit steps needs to know.
 
     Near onset and rest, where the direction of ``D`` relaxes as ``1/|D|``, the steps are implicit; in between, where
     explicit ones of order 8 can be longer without losing stability, they are explicit.
@@ -75,21 +75,35 @@ class Method(NamedTuple):
     explicit: bool
     pull: float  # rate of relaxation times |D|, from the last Jacobian
     slow: float  # |D| at which explicit steps end
-    implicit_ahead: int  # implicit steps at least before explicit ones
+    implicit_ahead: int  # least number of implicit steps before an explicit one
 
 
 @kernel
 def _choose_part(t: float, near: float, par: Parameters, tide: TidePanels, ws: Workspace) -> Parameters:
-    """Put the stress on the part of the yield section that belongs to the flow ``ws.y``.
+    """Parameters with the part of the yield section (face or corner) on which the stress of the flow ``ws.y`` lies.
 
-    That is a face if ``D``, within the Lode angle `near`, is normal to one and can stay so, or else a corner.
+    The stress lies on a face if ``D`` is normal to the face, within the Lode angle `near`, and can stay normal to it;
+    otherwise in a corner.
     """
     if not on_hexagon(par.material):
         return Parameters(on_part(par.material, SMOOTH, par.material.fan_limit), par.rigid)
     par = Parameters(on_part(par.material, FACE, par.material.fan_limit), par.rigid)
-    rate(FLOWING, t, ws.y, ws.spare[:15], par, tide, ws.work)
+    rate(FLOWING, t, ws.y, ws.inner_rate, par, tide, ws.work)
     s = ws.work.s
     return Parameters(part_of_flow(s[BEYOND_FACE], s[PLACE], near, par.material), par.rigid)
+
+
+@kernel
+def _begin_flow(
+    t: float, near: float, par: Parameters, tide: TidePanels, limits: Limits, ws: Workspace
+) -> Flow:
+    """The flow that starts in the state ``ws.y``."""
+    par = _choose_part(t, near, par, tide, ws)
+    # A step must not straddle the kink of the dilatancy: plastic flow only ever dilates, and passes it once.
+    fading = fade_start(par.material)
+    if not (par.material.beta > 0.0 and np.sqrt(determinant(ws.y[0:6])) < fading):
+        fading = np.inf
+    return Flow(par, tide, limits.axis_ratio * limits.axis_ratio, fading)
 
 
 @inlined
@@ -136,38 +150,65 @@ def _choose_method(
         explicit, ahead = False, _BETWEEN
     if not explicit:
         flow_jacobian(t, ws.y, f0, 1e-6, flow.par.material, flow.tide, ws.work, ws.jac, ws.lu)
-        pull = d * _stiffness(ws.jac, ws.spare[:15])
+        pull = d * _stiffness(ws.jac, ws.inner_rate)
         ahead -= 1
         if ahead < 0 and 1.5 * h * pull < _STABLE * d:
             explicit, slow = True, 0.5 * d
     return Method(explicit, pull, slow, ahead)
 
 
+@kernel
+def _step_length(method: Method, h: float, d: float, trend: float) -> float:
+    """Length `h` of the next step, shortened for stability and near rest, from ``|D|`` and its derivative."""
+    if method.explicit:
+        h = min(h, _STABLE * d / method.pull)
+    if trend < 0.0:
+        # |D| falls linearly to arrest, its direction relaxes as 1/|D|: approach it geometrically.
+        h = min(h, _APPROACH * d / -trend)
+    return h
+
+
 @inlined
 def _accepted_step(
     explicit: bool, t: float, t1: float, h: float, flow: Flow, limits: Limits, ws: Workspace, log: Log
-) -> tuple[float, float, float]:
+) -> tuple[FlowStep, float, float]:
     """Make a step of at most `h` towards `t1`, shortened until its error is allowed.
 
-    Returns its error (nan where none could be made), its length, and the largest growth of the next one.
+    Returns the step, its error (nan where none could be made), and the largest growth of the next one.
     """
     growth = 6.0
     while True:
         if exhausted(log, limits):
-            return np.nan, h, growth
+            return FlowStep(explicit, t, h), np.nan, growth
         if h >= t1 - t:
             h = t1 - t
         error = _step(explicit, t, h, flow, ws)
         count_step(log)
         if error <= 1.0:
-            return error, h, growth
+            if explicit:
+                explicit_dense(FLOWING, t, N_FULL, h, flow.par, flow.tide, ws)
+            return FlowStep(explicit, t, h), error, growth
         count_rejected(log)
-        # Near onset the error falls slower than the order says: a second refusal halves the step at least.
+        # Near onset the error falls slower than the order says: a second rejection at least halves the step.
         most = 0.9 if growth > 1.0 else 0.5
         growth = 1.0
-        h *= min(most, max(0.1, 0.9 * error ** (-0.125 if explicit else -0.2))) if np.isfinite(error) else 0.1
+        h *= min(most, max(0.1, 0.9 * error ** _exponent(explicit))) if np.isfinite(error) else 0.1
         if h < 1e-15 * max(1.0, abs(t)):
-            return np.nan, h, growth
+            return FlowStep(explicit, t, h), np.nan, growth
+
+
+@kernel
+def _exponent(explicit: bool) -> float:
+    """Power of the error to which the length of a step is proportional: minus one over the order."""
+    return -0.125 if explicit else -0.2
+
+
+@kernel
+def _next_length(step: FlowStep, error: float, growth: float) -> float:
+    """Length of the step that follows an accepted one, from its error; it grows by `growth` at most."""
+    if error > 0.0:
+        return step.h * min(growth, max(0.2, 0.9 * error ** _exponent(step.explicit)))
+    return step.h * growth
 
 
 @kernel
@@ -191,6 +232,16 @@ def _strain_rate(y: Array, f0: Array, unit: Array) -> tuple[float, float]:
 
 
 @kernel
+def _near_rest(d: float, trend: float, fastest: float, tolerance: float) -> bool:
+    """Whether the time to rest is below the tolerance.
+
+    The direction of so small a ``D`` is noise, and on a sharp corner of the yield section, which turns the stress with
+    it, ``D`` would never come to rest.
+    """
+    return d < 1e-2 * fastest and d < _BRIEF * max(tolerance, _TIGHT) * -trend
+
+
+@kernel
 def _step_to_event(
     step: FlowStep, end: float, goes_on: bool, flow: Flow, ws: Workspace, log: Log
 ) -> FlowStep:
@@ -201,9 +252,34 @@ def _step_to_event(
     if goes_on and keeps_history(log):
         if explicit:
             explicit_dense(FLOWING, t, N_FULL, h, flow.par, flow.tide, ws)
-        record_inside(step, ws.spare[:15], flow, ws, log)
+        record_inside(step, ws.inner_rate, flow, ws, log)
     copy(ws.y1, ws.y, N_FULL)
     return step
+
+
+@kernel
+def _after_event(reason: int, t: float, near: float, flow: Flow, ws: Workspace) -> Flow:
+    """The flow that goes on after SWITCH, on another part of the yield section, or FADE, with less dilatancy."""
+    if reason == FADE:
+        return Flow(flow.par, flow.tide, flow.limit2, np.inf)
+    return Flow(_choose_part(t, near, flow.par, flow.tide, ws), flow.tide, flow.limit2, flow.fade_volume)
+
+
+@kernel
+def _end_step(step: FlowStep, t1: float, flow: Flow, ws: Workspace, log: Log) -> float:
+    """Record a step without an event, go on to its end at `t1` and restore the flow rule there; returns ``|D'|``."""
+    y, f0 = ws.y, ws.start_rate
+    if keeps_history(log):
+        record_inside(step, ws.inner_rate, flow, ws, log)
+        least_event(step.t + step.h, ws.y1, f0, flow, ws)
+    copy(ws.y1, y, N_FULL)
+    volume = np.sqrt(determinant(y[0:6]))
+    beyond = ws.work.s[BEYOND_FACE]
+    d_error = ws.scale[6]
+    if restore_flow_rule(y[6:12], volume, beyond, flow.par.material, d_error, ws.stress, ws.work.m[W_N]):
+        least_event(t1, y, f0, flow, ws)
+    _, d, _ = deviator(y[6:12], ws.stress)
+    return d
 
 
 @kernel
@@ -218,19 +294,13 @@ def follow_flow(
     log: Log,
 ) -> tuple[int, float]:
     """Plastic flow of ``ws.y`` up to one of its ends or `t1`; returns (reason, time)."""
-    y, tol = ws.y, limits.tolerance
-    f0 = ws.spare[15:30]
+    y, f0, tol = ws.y, ws.start_rate, limits.tolerance
+    near = 1e-6 + 10.0 * tol  # the direction of D is known no better
     h = 1e-4
     method = Method(False, 0.0, 0.0, 0)
     touched = False
-    near = 1e-6 + 10.0 * tol  # the direction of D is known no better
     fastest = 0.0
-    par = _choose_part(t, near, par, tide, ws)
-    # A step must not straddle the kink of the dilatancy: plastic flow only ever dilates, and passes it once.
-    fading = fade_start(par.material)
-    if not (par.material.beta > 0.0 and np.sqrt(determinant(y[0:6])) < fading):
-        fading = np.inf
-    flow = Flow(par, tide, limits.axis_ratio * limits.axis_ratio, fading)
+    flow = _begin_flow(t, near, par, tide, limits, ws)
     least, reason = least_event(t, y, f0, flow, ws)
     if least < 0.0:
         return reason, t
@@ -240,27 +310,20 @@ def follow_flow(
         record_flow(t, y, flow.par, ws, log)
         d, trend = _strain_rate(y, f0, ws.stress)
         fastest = max(fastest, d)
-        if d < 1e-2 * fastest and d < _BRIEF * max(tol, _TIGHT) * -trend:
-            # The time to rest is below the tolerance: the direction of so small a D is noise, and on a sharp corner
-            # of the yield section, which turns the stress with it, D would never come to rest.
+        if _near_rest(d, trend, fastest, tol):
             for i in range(N_FULL):
                 y[i] += d / -trend * f0[i]
             return ARREST, t + d / -trend
         method = _choose_method(method, t, h, d, f0, flow, ws)
         if method.explicit:
             copy(f0, ws.k[0], N_FULL)
-            h = min(h, _STABLE * d / method.pull)
-        if trend < 0.0:
-            # |D| falls linearly to arrest, its direction relaxes as 1/|D|: approach it geometrically.
-            h = min(h, _APPROACH * d / -trend)
         _set_scale(d, tol, ws.scale)
-        error, h, growth = _accepted_step(method.explicit, t, t1, h, flow, limits, ws, log)
+        h = _step_length(method, h, d, trend)
+        step, error, growth = _accepted_step(method.explicit, t, t1, h, flow, limits, ws, log)
         if not error <= 1.0:
             return STUCK, t
+        h = step.h
         last = h >= t1 - t
-        step = FlowStep(method.explicit, t, h)
-        if step.explicit:
-            explicit_dense(FLOWING, t, N_FULL, h, flow.par, tide, ws)
         if not touched:
             end_time = contact_time(Step(FLOWING, step.explicit, t, h, par.rigid), ground, ws)
             if end_time < np.inf:  # repeat the step up to the contact
@@ -273,41 +336,25 @@ def follow_flow(
         if end <= 1.0:
             goes_on = reason in (SWITCH, FADE)
             step = _step_to_event(step, end, goes_on, flow, ws, log)
-            h = step.h
-            t += h
+            t += step.h
             if not goes_on:
                 record_end(t, y, f0, flow, ws, log)
                 return reason, t
+            flow = _after_event(reason, t, near, flow, ws)
             if reason == FADE:
-                flow = Flow(flow.par, tide, flow.limit2, np.inf)
-                h /= end
+                h = step.h / end
             else:
-                flow = Flow(_choose_part(t, near, flow.par, tide, ws), tide, flow.limit2, flow.fade_volume)
-                h = max(h, 1e-4)
+                h = max(step.h, 1e-4)
                 method = Method(False, method.pull, method.slow, _BETWEEN)
             least, reason = least_event(t, y, f0, flow, ws)
             if least < 0.0:
                 return reason, t
             sample(-1, 0, ws)
             continue
-        if keeps_history(log):
-            record_inside(step, ws.spare[:15], flow, ws, log)
-            least_event(t + h, ws.y1, f0, flow, ws)
         t = t1 if last else t + h
-        copy(ws.y1, y, N_FULL)
-        material = flow.par.material
-        volume = np.sqrt(determinant(y[0:6]))
-        beyond = ws.work.s[BEYOND_FACE]
-        if restore_flow_rule(y[6:12], volume, beyond, material, ws.scale[6], ws.stress, ws.work.m[W_N]):
-            least_event(t, y, f0, flow, ws)
-        _, d, _ = deviator(y[6:12], ws.stress)
-        if d < D_REST:
+        if _end_step(step, t, flow, ws, log) < D_REST:
             record_end(t, y, f0, flow, ws, log)
             return ARREST, t
-        h *= (
-            min(growth, max(0.2, 0.9 * error ** (-0.125 if step.explicit else -0.2)))
-            if error > 0.0
-            else growth
-        )
+        h = _next_length(step, error, growth)
     record_end(t, y, f0, flow, ws, log)
     return TOUCH if touched else DONE, t

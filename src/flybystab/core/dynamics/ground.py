@@ -102,8 +102,8 @@ class Step(NamedTuple):
 
 
 @kernel
-def _gap(when: float, step: Step, ground: Ground, ws: Workspace) -> float:
-    """Height of the body's lowest point above the ground at the time `when` of a step, m."""
+def _gap(when: float, step: Step, ground: Ground, ws: Workspace, n: Array) -> float:
+    """Height of the body's lowest point above the ground at the time `when` of a step, m; `n` is scratch (3,)."""
     x = (when - step.t) / step.h
     if step.regime == RIGID:
         explicit_at(x, ws.y, N_RIGID, ws.dense, ws.ys)
@@ -111,7 +111,6 @@ def _gap(when: float, step: Step, ground: Ground, ws: Workspace) -> float:
         explicit_at(x, ws.y, N_FULL, ws.dense, ws.ys)
     else:
         implicit_at(x, ws.y, N_FULL, ws.dense, ws.y1, ws.ys)
-    n = ws.spare[42:45]
     height = _direction(when, ground, n)
     return height - ground.unit * _reach(step.regime, ws.ys, step.rigid, n, ws.work.m[W_SCRATCH])
 
@@ -135,7 +134,7 @@ def _crossing(low: float, high: float, size: float, ground: Ground, n: Array) ->
 def contact_time(step: Step, ground: Ground, ws: Workspace) -> float:
     """Time at which the body first touches the ground in a step; infinite if it does not.
 
-    Uses ``ws.ys`` and the end of ``ws.spare``.
+    Overwrites ``ws.ys``.
     """
     if ground.coefficients.shape[0] == 0:
         return np.inf
@@ -154,7 +153,7 @@ def contact_time(step: Step, ground: Ground, ws: Workspace) -> float:
     size = ground.unit * np.sqrt(size)
     if size < ground.least:
         return np.inf
-    n = ws.spare[42:45]
+    n = np.empty(3)
     end = t + step.h
     lowest = min(max(0.0, t), end)
     if _direction(lowest, ground, n) >= size:
@@ -165,30 +164,30 @@ def contact_time(step: Step, ground: Ground, ws: Workspace) -> float:
     if _direction(end, ground, n) >= size:
         b = _crossing(lowest, end, size, ground, n)
     count = min(_MOST, _LEAST + int(_DENSE * turn * (b - a)))
-    before = f = _gap(a, step, ground, ws)
+    before = f = _gap(a, step, ground, ws, n)
     if f <= 0.0:
         return a
     spacing = (b - a) / count
     for j in range(1, count + 1):
         at = a + j * spacing if j < count else b
-        after = _gap(at, step, ground, ws)
+        after = _gap(at, step, ground, ws, n)
         if after <= 0.0:
-            return _root(at - spacing, at, step, ground, ws)
+            return _root(at - spacing, at, step, ground, ws, n)
         # a dip between the samples, at the ends of the part also beside one
         if (f <= before and f <= after) or (j == count and after < f):
-            low, value = _dip(max(a, at - 2.0 * spacing), at, step, ground, ws)
+            low, value = _dip(max(a, at - 2.0 * spacing), at, step, ground, ws, n)
             if value <= 0.0:
-                return _root(max(a, at - 2.0 * spacing), low, step, ground, ws)
+                return _root(max(a, at - 2.0 * spacing), low, step, ground, ws, n)
         before, f = f, after
     return np.inf
 
 
 @kernel
-def _root(low: float, high: float, step: Step, ground: Ground, ws: Workspace) -> float:
+def _root(low: float, high: float, step: Step, ground: Ground, ws: Workspace, n: Array) -> float:
     """The time between `low`, where the body is clear of the ground, and `high` at which it has just reached it."""
     for _ in range(60):
         mid = 0.5 * (low + high)
-        if _gap(mid, step, ground, ws) <= 0.0:
+        if _gap(mid, step, ground, ws, n) <= 0.0:
             high = mid
         else:
             low = mid
@@ -198,21 +197,21 @@ def _root(low: float, high: float, step: Step, ground: Ground, ws: Workspace) ->
 
 
 @kernel
-def _dip(a: float, b: float, step: Step, ground: Ground, ws: Workspace) -> tuple[float, float]:
+def _dip(a: float, b: float, step: Step, ground: Ground, ws: Workspace, n: Array) -> tuple[float, float]:
     """Golden-section minimum of the gap between the times `a` and `b`: when, and how large."""
     x1 = b - _GOLDEN * (b - a)
     x2 = a + _GOLDEN * (b - a)
-    f1 = _gap(x1, step, ground, ws)
-    f2 = _gap(x2, step, ground, ws)
+    f1 = _gap(x1, step, ground, ws, n)
+    f2 = _gap(x2, step, ground, ws, n)
     for _ in range(30):
         if f1 > f2:
             a = x1
             x1, f1 = x2, f2
             x2 = a + _GOLDEN * (b - a)
-            f2 = _gap(x2, step, ground, ws)
+            f2 = _gap(x2, step, ground, ws, n)
         else:
             b = x2
             x2, f2 = x1, f1
             x1 = b - _GOLDEN * (b - a)
-            f1 = _gap(x1, step, ground, ws)
+            f1 = _gap(x1, step, ground, ws, n)
     return (x1, f1) if f1 < f2 else (x2, f2)

@@ -18,6 +18,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.core.dynamics.state import (
+    OTHER,
+    TIDE,
+    UNIT,
     W_A,
     W_B,
     W_L,
@@ -70,6 +73,38 @@ class Contact(NamedTuple):
     part: int
 
 
+class ImpulseRoom(NamedTuple):
+    """Scratch of `friction_impulse`: Newton's method for the unknowns of a sliding impulse (`_residual`)."""
+
+    x: Array  # unknowns: deviator of D (6), Phat, place of the stress on a face
+    kept: Array  # the last solution of the continuation in the friction
+    step: Array
+    residual: Array
+    moved: Array  # residual at a displaced point
+    jac: Array
+    pivots: NDArray[np.int64]
+    spin: Array  # after an impulse to rest
+
+
+# Unknowns and equations 6 and 7 of a sliding impulse; 0 to 5 are the deviator of ``D`` and its balance.
+_PRESSURE, _PLACE = 6, 7
+
+
+@kernel
+def impulse_room() -> ImpulseRoom:
+    """Fresh scratch."""
+    return ImpulseRoom(
+        np.zeros(8),
+        np.zeros(8),
+        np.zeros(8),
+        np.zeros(8),
+        np.zeros(8),
+        np.zeros((8, 8)),
+        np.zeros(8, dtype=np.int64),
+        np.zeros(3),
+    )
+
+
 class ImpulseProblem(NamedTuple):
     """Equations of a sliding impulse (`_residual`): ``D`` before it, coefficients and scratch."""
 
@@ -78,8 +113,7 @@ class ImpulseProblem(NamedTuple):
     cos_c: float
     scale: float  # of the rates of strain
     work: Buffers
-    jac: Array
-    pivots: NDArray[np.int64]
+    room: ImpulseRoom
 
 
 @kernel
@@ -89,7 +123,7 @@ def rest_spin(y: Array, s: Array, big_l: Array, work: Buffers, w: Array) -> None
     multiply(big_l, s, a)
     h0, h1, h2 = a[2, 1] - a[1, 2], a[0, 2] - a[2, 0], a[1, 0] - a[0, 1]
     # J = tr S 1 - S
-    c = work.c[2]
+    c = work.c[UNIT]
     c[0], c[1], c[2] = y[1] + y[2], y[0] + y[2], y[0] + y[1]
     c[3], c[4], c[5] = -y[3], -y[4], -y[5]
     inverse(c, a)
@@ -107,18 +141,18 @@ def _residual(x: Array, material: MaterialParameters, problem: ImpulseProblem, f
     """
     work, d_star = problem.work, problem.d_star
     n, b, sinv = work.m[W_N], work.m[W_B], work.m[W_SINV]
-    unit = work.c[2]
+    unit = work.c[UNIT]
     norm, _, support, _ = flow_stress(x[0:6], material, unit, n)
     if material.part == FACE:
         det = determinant(unit)
-        f[7] = norm * beyond_face(material.sin_phi, det)
+        f[_PLACE] = norm * beyond_face(material.sin_phi, det)
         p1, p2, _, _, _ = corner(material.sin_phi, det, False)
         isotropic(p1, p2, unit, b)
         for i in range(3):
             for j in range(3):
-                n[i, j] += x[7] * (b[i, j] - n[i, j])
+                n[i, j] += x[_PLACE] * (b[i, j] - n[i, j])
     multiply(n, sinv, b)
-    p = x[6]
+    p = x[_PRESSURE]
     strength = material.sin_phi * p + problem.cos_c
     mean = dilation(problem.beta, norm, support, material) / 3.0
     f[0] = x[0] + mean - d_star[0] - p * sinv[0, 0] + strength * b[0, 0]
@@ -127,7 +161,7 @@ def _residual(x: Array, material: MaterialParameters, problem: ImpulseProblem, f
     f[3] = x[3] - d_star[3] - p * sinv[0, 1] + 0.5 * strength * (b[0, 1] + b[1, 0])
     f[4] = x[4] - d_star[4] - p * sinv[0, 2] + 0.5 * strength * (b[0, 2] + b[2, 0])
     f[5] = x[5] - d_star[5] - p * sinv[1, 2] + 0.5 * strength * (b[1, 2] + b[2, 1])
-    f[6] = x[0] + x[1] + x[2]
+    f[_PRESSURE] = x[0] + x[1] + x[2]
     return strength
 
 
@@ -138,9 +172,7 @@ def friction_impulse(
     duration: float,
     offset: Array,
     work: Buffers,
-    jac: Array,
-    pivots: NDArray[np.int64],
-    x: Array,
+    room: ImpulseRoom,
 ) -> Contact:
     """Apply the impulse to the state ``y[15]``.
 
@@ -150,9 +182,10 @@ def friction_impulse(
         Time over which cohesion acts; 0 for an instant.
     offset : ndarray (6,)
         Rate of strain that counts as rest; the friction law holds for ``D`` less this.
-    jac, pivots, x : ndarray
-        Scratch: (15, 15), int (15,), (36,).
+    work, room : Buffers, ImpulseRoom
+        Scratch.
     """
+    x = room.x
     s, sinv, before = work.m[W_S], work.m[W_SINV], work.m[W_L]
     unpack(y[0:6], s)
     volume = np.sqrt(inverse(y[0:6], sinv))
@@ -164,36 +197,36 @@ def friction_impulse(
     beta, _ = dilatancy(volume, material)
     cos_c = material.cos_phi * material.cohesion * volume * duration
     # Rest needs the impulse That = (L - W) S; inside the yield surface it holds the body.
-    that = work.c[0]
-    w = x[8:11]
+    that = work.c[TIDE]
+    w = room.spin
     _impulse_to_rest(y, s, before, work, w, that)
-    p, norm, det = deviator(that, work.c[2])
+    p, norm, det = deviator(that, work.c[UNIT])
     g = slope_over_sine(material.surface, material.sin_phi, det)
     if norm <= g * (p * material.sin_phi + cos_c):
         for i in range(6):
             y[6 + i] = offset[i]
         y[12], y[13], y[14] = w[0], w[1], w[2]
         return Contact(REST, material.part)
-    d_star = work.c[1]
+    d_star = work.c[OTHER]
     for i in range(6):
         d_star[i] = y[6 + i] - offset[i]
     trace_sinv = sinv[0, 0] + sinv[1, 1] + sinv[2, 2]
-    mean, start, _ = deviator(d_star, work.c[2])
+    mean, start, _ = deviator(d_star, work.c[UNIT])
     scale = start + abs(mean) + abs(p) * trace_sinv
     excess = (norm - g * (p * material.sin_phi + cos_c)) * trace_sinv / 3.0
-    problem = ImpulseProblem(d_star, beta, cos_c, scale, work, jac, pivots)
-    found, part = _sliding_impulse(x, that, RestImpulse(p, norm, det, excess), mean, start, material, problem)
+    problem = ImpulseProblem(d_star, beta, cos_c, scale, work, room)
+    found, part = _sliding_impulse(that, RestImpulse(p, norm, det, excess), mean, start, material, problem)
     material = on_part(material, part, material.fan_limit)
     if not found:
         return Contact(FAILED, part)
-    strength = _residual(x, material, problem, x[19:27])
-    if strength < 0.0 or (material.sin_phi == 0.0 and material.cohesion == 0.0 and x[6] < 0.0):
+    strength = _residual(x, material, problem, room.residual)
+    if strength < 0.0 or (material.sin_phi == 0.0 and material.cohesion == 0.0 and x[_PRESSURE] < 0.0):
         return Contact(FREE, part)
     # Delta L = Phat S^-1 - (Phat sin + chat cos) N S^-1; b = N S^-1 is left by the residual.
     b = work.m[W_B]
     for i in range(3):
         for j in range(3):
-            before[i, j] += x[6] * sinv[i, j] - strength * b[i, j]
+            before[i, j] += x[_PRESSURE] * sinv[i, j] - strength * b[i, j]
     set_gradient(before, y)
     for i in range(6):
         y[6 + i] += offset[i]
@@ -221,7 +254,6 @@ def _impulse_to_rest(y: Array, s: Array, before: Array, work: Buffers, w: Array,
 
 @kernel
 def _sliding_impulse(
-    x: Array,
     that: Array,
     rest: RestImpulse,
     mean: float,
@@ -229,12 +261,12 @@ def _sliding_impulse(
     material: MaterialParameters,
     problem: ImpulseProblem,
 ) -> tuple[bool, int]:
-    """Solve the equations of sliding for ``x[:8]``; whether a solution was found, and its part of the section.
+    """Solve the equations of sliding for ``room.x``; whether a solution was found, and its part of the section.
 
     Near rest the strain starts along the deviator of the impulse that rest would need, in proportion to its excess;
     far from it the motion before the impulse, of ``-tr/3`` `mean` and ``|D'|`` `start`, is the better guess.
     """
-    work, d_star = problem.work, problem.d_star
+    work, d_star, x = problem.work, problem.d_star, problem.room.x
     sinv = work.m[W_SINV]
     trace_sinv = sinv[0, 0] + sinv[1, 1] + sinv[2, 2]
     hexagon = on_hexagon(material)
@@ -251,11 +283,11 @@ def _sliding_impulse(
             elif start > 0.0:
                 for i in range(6):
                     x[i] = d_star[i] + (mean if i < 3 else 0.0)
-                x[6] = max(0.0, 3.0 * mean / trace_sinv)
-                x[7] = 0.5
+                x[_PRESSURE] = max(0.0, 3.0 * mean / trace_sinv)
+                x[_PLACE] = 0.5
             else:
                 continue
-            found = _newton(x, m, problem) if guess < 2 else _by_weaker_friction(x, m, problem)
+            found = _newton(m, problem) if guess < 2 else _by_weaker_friction(m, problem)
             if found and (not hexagon or _belongs(x, m, work)):
                 return True, part
     return False, part
@@ -265,8 +297,8 @@ def _sliding_impulse(
 def _along_rest(
     that: Array, rest: RestImpulse, material: MaterialParameters, x: Array, work: Buffers
 ) -> None:
-    """First guess ``x[:8]``: strain along the impulse that rest would need, in proportion to its excess."""
-    unit, n = work.c[2], work.m[W_N]
+    """First guess ``x[8]``: strain along the impulse that rest would need, in proportion to its excess."""
+    unit, n = work.c[UNIT], work.m[W_N]
     for i in range(6):
         unit[i] = (that[i] + (rest.p if i < 3 else 0.0)) / rest.norm
     a, b = 1.0, 0.0
@@ -276,19 +308,19 @@ def _along_rest(
     pack(n, x[0:6])
     for i in range(6):
         x[i] *= rest.excess
-    x[6] = rest.p
-    x[7] = 0.5
+    x[_PRESSURE] = rest.p
+    x[_PLACE] = 0.5
 
 
 @kernel
-def _by_weaker_friction(x: Array, material: MaterialParameters, problem: ImpulseProblem) -> bool:
+def _by_weaker_friction(material: MaterialParameters, problem: ImpulseProblem) -> bool:
     """`_newton` by continuation in the friction: at less of it the section is rounder and a solution is found."""
-    kept = problem.jac[14]
+    x, kept = problem.room.x, problem.room.kept
     copy(x, kept, 8)
     share, more = 0.0, 0.5
     for _ in range(80):
         ahead = min(1.0, share + more)
-        if _newton(x, with_friction(material, material.sin_phi * ahead), problem):
+        if _newton(with_friction(material, material.sin_phi * ahead), problem):
             share = ahead
             copy(x, kept, 8)
             more *= 2.0
@@ -305,25 +337,31 @@ def _belongs(x: Array, material: MaterialParameters, work: Buffers) -> bool:
     """Whether a solution lies where its part of the hexagon says: on the face, or in the fan of the corner."""
     part = material.part
     if part == FACE:
-        return -1e-9 <= x[7] <= 1.0 + 1e-9
-    _, _, det = deviator(x[0:6], work.c[2])
+        return -1e-9 <= x[_PLACE] <= 1.0 + 1e-9
+    _, _, det = deviator(x[0:6], work.c[UNIT])
     past = beyond_face(material.sin_phi, det)
     return past >= -1e-9 if part == COMPRESSION_CORNER else past <= 1e-9
 
 
 @kernel
-def _newton(x: Array, material: MaterialParameters, problem: ImpulseProblem) -> bool:
-    """Solve `_residual` for ``x[:7]`` (``x[:8]`` on a face) from the guess in it; scratch in ``x[11:]``."""
-    trial, f, moved = x[11:19], x[19:27], x[27:35]
-    jac, pivots, scale = problem.jac, problem.pivots, problem.scale
+def _newton(material: MaterialParameters, problem: ImpulseProblem) -> bool:
+    """Solve `_residual` for ``room.x`` from the guess in it; the place of the stress counts on a face only."""
+    room, scale = problem.room, problem.scale
+    x, trial, f, moved, jac, pivots = room.x, room.step, room.residual, room.moved, room.jac, room.pivots
     m = 8 if material.part == FACE else 7
     for turn in range(60):
         _residual(x, material, problem, f)
-        _, size, _ = deviator(x[0:6], problem.work.c[2])
+        _, size, _ = deviator(x[0:6], problem.work.c[UNIT])
         if not size > 1e-300:
             return False
         for j in range(m):
-            delta = 1e-7 * size if j < 6 else 1e-7 * max(abs(x[6]), 1e-6 * scale) if j == 6 else 1e-7
+            delta = (
+                1e-7 * size
+                if j < 6
+                else 1e-7 * max(abs(x[_PRESSURE]), 1e-6 * scale)
+                if j == _PRESSURE
+                else 1e-7
+            )
             saved = x[j]
             x[j] = saved + delta
             delta = x[j] - saved

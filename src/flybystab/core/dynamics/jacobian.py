@@ -30,8 +30,11 @@ from flybystab.core.dynamics.state import (
     J_STRESS,
     J_TURN,
     J_UNIT,
+    OTHER,
     PLACE,
     PRESSURE,
+    TIDE,
+    UNIT,
     VOLUME,
     W_A,
     W_B,
@@ -127,7 +130,7 @@ def _stress(y: Array, f0: Array, material: MaterialParameters, work: Buffers) ->
     u, x = work.m[J_UNIT], work.m[J_FACE]
     volume = work.s[VOLUME]
     gradient(f0, rate)
-    unit = work.c[2]
+    unit = work.c[UNIT]
     _, norm, det = deviator(y[6:12], unit)
     unpack(unit, u)
     isotropic(0.0, 1.0, unit, work.m[J_SQUARE])
@@ -316,7 +319,7 @@ def flow_jacobian(
     _shape_columns(y, stress, system, work, jac, scratch[0:6])
     _gradient_columns(stress, material, system, work, jac, scratch[6])
     # t: M is the change of the tide
-    before, after = work.c[0], work.c[1]
+    before, after = work.c[TIDE], work.c[OTHER]
     tide_at(tide.tau, tide.start, tide.width, tide.coefficients, t + dt, after)
     for i in range(6):
         after[i] = (after[i] - before[i]) / dt

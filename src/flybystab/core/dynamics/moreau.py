@@ -1,9 +1,9 @@
 """A second integrator, without event location: time stepping with a set-valued friction law (after Moreau 1999).
 
 Each step drifts for half its length (free motion, in closed form: ``x -> (1 + t L) x``), kicks, and drifts
-again. The kick adds ``h K`` and then the impulse of :mod:`flybystab.core.dynamics.impulse`, which finds out by itself
-whether the body is rigid, flows or has no contact: rest, yield, arrest and contact need no root-finding and
-no switch. Angular momentum about the centre is kept to rounding, tides apart. The shape of a rigid body is
+again. The kick adds ``h K`` and then the impulse of :mod:`flybystab.core.dynamics.impulse`, whose equations decide
+whether the body is rigid, flows or has no contact: rest, yield, arrest and contact need neither root-finding nor
+event logic. Angular momentum about the centre is kept to rounding, tides apart. The shape of a rigid body is
 kept to second order in the step; plastic flow is first order: runs with halved steps measure the error.
 
 It shares the self-gravity, the tide and the yield surfaces with :mod:`flybystab.core.dynamics.regimes`, nothing else.
@@ -11,9 +11,19 @@ It shares the self-gravity, the tide and the yield surfaces with :mod:`flybystab
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
-from flybystab.core.dynamics.impulse import FAILED, FREE, REST, SLIDING, friction_impulse
+from flybystab.core.dynamics.impulse import (
+    FAILED,
+    FREE,
+    REST,
+    SLIDING,
+    ImpulseRoom,
+    friction_impulse,
+    impulse_room,
+)
 from flybystab.core.dynamics.rates import gravity_terms
 from flybystab.core.dynamics.state import (
     N_FULL,
@@ -82,100 +92,148 @@ def _dilation(y: Array, offset: Array, beta: float, material: MaterialParameters
     return dilation(beta, norm, support, material)
 
 
+class Steps(NamedTuple):
+    """Summary of a run.
+
+    Attributes
+    ----------
+    done : bool
+        Whether `t1` was reached; False if an impulse could not be found or a drift turned the body inside out.
+    first, last : float
+        Start of the first and end of the last step that flowed; -1 if none did.
+    flowing, free : int
+        Number of steps that flowed, and of those without contact.
+    """
+
+    done: bool
+    first: float
+    last: float
+    flowing: int
+    free: int
+
+
+class _Grains(NamedTuple):
+    """What a step leaves of the contacts between the grains."""
+
+    material: MaterialParameters
+    volume: float  # V/V0 at which the grains touch
+    touching: bool
+    outcome: int  # of the last impulse
+
+
+class _Scratch(NamedTuple):
+    """Buffers of a run."""
+
+    work: Buffers
+    room: ImpulseRoom
+    offset: Array
+    deviator: Array
+    kicked: Array  # state before the impulse
+    last: Array  # velocity gradient after the last impulse
+
+
+@kernel
+def _scratch() -> _Scratch:
+    """Fresh buffers."""
+    return _Scratch(
+        empty_buffers(), impulse_room(), np.zeros(6), np.zeros(6), np.zeros(N_FULL), np.zeros((3, 3))
+    )
+
+
+@kernel
+def _kick(t: float, h: float, y: Array, tide: TidePanels, work: Buffers) -> None:
+    """Add to ``L`` what gravity and tide give in the time `h`."""
+    gravity_terms(t, y, tide, work)
+    big_l = work.m[W_L]
+    gradient(y, big_l)
+    for i in range(3):
+        for j in range(3):
+            big_l[i, j] += h * work.m[W_K, i, j]
+    set_gradient(big_l, y)
+
+
+@kernel
+def _impulse(y: Array, h: float, grains: _Grains, scratch: _Scratch) -> _Grains:
+    """Apply the impulse of friction to the state ``y[15]`` after a kick.
+
+    The drift to the next kick is ``1 + h L``, of mean gradient ``L - h L^2/2``: that is what must obey the law of
+    friction. ``L^2`` of the last step is close enough, except where the grains meet: there it is that of the impulse
+    itself, found by iteration. The remaining error of the volume is removed, again except where the grains meet: there
+    the removal of their overlap would throw them apart.
+    """
+    material, contact, touching, outcome = grains
+    work, _, offset, less, kicked, last = scratch
+    volume = np.sqrt(determinant(y[0:6]))
+    beta, _ = dilatancy(contact, material)
+    gap = 0.0
+    for turn in range(1 if touching else 4):
+        multiply(last, last, work.m[W_A])
+        pack(work.m[W_A], offset)
+        for i in range(6):
+            offset[i] *= 0.5 * h
+        if turn == 0:
+            copy(y, kicked, N_FULL)
+            gap = np.log(contact / volume) / h
+        else:
+            copy(kicked, y, N_FULL)
+        for i in range(3):
+            offset[i] += gap / 3.0
+        # Only grains that cohere bear a tension: the impulse decides whether it exceeds the strength.
+        free = not (touching and material.cohesion > 0.0)
+        opening = y[6] + y[7] + y[8] - offset[0] - offset[1] - offset[2]
+        if free and opening >= _dilation(y, offset, beta, material, less):
+            outcome = FREE
+            break
+        if not touching and turn == 0:
+            contact = volume
+            beta, _ = dilatancy(contact, material)
+            gap = 0.0
+            for i in range(3):
+                offset[i] = 0.0
+        impulse = friction_impulse(y, material, h, offset, work, scratch.room)
+        outcome = impulse.outcome
+        material = on_part(material, impulse.part, material.fan_limit)
+        if outcome == FAILED:
+            break
+        gradient(y, last)
+    gradient(y, last)
+    if outcome == SLIDING:
+        contact *= np.exp(h * _dilation(y, offset, beta, material, less))
+    return _Grains(material, contact, outcome != FREE, outcome)
+
+
 @kernel
 def follow_steps(
-    t0: float,
-    t1: float,
-    n: int,
-    y: Array,
-    material: MaterialParameters,
-    tide: TidePanels,
-    brittle: bool,
-    summary: Array,
-) -> bool:
-    """Carry the state ``y[15]`` from `t0` to `t1` in `n` equal steps; False if an impulse could not be found.
-
-    ``summary[4]`` gets the start of the first and the end of the last step that flowed (-1 if none), the
-    number of steps that flowed, and the number without contact.
-    """
-    work = empty_buffers()
-    jac = np.zeros((15, 15))
-    pivots = np.zeros(15, dtype=np.int64)
-    spare = np.zeros(36)
-    offset = np.zeros(6)
-    less = np.zeros(6)
-    kicked = np.zeros(N_FULL)
-    gap = 0.0
-    last = np.zeros((3, 3))
-    gradient(y, last)
+    t0: float, t1: float, n: int, y: Array, material: MaterialParameters, tide: TidePanels, brittle: bool
+) -> Steps:
+    """Carry the state ``y[15]`` from `t0` to `t1` in `n` equal steps."""
+    scratch = _scratch()
+    gradient(y, scratch.last)
     h = (t1 - t0) / n
-    contact = 1.0  # V/V0 at which the grains touch
-    summary[0] = summary[1] = -1.0
-    summary[2] = summary[3] = 0.0
-    touching = True
+    grains = _Grains(material, 1.0, True, FREE)
+    first = last = -1.0
+    flowing = free = 0
     for step in range(n):
         t = t0 + (step + 0.5) * h
-        if not drift(0.5 * h, y, work):
-            return False
-        gravity_terms(t, y, tide, work)
-        big_l = work.m[W_L]
-        gradient(y, big_l)
-        for i in range(3):
-            for j in range(3):
-                big_l[i, j] += h * work.m[W_K, i, j]
-        set_gradient(big_l, y)
-        volume = np.sqrt(determinant(y[0:6]))
+        if not drift(0.5 * h, y, scratch.work):
+            return Steps(False, first, last, flowing, free)
+        _kick(t, h, y, tide, scratch.work)
         if step == 0:  # volumes are compared at the kicks: the drift of a spinning body opens it a little
-            contact = volume
-        beta, _ = dilatancy(contact, material)
-        did = FREE
-        for turn in range(1 if touching else 4):
-            # The drift to the next kick is 1 + h L, of mean gradient L - h L^2/2: that is what must obey the law
-            # of friction, and L^2 of the last step is near enough, except where the grains meet: there it is that
-            # of the impulse itself, by iteration. What volume error is left is undone, again except there: what
-            # the grains overlap would throw them apart.
-            multiply(last, last, work.m[W_A])
-            pack(work.m[W_A], offset)
-            for i in range(6):
-                offset[i] *= 0.5 * h
-            if turn == 0:
-                copy(y, kicked, N_FULL)
-                gap = np.log(contact / volume) / h
-            else:
-                copy(kicked, y, N_FULL)
-            for i in range(3):
-                offset[i] += gap / 3.0
-            # Only grains that cohere bear a tension: whether it is too much, the impulse says.
-            free = not (touching and material.cohesion > 0.0)
-            if free and y[6] + y[7] + y[8] - offset[0] - offset[1] - offset[2] >= _dilation(
-                y, offset, beta, material, less
-            ):
-                did = FREE
-                break
-            if not touching and turn == 0:
-                contact = volume
-                beta, _ = dilatancy(contact, material)
-                gap = 0.0
-                for i in range(3):
-                    offset[i] = 0.0
-            impulse = friction_impulse(y, material, h, offset, work, jac, pivots, spare)
-            did = impulse.outcome
-            material = on_part(material, impulse.part, material.fan_limit)
-            if did == FAILED:
-                return False
-            gradient(y, last)
-        gradient(y, last)
-        touching = did != FREE
-        if did == SLIDING:
-            contact *= np.exp(h * _dilation(y, offset, beta, material, less))
+            grains = _Grains(material, np.sqrt(determinant(y[0:6])), True, FREE)
+        grains = _impulse(y, h, grains, scratch)
+        if grains.outcome == FAILED:
+            return Steps(False, first, last, flowing, free)
+        if grains.outcome == SLIDING:
             if brittle:
-                material = without_cohesion(material)
-            if summary[2] == 0.0:
-                summary[0] = t - 0.5 * h
-            summary[1] = t + 0.5 * h
-            summary[2] += 1.0
-        elif did != REST:
-            summary[3] += 1.0
-        if not drift(0.5 * h, y, work):
-            return False
-    return True
+                grains = _Grains(
+                    without_cohesion(grains.material), grains.volume, grains.touching, grains.outcome
+                )
+            if flowing == 0:
+                first = t - 0.5 * h
+            last = t + 0.5 * h
+            flowing += 1
+        elif grains.outcome != REST:
+            free += 1
+        if not drift(0.5 * h, y, scratch.work):
+            return Steps(False, first, last, flowing, free)
+    return Steps(True, first, last, flowing, free)

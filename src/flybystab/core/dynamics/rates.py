@@ -12,10 +12,13 @@ from flybystab.core.dynamics.state import (
     DETERMINANT,
     FLOWING,
     FLUID,
+    OTHER,
     PLACE,
     PRESSURE,
     RIGID,
     STRENGTH,
+    TIDE,
+    UNIT,
     VOLUME,
     W_A,
     W_B,
@@ -54,8 +57,8 @@ def rigid_rate(t: float, y: Array, dy: Array, rigid: RigidShape, tide: TidePanel
     ``Omegadot_ij = (K - Omega^2)_ij (S_j - S_i)/(S_i + S_j)`` along the body axes, the antisymmetric part
     of ``(Omegadot + Omega^2) S = K S - T``; the quaternion turns at ``qdot = q omega / 2``.
     """
-    kt = work.c[0]
-    kb = work.c[1]
+    kt = work.c[TIDE]
+    kb = work.c[OTHER]
     tide_at(tide.tau, tide.start, tide.width, tide.coefficients, t, kt)
     rotated_to_body(y, kt, work.m[W_N], kb)
     w0, w1, w2 = y[4], y[5], y[6]
@@ -82,8 +85,8 @@ def rigid_excess(
     t: float, y: Array, par: Parameters, tide: TidePanels, work: Buffers, stress: Array
 ) -> tuple[float, float, float, float]:
     """Yield excess, pressure, deviator norm, unit determinant of a RIGID state; sets ``stress[6]``."""
-    kt = work.c[0]
-    kb = work.c[1]
+    kt = work.c[TIDE]
+    kb = work.c[OTHER]
     tide_at(tide.tau, tide.start, tide.width, tide.coefficients, t, kt)
     rotated_to_body(y, kt, work.m[W_N], kb)
     rigid = par.rigid
@@ -98,14 +101,14 @@ def rigid_excess(
 def gravity_terms(t: float, y: Array, tide: TidePanels, work: Buffers) -> None:
     """Compute the terms of the rates that depend on ``t`` and ``S`` only.
 
-    These are ``S``, ``S^-1``, ``K_g + K_t`` and the volume; the tide is left in ``work.c[0]``.
+    These are ``S``, ``S^-1``, ``K_g + K_t`` and the volume; the tide is left in ``work.c[TIDE]``.
     """
     unpack(y[0:6], work.m[W_S])
     det = inverse(y[0:6], work.m[W_SINV])
     work.s[VOLUME] = np.sqrt(det)
     k = work.m[W_K]
     gravity_tensor(y[0:6], work.m[W_SINV], det, work.m[W_SCRATCH, 0], work.m[W_VECTORS], k)
-    kt = work.c[0]
+    kt = work.c[TIDE]
     tide_at(tide.tau, tide.start, tide.width, tide.coefficients, t, kt)
     # K_g = -2 (V0/V) A = -2 Gamma
     k[0, 0] = kt[0] - 2.0 * k[0, 0]
@@ -151,7 +154,7 @@ def _face_stress(
     sinv, r, n, b = work.m[W_SINV], work.m[W_R], work.m[W_N], work.m[W_B]
     x, xs = work.m[W_FACE], work.m[W_A]
     p1, p2, _, _, _ = corner(sin, det_d, False)
-    isotropic(p1, p2, work.c[2], x)
+    isotropic(p1, p2, work.c[UNIT], x)
     for i in range(3):
         for j in range(3):
             x[i, j] -= n[i, j]
@@ -174,7 +177,7 @@ def _face_stress(
     size = 0.0
     third = 0.0
     if factor != 0.0:
-        unit = work.c[2]
+        unit = work.c[UNIT]
         for i in range(3):
             for j in range(3):
                 x[i, j] = n[i, j] + place * x[i, j]
@@ -192,11 +195,11 @@ def _flow_acceleration(d: Array, material: MaterialParameters, work: Buffers) ->
     trace_sinv = sinv[0, 0] + sinv[1, 1] + sinv[2, 2]
     trace_d = d[0] + d[1] + d[2]
     trace_r = r[0, 0] + r[1, 1] + r[2, 2]
-    norm, g, support, det = flow_stress(d, material, work.c[2], n)
+    norm, g, support, det = flow_stress(d, material, work.c[UNIT], n)
     work.s[DETERMINANT] = det
     det_d = 0.0
     if material.part != SMOOTH:
-        det_d = determinant(work.c[2])
+        det_d = determinant(work.c[UNIT])
         work.s[BEYOND_FACE] = beyond_face(material.sin_phi, det_d)
     sin = material.sin_phi
     cohesive = material.cos_phi * material.cohesion * volume

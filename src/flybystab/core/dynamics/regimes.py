@@ -29,7 +29,7 @@ import numpy as np
 from flybystab.core.dynamics.dispersed import follow_free
 from flybystab.core.dynamics.flowing import follow_flow
 from flybystab.core.dynamics.ground import Ground
-from flybystab.core.dynamics.impulse import FAILED, FREE, SLIDING, friction_impulse
+from flybystab.core.dynamics.impulse import FAILED, FREE, SLIDING, friction_impulse, impulse_room
 from flybystab.core.dynamics.rates import rigid_excess
 from flybystab.core.dynamics.rigid import follow_rigid
 from flybystab.core.dynamics.state import (
@@ -177,10 +177,8 @@ def quaternion(m: Array, q: Array) -> None:
 @kernel
 def _contact(y: Array, par: Parameters, ws: Workspace) -> int:
     """Apply the inelastic impulse of grains that meet to ``y[15]``; returns its outcome."""
-    offset = ws.spare[36:42]
-    offset[:] = 0.0
     material = on_part(par.material, SMOOTH, par.material.fan_limit)
-    return friction_impulse(y, material, 0.0, offset, ws.work, ws.jac, ws.pivots, ws.spare).outcome
+    return friction_impulse(y, material, 0.0, np.zeros(6), ws.work, impulse_room()).outcome
 
 
 @kernel

@@ -7,7 +7,13 @@ import numpy as np
 from flybystab.core.dynamics.ground import Ground, Step, contact_time
 from flybystab.core.dynamics.rates import rate, rigid_excess
 from flybystab.core.dynamics.state import N_RIGID, RIGID, Parameters, rigid_volume
-from flybystab.core.dynamics.steppers import explicit_at, explicit_dense, explicit_step
+from flybystab.core.dynamics.steppers import (
+    explicit_at,
+    explicit_dense,
+    explicit_growth,
+    explicit_reduction,
+    explicit_step,
+)
 from flybystab.core.dynamics.workspace import (
     DONE,
     N_SAMPLE,
@@ -28,12 +34,13 @@ from flybystab.core.dynamics.workspace import (
 from flybystab.core.ellipsoid.tide import TidePanels
 from flybystab.core.material.flow_rule import dilatancy
 from flybystab.core.material.yield_surface import required_friction, slope
+from flybystab.core.numerics.dop853 import N_STAGES
 from flybystab.core.numerics.jit import code, inlined, kernel
 from flybystab.typing import Array
 
-# What `_rigid_values` returns.
-_ONSET = code(0)
-_FRICTION = code(1)
+# Rows of `Workspace.sample`, and what `_rigid_values` returns.
+_ONSET = code(0)  # the onset function
+_FRICTION = code(1)  # the mobilised friction angle, rad
 
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
@@ -43,8 +50,10 @@ _BESIDE = 1e-4
 
 @kernel
 def yields(t: float, y: Array, par: Parameters, tide: TidePanels, ws: Workspace) -> float:
-    """Positive where a RIGID state has yielded and can flow: the smaller of the yield excess and, beyond
-    yield, the denominator of the pressure for flow along the deviator of the rigid stress.
+    """Onset function: positive where a RIGID state has yielded and can flow.
+
+    It is the yield excess or, beyond yield, the smaller of that and the denominator of the pressure for flow along the
+    deviator of the rigid stress.
     """
     excess, p, norm, det = rigid_excess(t, y, par, tide, ws.work, ws.stress)
     return _onset(excess, p, norm, det, par, ws.stress)
@@ -89,7 +98,7 @@ def _mobilised_friction(p: float, norm: float, det: float, par: Parameters) -> f
 
 @kernel
 def _rigid_values(t: float, y: Array, par: Parameters, tide: TidePanels, ws: Workspace, which: int) -> float:
-    """Onset function (`which` 0) or mobilised friction angle (1) of a RIGID state."""
+    """Onset function or mobilised friction angle (`which`: _ONSET or _FRICTION) of a RIGID state."""
     if which == _ONSET:
         return yields(t, y, par, tide, ws)
     _, p, norm, det = rigid_excess(t, y, par, tide, ws.work, ws.stress)
@@ -142,10 +151,10 @@ def _summit(
     ws: Workspace,
     which: int,
 ) -> bool:
-    """Whether a maximum may lie beside sample `j` of ``f[: last + 1]``.
+    """Whether a maximum may lie next to sample `j` of ``f[: last + 1]``.
 
-    Inside the step its neighbours tell, by the parabola. At an end of the step there is one neighbour only, and a
-    maximum on the way to it shows in the slope: a point next to the end is higher than the end.
+    Inside the step the parabola through the sample and its two neighbours decides. At an end of the step, which has
+    one neighbour only, the slope decides: a maximum is possible where a point close to the end is higher than the end.
     """
     if 0 < j < last:
         return _vertex_inside(f[j - 1], f[j], f[j + 1])
@@ -158,7 +167,7 @@ def _summit(
 
 @kernel
 def _interval(j: int, last: int) -> tuple[float, float]:
-    """Fractions of a step between which a maximum beside sample `j` of ``0 ... last`` lies."""
+    """Fractions of a step between which a maximum next to sample `j` of ``0 ... last`` lies."""
     return max(j - 1.0, 0.0) / N_SAMPLE, min(j + 1.0, last) / N_SAMPLE
 
 
@@ -171,22 +180,22 @@ def _sample_step(
     ``ws.sample`` gets the onset function and the mobilised friction at the samples. Between samples near yield the
     maximum of the onset function is located.
     """
-    f = ws.sample
-    f[0, 0], f[1, 0] = f[0, N_SAMPLE], f[1, N_SAMPLE]
+    onset, friction = ws.sample[_ONSET], ws.sample[_FRICTION]
+    onset[0], friction[0] = onset[N_SAMPLE], friction[N_SAMPLE]
     norm = 0.0
     for j in range(1, N_SAMPLE + 1):
         x = j / N_SAMPLE
         explicit_at(x, ws.y, N_RIGID, ws.dense, ws.ys)
         excess, p, norm, det = rigid_excess(t + x * h, ws.ys, par, tide, ws.work, ws.stress)
-        f[0, j] = _onset(excess, p, norm, det, par, ws.stress)
-        f[1, j] = _mobilised_friction(p, norm, det, par)
-        if not unyielding and f[0, j] > 0.0:
+        onset[j] = _onset(excess, p, norm, det, par, ws.stress)
+        friction[j] = _mobilised_friction(p, norm, det, par)
+        if not unyielding and onset[j] > 0.0:
             return x, j - 1
     if unyielding:
         return 2.0, N_SAMPLE
-    margin = f[0].max() - f[0].min() + 0.02 * norm
+    margin = onset.max() - onset.min() + 0.02 * norm
     for j in range(N_SAMPLE + 1):
-        if f[0, j] + margin > 0.0 and _summit(f[0], j, N_SAMPLE, t, h, par, tide, ws, _ONSET):
+        if onset[j] + margin > 0.0 and _summit(onset, j, N_SAMPLE, t, h, par, tide, ws, _ONSET):
             a, b = _interval(j, N_SAMPLE)
             x, value = _largest(a, b, t, h, par, tide, ws, _ONSET)
             if value > 0.0:
@@ -211,19 +220,19 @@ def _friction_peak(
     t: float, h: float, n: int, par: Parameters, tide: TidePanels, peak: Peak, ws: Workspace
 ) -> Peak:
     """The larger of `peak` and the largest mobilised friction up to sample `n` of a step."""
-    f = ws.sample
-    margin = f[1, : n + 1].max() - f[1, : n + 1].min()
+    f = ws.sample[_FRICTION]
+    margin = f[: n + 1].max() - f[: n + 1].min()
     for j in range(n + 1):
         if (
-            f[1, j] < np.inf
-            and f[1, j] + margin > peak.friction
-            and _summit(f[1], j, n, t, h, par, tide, ws, _FRICTION)
+            f[j] < np.inf
+            and f[j] + margin > peak.friction
+            and _summit(f, j, n, t, h, par, tide, ws, _FRICTION)
         ):
             a, b = _interval(j, n)
             x, value = _largest(a, b, t, h, par, tide, ws, _FRICTION)
             peak = larger(peak, value, t + x * h)
     for j in range(1, n + 1):
-        peak = larger(peak, f[1, j], t + h * j / N_SAMPLE)
+        peak = larger(peak, f[j], t + h * j / N_SAMPLE)
     return peak
 
 
@@ -249,6 +258,45 @@ def _step_to_yield(
     copy(ws.y1, ws.y, N_RIGID)
     _normalise(ws.y)
     return t + high * h
+
+
+@kernel
+def _longest_step(t: float, tolerance: float, tide: TidePanels) -> float:
+    """Longest step at a time.
+
+    A step never spans more of the variable ``asinh(t/tau)`` of the tide than the panels of the tide resolve, and less
+    for a smaller tolerance, in proportion to a step of order 8: otherwise a run and the run that measures its error
+    would share the error of the tide.
+    """
+    if tide.coefficients.shape[0] == 0:
+        return np.inf
+    return min(0.4, 0.225 * (1e8 * tolerance) ** 0.125) * np.sqrt(t * t + tide.tau * tide.tau)
+
+
+@kernel
+def _try_step(
+    t: float, h: float, tolerance: float, par: Parameters, tide: TidePanels, ws: Workspace, log: Log
+) -> float:
+    """Error of one step of `h` (accept at <= 1), which is counted in `log`."""
+    y = ws.y
+    spin = np.sqrt(y[4] ** 2 + y[5] ** 2 + y[6] ** 2)
+    for i in range(N_RIGID):
+        ws.scale[i] = tolerance if i < 4 else tolerance * max(spin, 0.1)
+    error = explicit_step(RIGID, t, N_RIGID, h, par, tide, ws)
+    count_step(log)
+    if not error <= 1.0:
+        count_rejected(log)
+    return error
+
+
+@kernel
+def _record_state(
+    t: float, par: Parameters, tide: TidePanels, ws: Workspace, log: Log
+) -> tuple[float, float]:
+    """Append the state ``ws.y`` to the history; returns its onset function and its mobilised friction."""
+    excess, p, norm, det = rigid_excess(t, ws.y, par, tide, ws.work, ws.stress)
+    record(t, RIGID, ws.y, par, p, norm, det, ws, log)
+    return _onset(excess, p, norm, det, par, ws.stress), _mobilised_friction(p, norm, det, par)
 
 
 @kernel
@@ -282,36 +330,23 @@ def follow_rigid(
         The end, its time, the length of the next step (0 unless it ends at yield), and the largest mobilised friction.
     """
     y, k, tol = ws.y, ws.k, limits.tolerance
-    h = min(0.05 if first_step <= 0.0 else first_step, t1 - t)
+    h = min(0.05 if first_step <= 0.0 else first_step, t1 - t, _longest_step(t, tol, tide))
     rate(RIGID, t, y, k[0], par, tide, ws.work)
-    excess, p, norm, det = rigid_excess(t, y, par, tide, ws.work, ws.stress)
-    record(t, RIGID, y, par, p, norm, det, ws, log)
-    # A step never spans more of the change of variable of the tide than its panels resolve, and less of it for a
-    # smaller tolerance, as steps of order 8 are smaller: else the run that measures the error would share it.
-    reach = min(0.4, 0.225 * (1e8 * tol) ** 0.125)
-    if tide.coefficients.shape[0] > 0:
-        h = min(h, reach * np.sqrt(t * t + tide.tau * tide.tau))
-    touched = False
-    f = ws.sample
-    f[0, N_SAMPLE] = _onset(excess, p, norm, det, par, ws.stress)
-    f[1, N_SAMPLE] = _mobilised_friction(p, norm, det, par)
-    peak = larger(peak, f[1, N_SAMPLE], t)
-    if not unyielding and f[0, N_SAMPLE] > 0.0:
+    onset, friction = _record_state(t, par, tide, ws, log)
+    ws.sample[_ONSET, N_SAMPLE], ws.sample[_FRICTION, N_SAMPLE] = onset, friction
+    peak = larger(peak, friction, t)
+    if not unyielding and onset > 0.0:
         return ONSET, t, first_step, peak
+    touched = False
     while t < t1:
         if exhausted(log, limits):
             return STUCK, t, first_step, peak
         last = h >= t1 - t
         if last:
             h = t1 - t
-        spin = np.sqrt(y[4] ** 2 + y[5] ** 2 + y[6] ** 2)
-        for i in range(7):
-            ws.scale[i] = tol if i < 4 else tol * max(spin, 0.1)
-        error = explicit_step(RIGID, t, N_RIGID, h, par, tide, ws)
-        count_step(log)
+        error = _try_step(t, h, tol, par, tide, ws, log)
         if not error <= 1.0:
-            count_rejected(log)
-            h *= max(0.2, 0.9 * error ** (-0.125)) if np.isfinite(error) else 0.2
+            h *= explicit_reduction(error)
             continue
         explicit_dense(RIGID, t, N_RIGID, h, par, tide, ws)
         if not touched:
@@ -326,16 +361,13 @@ def follow_rigid(
         peak = _friction_peak(t, h, n, par, tide, peak, ws)
         if end <= 1.0:
             t = _step_to_yield(t, h, n, end, par, tide, ws)
-            excess, p, norm, det = rigid_excess(t, y, par, tide, ws.work, ws.stress)
-            peak = larger(peak, _mobilised_friction(p, norm, det, par), t)
-            record(t, RIGID, y, par, p, norm, det, ws, log)
-            return ONSET, t, h, peak
+            _, friction = _record_state(t, par, tide, ws, log)
+            return ONSET, t, h, larger(peak, friction, t)
         t = t1 if last else t + h
         copy(ws.y1, y, N_RIGID)
         _normalise(y)
-        k[0] = k[12]
-        h *= min(5.0, max(0.3, 0.9 * error ** (-0.125))) if error > 0.0 else 5.0
-        h = min(h, reach * np.sqrt(t * t + tide.tau * tide.tau) if tide.coefficients.shape[0] > 0 else h)
+        k[0] = k[N_STAGES]
+        h = min(h * explicit_growth(error), _longest_step(t, tol, tide))
     return TOUCH if touched else DONE, t, 0.0, peak
 
 

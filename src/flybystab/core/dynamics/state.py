@@ -89,6 +89,11 @@ J_NORMAL = 21
 N_WORK = 22
 
 
+# Components of `Buffers.c`.
+TIDE = 0  # tidal tensor at the time of the last rate
+OTHER = 1  # a second tensor: the tide along the body axes, or at another time; the rate of strain before an impulse
+UNIT = 2  # unit deviator of the rate of strain
+
 # Numbers of `Buffers.s` that `gravity_terms` and the rates leave.
 VOLUME = 0  # V/V0
 STRENGTH = 1  # k P + k c

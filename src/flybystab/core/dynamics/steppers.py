@@ -49,6 +49,18 @@ def explicit_step(
 
 
 @kernel
+def explicit_growth(error: float) -> float:
+    """Factor by which the step after an accepted one of `explicit_step` may be longer, from its error."""
+    return min(5.0, max(0.3, 0.9 * error ** (-0.125))) if error > 0.0 else 5.0
+
+
+@kernel
+def explicit_reduction(error: float) -> float:
+    """Factor by which a rejected step of `explicit_step` is shortened."""
+    return max(0.2, 0.9 * error ** (-0.125)) if np.isfinite(error) else 0.2
+
+
+@kernel
 def explicit_dense(
     regime: int, t: float, n: int, h: float, par: Parameters, tide: TidePanels, ws: Workspace
 ) -> None:

@@ -88,19 +88,20 @@ class Workspace(NamedTuple):
     """Buffers of a run, allocated once."""
 
     work: Buffers
-    k: Array
-    jac: Array
+    k: Array  # rates of the stages
+    jac: Array  # Jacobian, and the derivative in time as the last column
     lu: Array
     pivots: NDArray[np.int64]
-    dense: Array
-    y: Array
+    dense: Array  # interpolant of a step
+    y: Array  # state at the start of a step, at its end, and inside it
     y1: Array
     ys: Array
-    scale: Array
+    scale: Array  # error allowed in each number of the state
     stress: Array
-    sample: Array
-    spare: Array  # 36 of an impulse, its 6 zeros, 3 of the ground; of a flow the first 30
-    ends: Array  # flow: event functions at the samples of a step, and last
+    sample: Array  # rigid: onset function and mobilised friction (rows) at the samples of a step
+    start_rate: Array  # flow: rate at the start of a step
+    inner_rate: Array  # flow: rate at a point inside a step
+    ends: Array  # flow: event functions (rows) at the samples of a step, and last
 
 
 @kernel
@@ -132,7 +133,8 @@ def workspace() -> Workspace:
         np.ones(15),
         np.zeros(6),
         np.zeros((2, N_SAMPLE + 1)),
-        np.zeros(45),
+        np.zeros(15),
+        np.zeros(15),
         np.zeros((4, N_SAMPLE + 2)),
     )
 
@@ -153,7 +155,8 @@ def borrowed_workspace(ws: Workspace) -> Workspace:
         borrowed(ws.scale),
         borrowed(ws.stress),
         borrowed(ws.sample),
-        borrowed(ws.spare),
+        borrowed(ws.start_rate),
+        borrowed(ws.inner_rate),
         borrowed(ws.ends),
     )
 

@@ -11,7 +11,7 @@ import numpy as np
 from flybystab.core.energy.perturbation import (
     LONGEST,
     SQRT2,
-    Pile,
+    Ellipsoid,
     barrier,
     direction,
     powers,
@@ -46,7 +46,7 @@ MOST_TURNS = 200
 
 
 @kernel
-def level(b: Pile, x: Array, order: int, enough: float) -> tuple[float, float]:
+def level(b: Ellipsoid, x: Array, order: int, enough: float) -> tuple[float, float]:
     """Critical energy and strain of one direction at an order: 2, 3, or 0 for the barrier (known up to `enough`).
 
     Order 1 is ``-P1/V`` (twice): its least value is the distance of the stress from the yield surface.
@@ -69,7 +69,7 @@ def _clip(x: Array, ball: bool) -> None:
 
 
 @kernel
-def descent(b: Pile, x: Array, order: int, which: int, step: float, smallest: float) -> float:
+def descent(b: Ellipsoid, x: Array, order: int, which: int, step: float, smallest: float) -> float:
     """Minimise the critical energy (or strain) over directions by pattern search from ``x[5]``, which it moves."""
     ball = b.associative and b.sin > 0.0
     limit = np.inf
@@ -110,7 +110,7 @@ def descent(b: Pile, x: Array, order: int, which: int, step: float, smallest: fl
 
 
 @kernel
-def _on_face(b: Pile, turn: Array, axes: Array, x: Array) -> None:
+def _on_face(b: Ellipsoid, turn: Array, axes: Array, x: Array) -> None:
     """Write the unit normal ``x[5]`` to the Mohr-Coulomb face whose principal axes are `axes` turned by ``turn[3]``.
 
     ``f = (sigma_1 - sigma_3) + (sigma_1 + sigma_3) sin(phi)``. The columns of `axes` go from least to greatest.
@@ -150,7 +150,9 @@ def _principal(x: Array, axes: Array) -> None:
 
 
 @kernel
-def polish(b: Pile, x: Array, order: int, which: int, size: float, smallest: float, on_face: bool) -> float:
+def polish(
+    b: Ellipsoid, x: Array, order: int, which: int, size: float, smallest: float, on_face: bool
+) -> float:
     """Lower the critical energy (or strain) from ``x[5]``, which it moves, by simplices (Nelder & Mead 1965).
 
     A simplex turns into the narrow, curved valleys along which no coordinate leads down; it is set up anew and
@@ -220,7 +222,7 @@ def polish(b: Pile, x: Array, order: int, which: int, size: float, smallest: flo
 
 
 @kernel
-def _corner(b: Pile, v: Array, order: int, which: int, ball: bool, axes: Array, y: Array) -> float:
+def _corner(b: Ellipsoid, v: Array, order: int, which: int, ball: bool, axes: Array, y: Array) -> float:
     """Value at the corner ``v`` of a simplex, which it brings into the ball; writes its direction ``y[5]``."""
     if v.size == 3:
         _on_face(b, v, axes, y)
@@ -257,7 +259,7 @@ def starts(n_angles: int, ball: bool) -> Array:
 
 @kernel
 def least(
-    b: Pile,
+    b: Ellipsoid,
     order: int,
     which: int,
     seeds: Array,

@@ -22,12 +22,12 @@ import numpy as np
 from flybystab.core.ellipsoid.rigid_stress import overload, rigid_stress
 from flybystab.core.energy.flow_work import growth_at, power, volume_at
 from flybystab.core.energy.perturbation import (
-    BEYOND_EDGE,
-    EDGE,
+    LARGER_AXIS_RATIO2,
+    LARGEST_AXIS_RATIO,
     LONGEST,
     NO_TIDE,
+    Ellipsoid,
     Path,
-    Pile,
     direction,
     mobility,
     path_along,
@@ -84,7 +84,7 @@ def tidal_power(gradient: Array, growth: float, shape: Array, tide: Array) -> fl
 
 @kernel
 def forces_at(
-    b: Pile, path: Path, strain: float, momentum: Array, tide: Array
+    b: Ellipsoid, path: Path, strain: float, momentum: Array, tide: Array
 ) -> tuple[float, float, float, float]:
     """Rate of loss of the free body, force of tide and torque, mobility and squared axis ratio at a strain."""
     flow = path.flow
@@ -99,14 +99,16 @@ def forces_at(
 
 
 @kernel
-def slide(b: Pile, x: Array, time: Array, momentum: Array, tide: Array) -> tuple[float, float, float, float]:
+def slide(
+    b: Ellipsoid, x: Array, time: Array, momentum: Array, tide: Array
+) -> tuple[float, float, float, float]:
     """Energy given, largest kinetic energy, strain and duration of the deformation along the path of ``x[5]``.
 
     ``momentum[n, 3]`` and ``tide[n, 6]`` are those of the rigid course at ``time[n]``, body axes, linear in between.
     It ends at the axis ratio where the homogeneous model does, or at the strain `LONGEST`.
     """
     path = path_along(b, x)
-    edge = max(EDGE * EDGE, BEYOND_EDGE * (np.max(b.s) / np.min(b.s)))
+    edge = max(LARGEST_AXIS_RATIO * LARGEST_AXIS_RATIO, LARGER_AXIS_RATIO2 * (np.max(b.s) / np.min(b.s)))
     h = np.empty(3)
     k = np.empty(6)
     rate = strain = work = given = kinetic = moving = 0.0

@@ -67,12 +67,12 @@ LONGEST = 3.0
 #: Steps of strain in which its maximum is bracketed.
 STEP = 0.2
 
-#: Axis ratio at which the homogeneous model is left; a body that is beyond it may grow its square by the second.
-EDGE = 6.0
-BEYOND_EDGE = 1.002
+#: Largest axis ratio of the homogeneous model; the square of one that is larger at the start may grow by this factor.
+LARGEST_AXIS_RATIO = 6.0
+LARGER_AXIS_RATIO2 = 1.002
 
 
-class Pile(NamedTuple):
+class Ellipsoid(NamedTuple):
     """A granular ellipsoid in the units of this module; `s` is ``S`` with ``det S = 1``."""
 
     s: Array
@@ -115,7 +115,7 @@ def direction(c: Array, x: Array) -> None:
 
 
 @kernel
-def pile(
+def ellipsoid(
     s1: float,
     s2: float,
     s3: float,
@@ -125,8 +125,8 @@ def pile(
     cohesion: float,
     dilatancy: float,
     kappa: float,
-) -> Pile:
-    """Set the scene; `s_i` of any scale, `spin`, `cohesion`, `kappa` in the units of this module.
+) -> Ellipsoid:
+    """The ellipsoid with its equilibrium stress; `s_i` of any scale, other quantities in the units of this module.
 
     `dilatancy` is ``beta / min k``; 1 or more means associative flow, whatever the yield surface.
     """
@@ -148,7 +148,7 @@ def pile(
     for i in range(3):
         momentum[i] = MASS / 5.0 * (trace - s[i]) * spin[i]
     sin = np.sin(phi)
-    return Pile(
+    return Ellipsoid(
         s,
         spin.copy(),
         momentum,
@@ -179,7 +179,7 @@ def _unit_determinant(x: Array, r: float) -> float:
 
 
 @kernel
-def slope_of_flow(b: Pile, x: Array) -> tuple[float, float]:
+def slope_of_flow(b: Ellipsoid, x: Array) -> tuple[float, float]:
     """``k`` over ``sin phi`` of the dissipation in the direction `x`, and the dilatancy ``tr D`` at ``|D'| = 1``.
 
     Associative flow: the support function ``m(D') = max over theta of k(theta) shat(theta):D'`` of the yield
@@ -197,7 +197,7 @@ def slope_of_flow(b: Pile, x: Array) -> tuple[float, float]:
 
 
 @kernel
-def flow_along(b: Pile, x: Array) -> Flow:
+def flow_along(b: Ellipsoid, x: Array) -> Flow:
     """What the power of the stress depends on in a direction ``x[5]``, ``|x| <= 1``."""
     r = np.sqrt(np.sum(x * x))
     det = _unit_determinant(x, r) if r > 0.0 else 0.0
@@ -221,7 +221,7 @@ def flow_along(b: Pile, x: Array) -> Flow:
 
 
 @kernel
-def powers(b: Pile, x: Array) -> tuple[float, float, float]:
+def powers(b: Ellipsoid, x: Array) -> tuple[float, float, float]:
     """``P1, P2, P3`` of a direction ``x[5]``, ``|x| <= 1``; minus infinity, 0, 0 where the flow jams."""
     flow = flow_along(b, x)
     d = np.empty(6)
@@ -270,7 +270,7 @@ class Path(NamedTuple):
 
 
 @kernel
-def path_along(b: Pile, x: Array) -> Path:
+def path_along(b: Ellipsoid, x: Array) -> Path:
     """Path of a direction ``x[5]``."""
     flow = flow_along(b, x)
     d = np.empty(6)
@@ -284,7 +284,7 @@ def path_along(b: Pile, x: Array) -> Path:
 
 
 @kernel
-def state_at(b: Pile, path: Path, t: float) -> tuple[float, float, float]:
+def state_at(b: Ellipsoid, path: Path, t: float) -> tuple[float, float, float]:
     """``Phi``, the rate at which kinetic energy is lost in slow flow, and the squared axis ratio at strain `t`."""
     volume = volume_at(path.flow.trace, t)
     growth = growth_at(path.flow.trace, volume)
@@ -304,7 +304,7 @@ def mobility(path: Path, t: float, volume: float, growth: float) -> float:
 
 
 @kernel
-def _work(b: Pile, path: Path, start: float, end: float, inertia: float) -> tuple[float, float]:
+def _work(b: Ellipsoid, path: Path, start: float, end: float, inertia: float) -> tuple[float, float]:
     """Work of the stress between two strains, by Gauss' rule between the kinks of its power.
 
     The kinetic energy ``K`` that is needed at the start to reach a strain at rest obeys ``dK/dt = -y - w K`` with the
@@ -353,7 +353,7 @@ def _work(b: Pile, path: Path, start: float, end: float, inertia: float) -> tupl
 
 
 @kernel
-def loss_at(b: Pile, x: Array, t: float, slow: bool) -> float:
+def loss_at(b: Ellipsoid, x: Array, t: float, slow: bool) -> float:
     """Energy needed to reach strain `t`; `slow`: ``Phi(t) - Phi(0) + int V sigma*:D dt`` without inertia."""
     path = path_along(b, x)
     phi0, _, _ = state_at(b, path, 0.0)
@@ -372,92 +372,101 @@ def loss_at(b: Pile, x: Array, t: float, slow: bool) -> float:
 
 
 @kernel
-def loss_rate(b: Pile, x: Array, t: float) -> float:
+def loss_rate(b: Ellipsoid, x: Array, t: float) -> float:
     """Rate at which slow flow loses kinetic energy at strain `t`, per strain."""
     return state_at(b, path_along(b, x), t)[1]
 
 
 @kernel
-def barrier(b: Pile, x: Array, longest: float, enough: float) -> tuple[float, float]:
+def _strain_at_ratio(
+    b: Ellipsoid, path: Path, a: float, z: float, ratio2_a: float, ratio2_z: float, limit2: float
+) -> float:
+    """Strain between `a` and `z` at which the squared axis ratio is `limit2` (Illinois rule)."""
+    fa, fz = np.log(ratio2_a / limit2), np.log(ratio2_z / limit2)
+    side = 0
+    t = z
+    for _ in range(30):
+        t = (a * fz - z * fa) / (fz - fa)
+        _, _, ratio2 = state_at(b, path, t)
+        f = np.log(ratio2 / limit2)
+        if abs(f) < 1e-9:
+            break
+        if f < 0.0:
+            a = t
+            fa = f
+            fz *= 0.5 if side < 0 else 1.0
+            side = -1
+        else:
+            z = t
+            fz = f
+            fa *= 0.5 if side > 0 else 1.0
+            side = 1
+    return t
+
+
+@kernel
+def _strain_at_maximum(
+    b: Ellipsoid, path: Path, a: float, z: float, rate_a: float, rate_z: float
+) -> tuple[float, float]:
+    """Strain between `a` and `z` at which slow flow ceases to lose energy (Illinois rule), and ``Phi`` there."""
+    side = 0
+    t = z
+    phi = 0.0
+    for _ in range(40):
+        t = (a * rate_z - z * rate_a) / (rate_z - rate_a)
+        phi, y, _ = state_at(b, path, t)
+        # the error of the maximum is of second order
+        if abs(y) <= 1e-8 * MASS or z - a < 1e-8:
+            break
+        if y > 0.0:
+            a = t
+            rate_a = y
+            rate_z *= 0.5 if side > 0 else 1.0
+            side = 1
+        else:
+            z = t
+            rate_z = y
+            rate_a *= 0.5 if side < 0 else 1.0
+            side = -1
+    return t, phi
+
+
+@kernel
+def barrier(b: Ellipsoid, x: Array, longest: float, enough: float) -> tuple[float, float]:
     """Energy needed to reach the strain at which slow flow ceases to lose energy, along ``F = exp(L t)``; that strain.
 
-    Up to the inertia of the flow (see `_work`) it is the first maximum of ``Phi(t) - Phi(0) + int V sigma*:D dt``.
+    Up to the inertia of the flow (see `_work`) it is the first maximum of ``Phi(t) - Phi(0) + int V sigma*:D dt``: the
+    first zero of its exact slope, bracketed by steps of :data:`STEP`.
 
-    The path ends where the axis ratio passes :data:`EDGE` and the homogeneous model with it: the loss there counts
-    as the maximum. Infinite where the loss grows up to the strain `longest` without either.
-    A loss above `enough` is returned as it is met: the barrier is at least that high.
-    The maximum is the first zero of the exact slope, bracketed by steps of :data:`STEP` and refined by the Illinois
-    rule.
+    The path ends where the axis ratio passes :data:`LARGEST_AXIS_RATIO`, at which the homogeneous model is left: the
+    loss there counts as the maximum. Infinite where the loss grows up to the strain `longest` without either. A loss
+    above `enough` is returned as soon as it is found: the barrier is at least that high.
     """
     path = path_along(b, x)
     phi0, y0, ratio2 = state_at(b, path, 0.0)
-    edge = max(EDGE * EDGE, BEYOND_EDGE * ratio2)
-    t0 = 0.0
     if y0 <= 0.0:
         return 0.0, 0.0
-    t1 = 0.0
-    y1 = y0
-    phi = phi0
-    ratio0 = ratio2
+    limit2 = max(LARGEST_AXIS_RATIO * LARGEST_AXIS_RATIO, LARGER_AXIS_RATIO2 * ratio2)
+    t0 = t1 = 0.0
+    y1, ratio0 = y0, ratio2
     before = work = 0.0  # work up to t0 and t1
     held = inertia = 0.0  # the exponent of `_work` there
     while y1 > 0.0:
-        t0 = t1
-        y0 = y1
+        t0, y0 = t1, y1
         before, held = work, inertia
         t1 = t0 + STEP
         if t0 >= longest or not y0 < np.inf:
             return np.inf, np.inf
         phi, y1, ratio2 = state_at(b, path, t1)
-        if ratio2 > edge:
-            a = t0
-            fa = np.log(ratio0 / edge)
-            fb = np.log(ratio2 / edge)
-            side = 0
-            t = t1
-            for _ in range(30):
-                t = (a * fb - t1 * fa) / (fb - fa)
-                phi, y1, ratio2 = state_at(b, path, t)
-                f = np.log(ratio2 / edge)
-                if abs(f) < 1e-9:
-                    break
-                if f < 0.0:
-                    a = t
-                    fa = f
-                    fb *= 0.5 if side < 0 else 1.0
-                    side = -1
-                else:
-                    t1 = t
-                    fb = f
-                    fa *= 0.5 if side > 0 else 1.0
-                    side = 1
-            t1 = t
+        if ratio2 > limit2:
+            t1 = _strain_at_ratio(b, path, t0, t1, ratio0, ratio2, limit2)
+            phi, y1, ratio2 = state_at(b, path, t1)
             if y1 > 0.0:
                 return phi - phi0 + before + _work(b, path, t0, t1, held)[0], t1
         ratio0 = ratio2
         work, inertia = _work(b, path, t0, t1, held)
         work += before
-        if y1 > 0.0:
-            lost = phi - phi0 + work
-            if lost > enough:
-                return lost, t1
-    start = t0
-    t = t1
-    side = 0
-    for _ in range(40):
-        t = (t0 * y1 - t1 * y0) / (y1 - y0)
-        phi, y, _ = state_at(b, path, t)
-        # the error of the maximum is of second order
-        if abs(y) <= 1e-8 * MASS or t1 - t0 < 1e-8:
-            break
-        if y > 0.0:
-            t0 = t
-            y0 = y
-            y1 *= 0.5 if side > 0 else 1.0
-            side = 1
-        else:
-            t1 = t
-            y1 = y
-            y0 *= 0.5 if side < 0 else 1.0
-            side = -1
-    return phi - phi0 + before + _work(b, path, start, t, held)[0], t
+        if y1 > 0.0 and phi - phi0 + work > enough:
+            return phi - phi0 + work, t1
+    t, phi = _strain_at_maximum(b, path, t0, t1, y0, y1)
+    return phi - phi0 + before + _work(b, path, t0, t, held)[0], t

@@ -25,11 +25,11 @@ from flybystab.core.energy.direction_search import (
 )
 from flybystab.core.energy.flow_work import volume_at
 from flybystab.core.energy.perturbation import (
-    Pile,
+    Ellipsoid,
     direction,
+    ellipsoid,
     flow_along,
     path_along,
-    pile,
     powers,
     rate_of_strain,
     slope_of_flow,
@@ -68,13 +68,13 @@ ON_YIELD = 1e-9
 
 
 @kernel
-def _certified(b: Pile) -> bool:
+def _certified(b: Ellipsoid) -> bool:
     """Whether ``P1`` is linear and ``P2`` quadratic in the direction: not with a reaction pressure."""
     return is_circular(b.code) and (b.associative or b.kappa > 0.0 or b.sin <= 0.0)
 
 
 @kernel
-def first_to_flow(b: Pile, x: Array) -> float:
+def first_to_flow(b: Ellipsoid, x: Array) -> float:
     """``P1/V`` in the direction ``x[5]`` in which the body flows first: the greatest of all for associative flow.
 
     With less dilatancy it flows along the stress deviator.
@@ -99,7 +99,7 @@ def first_to_flow(b: Pile, x: Array) -> float:
 
 
 @kernel
-def overload_rate(b: Pile, x: Array) -> float:
+def overload_rate(b: Ellipsoid, x: Array) -> float:
     """Rate at which the overload of the rigid body grows along the flow ``x[5]``, at fixed angular momentum.
 
     For a body at yield whose flow is not associative this decides on stability to infinitesimal perturbations, not
@@ -129,7 +129,7 @@ def overload_rate(b: Pile, x: Array) -> float:
 
 
 @kernel
-def _face_normal(b: Pile, x: Array) -> None:
+def _face_normal(b: Ellipsoid, x: Array) -> None:
     """Unit deviator ``x[5]`` of the normal to the Mohr-Coulomb face that the stress is under.
 
     ``f = (sigma_1 - sigma_3) + (sigma_1 + sigma_3) sin(phi)``: ``P1`` has a kink there, which a descent misses.
@@ -162,7 +162,7 @@ def mobilised_curvature(
     Positive: the body is stable to infinitesimal perturbations even with its friction fully mobilised. nan where
     there is no deviator (``D*`` is undefined), no pressure or no sufficient friction.
     """
-    b = pile(s[0], s[1], s[2], spin, code, friction, cohesion, 1.0, 0.0)
+    b = ellipsoid(s[0], s[1], s[2], spin, code, friction, cohesion, 1.0, 0.0)
     if not friction < np.inf or pressure <= 0.0 or np.sum(b.stress * b.stress) <= 1e-28 * pressure * pressure:
         return np.nan
     x = np.empty(5)
@@ -172,6 +172,78 @@ def mobilised_curvature(
     rate_of_strain(x, beta, d)
     _, f2, _ = energy_derivatives(b.s[0], b.s[1], b.s[2], b.one, b.two, b.three, b.spin, d)
     return f2 / (pressure * MASS)
+
+
+@kernel
+def _critical_kappa(b: Ellipsoid, stress: Array, p: float, beta: float) -> float:
+    """Plastic bulk modulus below which the body is unstable along its stress deviator; nan where none is."""
+    y = np.empty(5)
+    direction(stress, y)
+    y /= np.sqrt(np.sum(y * y))
+    d = np.empty(6)
+    rate_of_strain(y, beta, d)
+    _, f2, _ = energy_derivatives(b.s[0], b.s[1], b.s[2], b.one, b.two, b.three, b.spin, d)
+    g, _ = slope_of_flow(b, y)
+    return p + (f2 / MASS + beta * g * b.cohesion) / (beta * (g * b.sin - beta))
+
+
+@kernel
+def _stable(b: Ellipsoid, x: Array, p1: float, p: float, size: float, tolerance: float) -> bool:
+    """Whether the body is stable to infinitesimal perturbations.
+
+    ``P1/V`` is the largest, in the direction ``x[5]``; `p` and `size` are the pressure and the norm of the deviator.
+    """
+    g, _ = slope_of_flow(b, x)
+    if p1 < -tolerance:
+        return True
+    if size <= ON_YIELD * abs(p) and g * b.sin * p <= tolerance:
+        # neither deviator nor friction: a fluid, to be tested in every direction that keeps the volume
+        f = np.empty((6, 6))
+        curvature_form(b, f)
+        return trust_region(f[:5, :5].copy(), np.zeros(5), False, np.zeros(5)) > 0.0
+    if b.associative or b.kappa > 0.0 or b.sin <= 0.0:
+        _, p2, _ = powers(b, x)
+        return p1 <= tolerance and p2 < 0.0
+    return p1 <= tolerance and overload_rate(b, x) < 0.0
+
+
+@kernel
+def _finite_perturbations(
+    b: Ellipsoid, x: Array, marginal: bool, stable: bool, depth: int, row: Array, directions: Array
+) -> None:
+    """Critical energies and strains from the second order on, and their `directions`; see `classify`.
+
+    The body flows first along ``x[5]``; `marginal`: it is at yield.
+    """
+    xe, xs = x.copy(), np.empty(5)
+    seeds = np.zeros((3, 5))
+    if _certified(b):
+        row[ENERGY_2], row[STRAIN_2], most = least_second_order(b, xe, xs)
+        row[SOFTEST] = most / MASS
+        if marginal and not stable:
+            row[ENERGY_2] = row[STRAIN_2] = 0.0
+    else:
+        seeds[:] = x
+        row[ENERGY_2], _ = least(b, SECOND, ENERGY, seeds, DENSE, FOUR, 1e-6, depth > 4, xe)
+        row[STRAIN_2], _ = least(b, SECOND, STRAIN, seeds, DENSE, FOUR, 1e-6, depth > 4, xs)
+    directions[0], directions[1] = xe, xs
+    if stable and row[ENERGY_2] == np.inf:
+        row[LEVEL] = 3.0
+    if depth < 3:
+        return
+    seeds[0], seeds[1], seeds[2] = xe, xs, x
+    row[ENERGY_3], row[STRAIN_3] = least(b, THIRD, ENERGY, seeds, MEDIUM, THREE, 1e-4, depth > 4, xe)
+    directions[2] = xe
+    if depth > 4:
+        row[STRAIN_3], _ = least(b, THIRD, STRAIN, seeds, MEDIUM, THREE, 1e-4, depth > 4, xs)
+        directions[3] = xs
+    if depth < 4:
+        return
+    seeds[2] = xe
+    row[ENERGY_B], row[STRAIN_B] = least(
+        b, BARRIER, ENERGY, seeds, MEDIUM if depth > 4 else COARSE, THREE, 1e-3, depth > 4, xe
+    )
+    directions[4] = xe
 
 
 @kernel
@@ -200,9 +272,7 @@ def classify(
     directions[:] = np.nan
     scale = np.cbrt(s1 * s2 * s3)
     s = np.empty(3)
-    s[0] = s1 / scale
-    s[1] = s2 / scale
-    s[2] = s3 / scale
+    s[0], s[1], s[2] = s1 / scale, s2 / scale, s3 / scale
     stress = np.empty(6)
     rigid_stress(s[0], s[1], s[2], 1.0, 1.0, spin, np.zeros(6), stress)
     p, size, _ = invariants(stress)
@@ -219,71 +289,17 @@ def classify(
         for i in range(ENERGY_2, STRAIN_B + 1):
             row[i] = 0.0
         return
-    b = pile(s[0], s[1], s[2], spin, code, phi, flow_cohesion, dilatancy, kappa)
+    b = ellipsoid(s[0], s[1], s[2], spin, code, phi, flow_cohesion, dilatancy, kappa)
     x = np.empty(5)
-    push = first_to_flow(b, x)
-    _, p2, _ = powers(b, x)
-    f = np.empty((6, 6))
-    curvature_form(b, f)
-    y = np.zeros(5)
+    p1 = first_to_flow(b, x)
     g, beta = slope_of_flow(b, x)
-    k = g * b.sin
-    if 0.0 < beta < k and not b.associative and size > 0.0:
-        direction(stress, y)
-        y /= np.sqrt(np.sum(y * y))
-        d = np.empty(6)
-        rate_of_strain(y, beta, d)
-        _, f2, _ = energy_derivatives(b.s[0], b.s[1], b.s[2], b.one, b.two, b.three, b.spin, d)
-        g, _ = slope_of_flow(b, y)
-        k = g * b.sin
-        row[KAPPA] = p + (f2 / MASS + beta * g * b.cohesion) / (beta * (k - beta))
-    if push < -tolerance:
-        stable = True
-    elif size <= ON_YIELD * abs(p) and k * p <= tolerance:
-        # neither deviator nor friction: a fluid, to be tested in every direction that keeps the volume
-        stable = trust_region(f[:5, :5].copy(), np.zeros(5), False, y) > 0.0
-    elif b.associative or b.kappa > 0.0 or b.sin <= 0.0:
-        stable = push <= tolerance and p2 < 0.0
-    else:
-        stable = push <= tolerance and overload_rate(b, x) < 0.0
+    if 0.0 < beta < g * b.sin and not b.associative and size > 0.0:
+        row[KAPPA] = _critical_kappa(b, stress, p, beta)
+    stable = _stable(b, x, p1, p, size, tolerance)
     if stable:
         row[LEVEL] = 2.0
-    if depth < 2:
-        return
-    seeds = np.zeros((3, 5))
-    xs = np.empty(5)
-    if _certified(b):
-        xe = x.copy()
-        row[ENERGY_2], row[STRAIN_2], most = least_second_order(b, xe, xs)
-        row[SOFTEST] = most / MASS
-        if push >= -tolerance and not stable:
-            row[ENERGY_2] = row[STRAIN_2] = 0.0
-    else:
-        xe = x.copy()
-        seeds[:] = x
-        row[ENERGY_2], _ = least(b, SECOND, ENERGY, seeds, DENSE, FOUR, 1e-6, depth > 4, xe)
-        row[STRAIN_2], _ = least(b, SECOND, STRAIN, seeds, DENSE, FOUR, 1e-6, depth > 4, xs)
-    directions[0] = xe
-    directions[1] = xs
-    if stable and row[ENERGY_2] == np.inf:
-        row[LEVEL] = 3.0
-    if depth < 3:
-        return
-    seeds[0] = xe
-    seeds[1] = xs
-    seeds[2] = x
-    row[ENERGY_3], row[STRAIN_3] = least(b, THIRD, ENERGY, seeds, MEDIUM, THREE, 1e-4, depth > 4, xe)
-    directions[2] = xe
-    if depth > 4:
-        row[STRAIN_3], _ = least(b, THIRD, STRAIN, seeds, MEDIUM, THREE, 1e-4, depth > 4, xs)
-        directions[3] = xs
-    if depth < 4:
-        return
-    seeds[2] = xe
-    row[ENERGY_B], row[STRAIN_B] = least(
-        b, BARRIER, ENERGY, seeds, MEDIUM if depth > 4 else COARSE, THREE, 1e-3, depth > 4, xe
-    )
-    directions[4] = xe
+    if depth >= 2:
+        _finite_perturbations(b, x, p1 >= -tolerance, stable, depth, row, directions)
 
 
 @kernel

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flybystab.core.energy.perturbation import Pile, rate_of_strain, slope_of_flow
+from flybystab.core.energy.perturbation import Ellipsoid, rate_of_strain, slope_of_flow
 from flybystab.core.energy.potential import MASS, energy_derivatives
 from flybystab.core.numerics.jit import kernel
 from flybystab.typing import Array
@@ -93,7 +93,7 @@ def trust_region(a: Array, b: Array, ball: bool, x: Array) -> float:
 
 
 @kernel
-def curvature_form(b: Pile, f: Array) -> None:
+def curvature_form(b: Ellipsoid, f: Array) -> None:
     """Write the form ``f[6, 6]`` with ``Phi'' = X.f X`` for ``X = (x, tr D)``, by polarisation."""
     d = np.empty(6)
     x = np.zeros(6)
@@ -113,7 +113,7 @@ def curvature_form(b: Pile, f: Array) -> None:
 
 
 @kernel
-def least_second_order(b: Pile, x_energy: Array, x_strain: Array) -> tuple[float, float, float]:
+def least_second_order(b: Ellipsoid, x_energy: Array, x_strain: Array) -> tuple[float, float, float]:
     """Least critical energy and least critical strain at second order on a circular cone, and greatest ``P2``.
 
     Writes the directions that give them. Dinkelbach's iteration ``E <- P1^2/(2 P2)`` at the minimiser of

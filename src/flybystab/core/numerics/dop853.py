@@ -47,7 +47,7 @@ def stage_state(s: int, y: Array, n: int, h: float, k: Array, out: Array) -> Non
 
 @pasted_kernel
 def stage_state_6(s: int, y: Array, h: float, k: Array, out: Array) -> None:
-    """As `stage_state` for six numbers, with the sums in registers."""
+    """`stage_state` for six numbers (a position and a velocity), with the sums in registers."""
     w0 = w1 = w2 = w3 = w4 = w5 = 0.0
     for m in range(FROM[s], FROM[s + 1]):
         a = WEIGHT[m]
