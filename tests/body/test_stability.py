@@ -29,8 +29,8 @@ from flybystab.core.energy.direction_search import (
 from flybystab.core.energy.perturbation import (
     LONGEST,
     barrier,
+    ellipsoid,
     loss_at,
-    pile,
     powers,
     second_order,
     third_order,
@@ -45,7 +45,7 @@ STEADY = (0.0, 0.0, 0.7)
 
 
 def scene(axes, spin=STEADY, phi=30.0, dilatancy=1.0, code=0, cohesion=0.0, kappa=0.0):
-    return pile(*np.square(axes), np.array(spin), code, np.deg2rad(phi), cohesion, dilatancy, kappa)
+    return ellipsoid(*np.square(axes), np.array(spin), code, np.deg2rad(phi), cohesion, dilatancy, kappa)
 
 
 def directions(n, seed=0, ball=False):
@@ -142,7 +142,7 @@ def test_third_order_and_barrier_minima_beat_brute_force(case):
 def test_no_second_search_goes_below_the_minima(code, dilatancy):
     """SciPy's simplex from the best of many random directions; Mohr-Coulomb has its minima in sharp valleys."""
     given = (1.96, 0.7225, 0.5625), np.array([0.0, 0.0, 0.449]), code, np.deg2rad(40.0), 0.0, dilatancy, 0.0
-    b = pile(*given[0], *given[1:])
+    b = ellipsoid(*given[0], *given[1:])
     row, found = np.empty(columns.COLUMNS), np.empty((columns.DIRECTIONS, 5))
     classify(*given[0], *given[1:5], given[4], *given[5:], 5, row, found)
     samples = directions(2000, seed=7, ball=dilatancy == 1.0)

@@ -10,7 +10,7 @@ from flybystab.body.stability import stability
 from flybystab.body.surface_slope import surface_slopes
 from flybystab.core.ellipsoid.tide import tensor
 from flybystab.core.energy.newmark import forces_at, slide
-from flybystab.core.energy.perturbation import loss_at, path_along, pile, powers
+from flybystab.core.energy.perturbation import ellipsoid, loss_at, path_along, powers
 from flybystab.errors import InvalidInput
 from flybystab.flybys.flyby import flyby
 from flybystab.flybys.margin import flyby_margin
@@ -48,7 +48,9 @@ def test_course_turns_with_its_spin_and_carries_the_tide_along():
 
 def free_scene(friction, dilatancy=0.0):
     """An ellipsoid at rest in its own units, and the direction that stretches its long axis."""
-    scene = pile(1.96, 1.0, 0.81, np.array([0.0, 0.0, 0.4]), 0, np.deg2rad(friction), 0.0, dilatancy, 0.0)
+    scene = ellipsoid(
+        1.96, 1.0, 0.81, np.array([0.0, 0.0, 0.4]), 0, np.deg2rad(friction), 0.0, dilatancy, 0.0
+    )
     x = np.zeros(5)
     x[0], x[1] = np.sqrt(0.75), 0.5
     return scene, x

@@ -21,7 +21,7 @@ from flybystab.body.stability import unit_deviator
 from flybystab.constants import G
 from flybystab.core.dynamics.run import Run, integrate
 from flybystab.core.ellipsoid.tide import components, no_tide, tensor
-from flybystab.core.energy.perturbation import EDGE, pile, rate_of_strain, slope_of_flow
+from flybystab.core.energy.perturbation import LARGEST_AXIS_RATIO, ellipsoid, rate_of_strain, slope_of_flow
 from flybystab.core.energy.perturbation import direction as strain_direction
 from flybystab.core.energy.potential import velocity_gradient
 from flybystab.errors import InvalidInput, NotConverged
@@ -340,7 +340,7 @@ def _push(body: Body, direction: Any, energy: float, dilatancy: float, tolerance
     m = body.material
     squares = body.axes**2
     arguments: Any = (*squares, np.zeros(3), m.surface_code, m.phi, 0.0, dilatancy, 0.0)
-    scene = pile(*arguments)
+    scene = ellipsoid(*arguments)
     x = np.empty(5)
     strain_direction(components(d), x)
     _, beta = slope_of_flow(scene, x)  # tr D of the flow rule at |D'| = 1
@@ -348,7 +348,7 @@ def _push(body: Body, direction: Any, energy: float, dilatancy: float, tolerance
     velocity_gradient(squares[0], squares[1], squares[2], components(d + beta / 3.0 * np.eye(3)), gradient)
     # K = tr(L I L^T)/2 with I = (m/5) S
     unit = body.mass.value / 10.0 * float(np.trace(gradient @ np.diag(squares) @ gradient.T))
-    limit = max(EDGE, 1.001 * body.axes[0] / body.axes[2])
+    limit = max(LARGEST_AXIS_RATIO, 1.001 * body.axes[0] / body.axes[2])
     return integrate(
         body.axes,
         body.rho,

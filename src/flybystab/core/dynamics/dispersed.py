@@ -1,4 +1,4 @@
-"""Motion without friction: dispersed grains, and the fluid closures."""
+"""Motion without friction: dispersed grains, and fluids."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ from flybystab.typing import Array
 
 
 class Ends(NamedTuple):
-    """Where motion without friction ends: contact of dispersed grains, and the limit of the model."""
+    """Ends of motion without friction: contact of dispersed grains, and the limit of the model."""
 
     regime: int
     contact: float  # squared volume at which dispersed grains touch

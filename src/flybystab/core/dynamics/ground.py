@@ -4,8 +4,8 @@ A body with the shape tensor ``S`` extends ``h = sqrt(n.S.n)`` from its centre t
 to it: the support function of the ellipsoid. It touches once its centre is no higher than ``h``. The tangent plane
 stands for the sphere of the planet, of radius R: ``h`` is too large by at most ``a1^2/(2 R)``, 8 cm for 1 km at Earth.
 
-The centre is that low for seconds only, far shorter than a step of the dynamics. So the part of a step in which it is
-lower than the body is large is cut out first, and searched by itself.
+The centre is that low for a few seconds, far less than a step of the dynamics. So the part of a step in which the
+centre is lower than the longest semi-axis is found first, and only that part is searched.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from flybystab.core.numerics.jit import kernel
 from flybystab.typing import Array
 
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
-#: Samples a radian that the body turns or deforms, and at least.
+#: Samples per radian of rotation or unit of strain, and their least and largest number.
 _DENSE, _LEAST, _MOST = 16, 8, 4000
 
 
@@ -173,7 +173,7 @@ def contact_time(step: Step, ground: Ground, ws: Workspace) -> float:
         after = _gap(at, step, ground, ws, n)
         if after <= 0.0:
             return _root(at - spacing, at, step, ground, ws, n)
-        # a dip between the samples, at the ends of the part also beside one
+        # a minimum between two samples, or next to the end of the part
         if (f <= before and f <= after) or (j == count and after < f):
             low, value = _dip(max(a, at - 2.0 * spacing), at, step, ground, ws, n)
             if value <= 0.0:

@@ -16,8 +16,8 @@ DISPERSED  the volume is back at its value at the loss of contact        inelast
 
 A body that reaches the ground (:mod:`flybystab.core.dynamics.ground`) ends the run in any regime.
 
-Every end is a root on the dense output, and the step is then repeated up to the root. `D_REST`, the rate of
-strain at which flow starts and ends, is 1e-10 of the dynamical rate: its share of any result is of that size.
+Every end is located as a root on the dense output, and the step is then repeated up to the root. `D_REST`, the rate of
+strain at which flow starts and ends, is 1e-10 of the dynamical rate; its effect on any result is of that size.
 """
 
 from __future__ import annotations

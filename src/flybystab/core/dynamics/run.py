@@ -1,7 +1,7 @@
 """One run of the dynamics: SI floats and arrays in, SI arrays out.
 
 The kernels of :mod:`flybystab.core.dynamics.regimes` work in the units of the body (see
-:mod:`flybystab.core.dynamics.state`); this is the only place where the two systems meet.
+:mod:`flybystab.core.dynamics.state`); all conversions between the two systems of units are made here.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What a passage has left of a body: axes, spin, and the gravitationally bound share (theory, section 7)."""
+"""Axes, spin and gravitationally bound mass of a body after an encounter (theory, section 7)."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _SINES = np.sin((np.arange(_HALF_LONGITUDES) + 0.5) * 2.0 * np.pi / _HALF_LONGIT
 #: The iteration ends where a pass removes less than this share of the mass, or after that many passes.
 CONVERGED = 1e-7
 PASSES = 500
-#: Below this share nothing is left.
+#: Below this fraction the body counts as lost.
 NOTHING = 1e-3
 
 
@@ -91,7 +91,7 @@ def angle_between(a: Array, b: Array) -> float:
 
 @kernel
 def one_pass_share(shape: Array, gradient: Array, rho: float) -> float:
-    """Share of the mass bound in the potential of the whole ellipsoid, with velocity ``L x``: an upper bound.
+    """Fraction of the mass bound in the potential of the whole ellipsoid, with velocity ``L x``: an upper bound.
 
     See :func:`flybystab.flybys.verdict.bound_fraction_upper`.
 
@@ -145,12 +145,12 @@ def one_pass_share(shape: Array, gradient: Array, rho: float) -> float:
 
 @kernel
 def bound_share(shape: Array, gradient: Array, rho: float) -> float:
-    """Share of the mass bound to what stays bound, for a homogeneous ellipsoid with velocity ``L x``.
+    """Fraction of the mass that stays bound, for a homogeneous ellipsoid with velocity ``L x``.
 
-    What is unbound in the potential of the whole is removed, the potential computed for the remainder, and so on until
-    nothing more leaves. The remainder is at each pass the part of the ellipsoid in which one quadratic form is below a
-    constant; its potential is that of the homogeneous ellipsoid with its mass and its second moments. Arguments as of
-    `one_pass_share`, which is the first pass.
+    The part that is unbound in the potential of the whole ellipsoid is removed, the potential is computed for the
+    remainder, and so on until nothing more is unbound. The remainder is at each pass the part of the ellipsoid in which
+    one quadratic form is below a constant; its potential is that of the homogeneous ellipsoid with its mass and its
+    second moments. Arguments as of `one_pass_share`, which is the first pass.
     """
     first = one_pass_share(shape, gradient, rho)
     if first >= 1.0:

@@ -1,4 +1,4 @@
-"""Stress of a rigidly turning ellipsoid, and how much of a load a granular material bears.
+"""Stress of a rigidly rotating ellipsoid, and the loads that a granular material can bear.
 
 The volume-averaged stress that rigidity needs is ``sigma V = (K - Omegadot - Omega^2) I`` with ``K`` the
 sum of self-gravity ``-2 pi G rho A`` and any tide. It is symmetric once ``Omegadot`` obeys Euler's equations;

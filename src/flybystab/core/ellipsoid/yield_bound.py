@@ -1,4 +1,4 @@
-"""Bound on the friction that a passage can mobilise, whatever the attitude.
+"""Bound on the friction that an encounter can mobilise, for any attitude.
 
 In principal axes the stress of the rigid body is ``T = 5 sigma/rho = H o (K_g + K_t + w^2 1 - w w)``, the
 entries of ``H`` being ``2 S_i S_j/(S_i + S_j)``, none above ``S_1``
@@ -145,7 +145,7 @@ def quick_margins(
     friction: Array,
     verdict: NDArray[np.int64],
 ) -> None:
-    """Judge many bodies in one tide.
+    """Bounds and verdicts for many bodies in one tide.
 
     Parameters
     ----------

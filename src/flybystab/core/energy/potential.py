@@ -13,8 +13,8 @@ at fixed angular momentum ``H`` (theory, section 5). A rate of strain ``D`` in t
 
 Units of this module: mean radius ``(a1 a2 a3)^(1/3)``, density and ``pi G rho`` of the undeformed body are one:
 mass ``M = 4 pi/3``, ``G = 1/pi``, energies in ``pi G rho^2 a^5``, stresses in ``pi G rho^2 a^2``, ``H`` in
-``rho a^5 sqrt(pi G rho)``. ``H`` keeps its components: a push is fast next to the precession that it starts
-(for steady spin this makes no difference to the first two derivatives).
+``rho a^5 sqrt(pi G rho)``. ``H`` keeps its components: a perturbation is fast compared with the precession that it
+starts (for steady spin this makes no difference to the first two derivatives).
 
 The six components of ``D`` are ``xx, yy, zz, xy, xz, yz``.
 """

@@ -1,4 +1,4 @@
-"""The stability of one granular ellipsoid, and of many, as one row of numbers each.
+"""Stability of granular ellipsoids: one row of results for each.
 
 Columns are named by the constants below. Units as in :mod:`flybystab.core.energy.potential`.
 """

@@ -1,4 +1,4 @@
-"""Clumps of grains: which touch or nearly so, what is bound to them, their shape and spin."""
+"""Clumps of grains in contact or close to it: their bound neighbours, shape and spin."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ def friends_of_friends(g: Grains, link: float, label: NDArray[np.int64]) -> int:
 
 
 def bound_clumps(g: Grains, label: NDArray[np.int64], largest: int) -> NDArray[np.bool_]:
-    """Which clumps are bound to the largest, it included; shape (clumps,).
+    """Whether each clump is bound to the largest one (True for that itself); shape (clumps,).
 
     A clump, or a loose grain, is bound if its centre of mass has a negative energy as a two-body problem with the bound
     ones together, whose potential is that of their grains. Repeated until no more join. Its own rotation keeps a clump

@@ -1,4 +1,4 @@
-"""A pile in motion: the arrays of the kernels together, and what they need between calls."""
+"""The simulation of a pile of grains: the arrays of the kernels and their state between calls."""
 
 from __future__ import annotations
 
@@ -101,7 +101,7 @@ class Simulation:
         self.time += steps * self.dt
 
     def rotate(self, matrix: Array) -> None:
-        """Turn everything, history included, about the origin."""
+        """Rotate positions, velocities and contact history about the origin."""
         for a in (self.grains.x, self.grains.v, self.grains.w, self.u, self.s):
             a[:] = a @ matrix.T
         spring = self.pairs.spring
@@ -117,7 +117,7 @@ class Simulation:
         self.s[:] += spin
 
     def centre(self) -> None:
-        """Put centre of mass and momentum to zero."""
+        """Move the centre of mass to the origin and remove the total momentum."""
         m = self.grains.mass / self.grains.mass.sum()
         self.grains.x[:] -= m @ self.grains.x
         for a in (self.grains.v, self.u):

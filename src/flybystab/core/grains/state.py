@@ -1,4 +1,4 @@
-"""Grains and contact parameters as the kernels take them.
+"""Grains and contact parameters, as passed to the kernels.
 
 Units are scaled: the gravitational constant, the mass of the pile and its volume-equivalent radius
 ``R = (a1 a2 a3)^(1/3)`` are one, so that the unit of time is ``sqrt(R^3/(G M)) = (4/3 pi G rho)^(-1/2)``. A pile

@@ -1,4 +1,4 @@
-"""Flow rule of the material: stress and dilation that belong to a rate of strain (theory, section 3).
+"""Flow rule of the material: stress and dilation as functions of the rate of strain (theory, section 3).
 
 The stress deviator over ``p sin(phi) + c cos(phi)`` is an isotropic function of the direction ``u`` of ``D'``,
 ``N = a u + b (u^2 - 1/3)``; the dilation ``tr D`` is proportional to ``|D'|``, or to the support function of the yield

@@ -1,4 +1,4 @@
-"""Associative flow on the hexagon of Mohr-Coulomb: its stress lies on a face or at a corner."""
+"""Associative flow on the Mohr-Coulomb hexagon, where the stress lies on a face or at a corner."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def on_hexagon(material: MaterialParameters) -> bool:
 def part_of_flow(
     beyond: float, place: float, near: float, material: MaterialParameters
 ) -> MaterialParameters:
-    """The material with the stress on the part of the hexagon that belongs to a flow.
+    """The material with the stress on the part of the hexagon (face or corner) where the flow rule puts it.
 
     Parameters
     ----------

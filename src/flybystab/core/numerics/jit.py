@@ -42,10 +42,10 @@ kernel = njit(cache=CACHE, nogil=True, error_model="numpy")
 uncached_kernel = njit(nogil=True, error_model="numpy")
 _SUMS: Any = {"fastmath": {"reassoc", "contract", "nsz"}}
 summing_kernel = njit(cache=CACHE, nogil=True, error_model="numpy", **_SUMS)
-# Handing over a tuple of arrays costs more than the few sums inside.
+# Passing a tuple of arrays to a function costs more than the few sums inside it.
 pasted_kernel = njit(cache=CACHE, nogil=True, error_model="numpy", inline="always", **_SUMS)
 
-#: A kernel that becomes part of its callers: those that only pass large ones on would compile them once more.
+#: A kernel that becomes part of its callers, so that large kernels which it calls are not compiled once more for it.
 inlined = njit(cache=CACHE, nogil=True, error_model="numpy", inline="always")
 
 
@@ -64,6 +64,6 @@ def _borrowed(context, array):  # type: ignore[no-untyped-def]
 
 
 #: Inside a kernel: the same array without its reference count. Counting costs an atomic instruction at each use,
-#: which in a loop over bodies is most of the time. Only an argument may be borrowed, as its caller keeps it alive: a
-#: local is freed after its last use, and the next array would lie in its place.
+#: which is most of the time of a loop over bodies. Only an argument may be borrowed, as its caller keeps it alive: a
+#: local array is freed after its last use, and its memory is given to the next one.
 borrowed: Any = (lambda array: array) if getattr(config, "DISABLE_JIT", 0) else intrinsic(_borrowed)

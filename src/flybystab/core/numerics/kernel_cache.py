@@ -1,8 +1,9 @@
 """When a compiled kernel on disk is out of date.
 
 numba keeps a kernel until the file that defines it changes. A kernel also contains the kernels that it calls, with
-their constants, from other files: after an update of the package it could answer with the code of before. Here the
-age of a kernel of this package is the digest of all files that it can be made from.
+their constants, from other files: after an update of the package it could run code of the previous version. Here the
+stamp of a kernel of this package is the digest of all files from which it is compiled. An index of kernels that names
+a class which the updated package no longer has is out of date too.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from numba.core.caching import FunctionCache
+from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 #: The directory of the package, and its name.
 ROOT = Path(__file__).resolve().parents[2]
@@ -24,7 +25,7 @@ _IMPORT = re.compile(
 
 
 def _file(module: str) -> Path | None:
-    """Source of a module of this package; None for a name that is none."""
+    """Source file of a module of this package; None where the name is not a module."""
     place = ROOT.joinpath(*module.split(".")[1:])
     return next((p for p in (place.with_suffix(".py"), place / "__init__.py") if p.is_file()), None)
 
@@ -61,7 +62,7 @@ def stamp(file: Path) -> str:
 
 
 def _stamped(locator: Any) -> Any:
-    """The same place for the cache, for files of this package only, with their `stamp`."""
+    """A locator with the same directories, for files of this package only, whose stamp is `stamp`."""
 
     class Stamped(locator):
         @classmethod
@@ -81,8 +82,22 @@ def _stamped(locator: Any) -> Any:
     return Stamped
 
 
+def _load_index(cache_file: Any) -> dict[Any, Any]:
+    """The kernels in an index file; none where an index of this package names a class that no longer exists."""
+    try:
+        return _load(cache_file)
+    except (AttributeError, ImportError):
+        if isinstance(cache_file._source_stamp, str):  # a `stamp`; numba's own are tuples
+            return {}
+        raise
+
+
+_load: Any = IndexDataCacheFile._load_index
+
+
 def watch() -> None:
-    """Let numba ask for the `stamp` of every kernel of this package; others are not concerned."""
+    """Make numba use the `stamp` for every kernel of this package; kernels of other packages are unaffected."""
     locators: list[Any] = FunctionCache._impl_class._locator_classes
     if not any(c.__name__.startswith("Stamped") for c in locators):
         locators[:0] = [_stamped(c) for c in locators]
+        IndexDataCacheFile._load_index = _load_index
