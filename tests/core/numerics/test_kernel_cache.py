@@ -70,3 +70,29 @@ def test_a_changed_callee_is_seen(tmp_path):
     assert run() == ["21.0", "1"]
     (package / "values.py").write_text("FACTOR = 3.0\n")
     assert run() == ["31.0", "0"]
+
+
+def test_an_index_that_names_a_class_no_longer_there_is_out_of_date(tmp_path):
+    """The signature of a kernel on disk holds the classes of its arguments; an update may have renamed one."""
+    package = tmp_path / "flybystab"
+    (package / "core" / "numerics").mkdir(parents=True)
+    for name in ("core/numerics/kernel_cache.py", "core/numerics/jit.py"):
+        (package / name).write_bytes((ROOT / name).read_bytes())
+    for name in ("__init__.py", "core/__init__.py", "core/numerics/__init__.py"):
+        (package / name).touch()
+    source = (
+        "from typing import NamedTuple\nfrom flybystab.core.numerics.jit import kernel\n\n"
+        "class Pair(NamedTuple):\n    a: float\n    b: float\n\n"
+        "@kernel\ndef total(p):\n    return p.a + p.b\n\nVALUE = total(Pair(1.0, 2.0))\n"
+    )
+    for text in (source, source.replace("Pair", "Couple")):
+        (package / "sums.py").write_text(text)
+        done = subprocess.run(
+            [sys.executable, "-c", "from flybystab.sums import VALUE; print(VALUE)"],
+            capture_output=True,
+            text=True,
+            cwd=tmp_path,
+            env=COMPILED,
+        )
+        assert done.returncode == 0, done.stderr
+        assert done.stdout.strip() == "3.0"

@@ -92,7 +92,8 @@ def _load_index(cache_file: Any) -> dict[Any, Any]:
         raise
 
 
-_load: Any = IndexDataCacheFile._load_index
+_index: Any = IndexDataCacheFile
+_load = _index._load_index
 
 
 def watch() -> None:
@@ -100,4 +101,4 @@ def watch() -> None:
     locators: list[Any] = FunctionCache._impl_class._locator_classes
     if not any(c.__name__.startswith("Stamped") for c in locators):
         locators[:0] = [_stamped(c) for c in locators]
-        IndexDataCacheFile._load_index = _load_index
+        _index._load_index = _load_index
