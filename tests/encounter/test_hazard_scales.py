@@ -28,21 +28,39 @@ def test_energy():
 @pytest.mark.parametrize(
     ("chance", "energy", "years", "palermo", "torino"),
     [
-        (0.031, 7.8, 7.86, -0.18, 3),  # 2024 YR4 on 2025-02-18, Sentry
-        (0.027, 1480.0, 24.3, 1.10, 4),  # Apophis on 2004-12-27, Sentry
-        (
-            3.7e-4,
-            1420.0,
-            161.0,
-            -1.59,
-            None,
-        ),  # Bennu 2182 (Farnocchia et al. 2021); beyond the century of Torino
+        # Sentry on 2006-02-23: 2004 VD17 in 2102, 2.7e11 kg at 21.4 km/s, -0.40 and 2, the second ever above 1
+        (5.4e-4, 1.48e4, 96.2, -0.40, 2),
+        # Sentry on 2006-10-19: Apophis in 2036, -2.52 and 0 (it had been 1 until August)
+        (2.2e-5, 400.0, 29.5, -2.52, 0),
+        # Sentry on 2004-12-27: Apophis in 2029, 1 in 37 against a background of 1 in 472, 1.10 and 4
+        (0.027, 1480.0, 24.3, 1.10, 4),
+        # Sentry on 2025-02-18: 2024 YR4 in 2032, 3.1 %, 3
+        (0.031, 7.8, 7.86, -0.18, 3),
+        # Bennu in 2182 (0.037 %: Farnocchia et al. 2021); beyond the century of Torino
+        (3.7e-4, 1420.0, 161.0, -1.59, None),
     ],
 )
 def test_published_values(chance, energy, years, palermo, torino):
     assert palermo_scale(chance, energy * MT, years * u.yr) == pytest.approx(palermo, abs=0.05)
     if torino is not None:
         assert torino_scale(chance, energy * MT) == torino
+
+
+def test_the_background_published_for_apophis():
+    """1 in 472 until April 2029 (December 2004): the ratio to 1 in 37 is the 12.6 of its Palermo value of 1.10."""
+    assert palermo_scale(1 / 472, 1480 * MT, 24.3 * u.yr) == pytest.approx(0.0, abs=0.005)
+    assert 472 / 37 == pytest.approx(10**1.10, rel=0.02)
+
+
+def test_torino_of_2024_yr4_as_its_probability_fell():
+    """3 at 3.1 %, 1 at 0.28 % (2025-02-20), 0 at 0.005 % (2025-02-24)."""
+    assert [torino_scale(p, 7.8 * MT) for p in (0.031, 0.0028, 5e-5)] == [3, 1, 0]
+
+
+def test_energy_of_2004_vd17():
+    """2.7e11 kg (Sentry, 2006-02-23) and 15 Gt, as reported then."""
+    energy = impact_energy(2.7e11 * u.kg, 21.4 * u.km / u.s)
+    assert energy.to_value(u.J) / MEGATON == pytest.approx(15e3, rel=0.05)
 
 
 @pytest.mark.parametrize(

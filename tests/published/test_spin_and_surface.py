@@ -57,7 +57,8 @@ def test_periods_of_toutatis():
     """5.38 +- 0.03 d about the long axis and 7.40 +- 0.03 d of precession (Zhao et al. 2015, from Chang'e-2).
 
     From the inertia ratios 3.0836 and 3.235 and the angular velocity of 1992-11-09 (98.71, 14.51, 33.53 deg/d along
-    the long, middle and short axis) of Takahashi et al. (2013, AJ 146, 95). The model gives 5.368 and 7.412 d.
+    the long, middle and short axis) of Takahashi et al. (2013, AJ 146, 95). The model gives 5.368 and 7.412 d. The
+    lightcurve gives 5.38 +- 0.5 and 7.41 +- 0.4 d (Mueller et al. 2000).
     """
     moments = np.array([1.0, 3.0836, 3.235])
     omega = np.deg2rad([98.71, 14.51, 33.53])
@@ -66,6 +67,19 @@ def test_periods_of_toutatis():
     assert moments[0] < j < moments[1]  # long-axis mode
     assert free_spin(moments, momentum, j, np.zeros(1))[1] == pytest.approx(5.38, abs=0.03)
     assert precession_period(moments, momentum, j) == pytest.approx(7.40, abs=0.03)
+
+
+def test_toutatis_from_its_periods():
+    """The inverse: angular momentum from 5.41 and 7.35 d (Hudson & Ostro 1995) and ratios 3.09, 3.22 (Ostro et al. 1999).
+
+    It agrees to 2 % with that of the angular velocity and inertia ratios of Takahashi et al. (2013).
+    """
+    moments = np.array([1.0, 3.09, 3.22])
+    momentum, j = tumbling_state(moments, 7.35, 5.41, "LAM")
+    assert moments[0] < j < moments[1]
+    assert precession_period(moments, momentum, j) == pytest.approx(7.35, rel=1e-6)
+    other = np.array([1.0, 3.0836, 3.235]) * np.deg2rad([98.71, 14.51, 33.53])
+    assert momentum == pytest.approx(np.linalg.norm(other), rel=0.02)
 
 
 @pytest.mark.parametrize("period", [3.0, 3.5, 3.8])
