@@ -70,7 +70,7 @@ def test_periods_of_toutatis():
 
 
 def test_toutatis_from_its_periods():
-    """The inverse: angular momentum from 5.41 and 7.35 d (Hudson & Ostro 1995) and ratios 3.09, 3.22 (Ostro et al. 1999).
+    """The angular momentum from 5.41 and 7.35 d (Hudson & Ostro 1995) and ratios 3.09, 3.22 (Ostro et al. 1999).
 
     It agrees to 2 % with that of the angular velocity and inertia ratios of Takahashi et al. (2013).
     """
