@@ -9,7 +9,7 @@ from scipy.optimize import minimize
 from flybystab.body.body import YIELD_SURFACES, Body, Material
 from flybystab.body.equilibrium import equilibrium, spin_limits
 from flybystab.body.fluids import maclaurin
-from flybystab.body.recovery import pushed
+from flybystab.body.recovery import pushed, recovery_energy
 from flybystab.body.stability import body_units, push, stability
 from flybystab.body.stability_regions import stability_many
 from flybystab.constants import G
@@ -408,6 +408,35 @@ def test_stability_at_yield_is_that_of_the_dynamics_over_the_plane(surface):
         assert s.stable_infinitesimal != flows_on
         seen.add(flows_on)
     assert False in seen
+
+
+@pytest.mark.parametrize("surface", YIELD_SURFACES)
+@pytest.mark.parametrize(("axes", "w2"), [((1, 0.8, 0.7), 0.7), ((1, 1, 0.6), 0.8)])
+def test_barrier_over_the_plane_of_dilatancy_and_friction(axes, w2, surface):
+    """From 2 % above the required friction on: the barrier grows with it, and is right to a factor of two.
+
+    Below associative flow the pressure of a body near yield may fall when it begins to flow, so that friction does
+    not stop a perturbation whose direction is held. In the dynamics the direction turns and the body comes to rest:
+    the barrier is not zero.
+    """
+    base = body(axes, w2, yield_surface=surface)
+    required = equilibrium(base).required_friction_angle
+    for dilatancy in (0.0, 0.3, 0.6, 0.9):
+        barriers = []
+        for factor in (1.02, 1.1, 1.3):
+            b = base.with_(material=base.material.with_(friction_angle=factor * required))
+            s = stability(b, dilatancy=dilatancy)
+            assert s.stable_infinitesimal
+            small = pushed(b, np.diag([1, -0.5, -0.5]), 1e-6 * s.binding_energy, dilatancy=dilatancy)
+            assert small.recovered
+            assert small.strain < 0.01
+            barriers.append((s.critical_energy.barrier / s.binding_energy).value)
+            series = [e.value for e in s.critical_energy[:2]]
+            assert all(np.isnan(e) or e > 0.0 for e in series)
+            assert np.isnan(series).any() == np.isnan(s.critical_strain[:2]).any()
+        assert 0.02 < barriers[0] < barriers[1] < barriers[2]
+        found = recovery_energy(b, s.directions.barrier, dilatancy=dilatancy, precision=0.05)
+        assert 0.7 < found / s.critical_energy.barrier < 2.0
 
 
 def test_brittle_cohesion_is_lost_in_flow():

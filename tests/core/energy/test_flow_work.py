@@ -20,7 +20,6 @@ from flybystab.core.energy.potential import MASS, velocity_gradient
 
 SLOW = np.bool_(True)
 PILE = np.array([1400.0, 850.0, 750.0]) / np.cbrt(1400.0 * 850.0 * 750.0)
-G_ONE = 1.0 / np.pi  # density and pi G rho of one
 DIRECTIONS = {
     "extends a1": [1.0, -0.5, -0.5, 0, 0, 0],
     "compresses a1": [-1.0, 0.5, 0.5, 0, 0, 0],
@@ -44,37 +43,36 @@ def kinetic_energy(shape, gradient):
     return MASS / 10.0 * np.trace(l @ s @ l.T)
 
 
-@pytest.mark.parametrize("direction", DIRECTIONS.values(), ids=DIRECTIONS.keys())
-@pytest.mark.parametrize("dilatancy", [0.0, 0.3, 0.6, 1.0])
-@pytest.mark.parametrize("code", range(4))
-def test_first_power_is_that_of_the_dynamics_of_a_small_perturbation(code, dilatancy, direction):
-    """The pile of the README at 35 deg: initial loss of kinetic energy in the full integrator, to 1e-3."""
-    rate = np.sqrt(np.pi * 6.6743e-11 * 2000.0)
-    spin = np.array([0.0, 0.0, 2 * np.pi / (6 * 3600.0) / rate])
-    phi = np.deg2rad(35.0)
-    b = ellipsoid(*PILE**2, spin, code, phi, 0.0, dilatancy, 0.0)
-    x = components_of(direction)
+DENSITY = 1.0 / (np.pi * 6.6743e-11)  # of the integrator: pi G rho is one
+
+
+def initial_powers(axes, spin, phi, cohesion, dilatancy, code, x, share, longest=np.inf):
+    """``P1`` of a direction, and the initial rate at which the integrator loses kinetic energy, per rate of strain.
+
+    The perturbation is followed for a `share` of the time to rest, `longest` at most.
+    """
+    squares = np.square(axes)
+    b = ellipsoid(*squares, spin, code, phi, cohesion, dilatancy, 0.0)
     _, trace = slope_of_flow(b, x)
     d, gradient = np.empty(6), np.empty((3, 3))
     rate_of_strain(x, trace, d)
-    velocity_gradient(*PILE**2, d, gradient)
+    velocity_gradient(*squares, d, gradient)
     size = 1e-4
-    start = kinetic_energy(np.diag(PILE**2), size * gradient)
+    start = kinetic_energy(np.diag(squares), size * gradient)
     p1 = powers(b, x)[0]
-    time = 0.02 * 2.0 * start / (size * -p1)  # a fiftieth of the time to rest
-    # units of the kernels: with this density pi G rho is one
-    density = 1.0 / (np.pi * 6.6743e-11)
+    time = min(share * 2.0 * start / (size * abs(p1)), longest)
     losses = []
     for t in (time, time / 2):
         run = integrate(
-            PILE,
-            density,
+            axes,
+            DENSITY,
             spin,
             np.eye(3),
             0.0,
             t,
             no_tide(),
             phi=phi,
+            cohesion=cohesion * DENSITY,
             dilatancy=dilatancy,
             surface=code,
             tolerance=1e-11,
@@ -82,7 +80,44 @@ def test_first_power_is_that_of_the_dynamics_of_a_small_perturbation(code, dilat
         )
         losses.append((kinetic_energy(run.shape, run.velocity_gradient) - start) / (size * t))
     # the rate falls linearly with |D|: extrapolated to the start
-    assert 2 * losses[1] - losses[0] == pytest.approx(p1, rel=1e-3)
+    return p1, 2 * losses[1] - losses[0]
+
+
+@pytest.mark.parametrize("direction", DIRECTIONS.values(), ids=DIRECTIONS.keys())
+@pytest.mark.parametrize("dilatancy", [0.0, 0.3, 0.6, 1.0])
+@pytest.mark.parametrize("code", range(4))
+def test_first_power_is_that_of_the_dynamics_of_a_small_perturbation(code, dilatancy, direction):
+    """The pile of the README at 35 deg: initial loss of kinetic energy in the full integrator, to 1e-3."""
+    rate = np.sqrt(np.pi * 6.6743e-11 * 2000.0)
+    spin = np.array([0.0, 0.0, 2 * np.pi / (6 * 3600.0) / rate])
+    x = components_of(direction)
+    p1, found = initial_powers(PILE, spin, np.deg2rad(35.0), 0.0, dilatancy, code, x, 0.02)
+    assert p1 < 0.0
+    assert found == pytest.approx(p1, rel=1e-3)
+
+
+@pytest.mark.parametrize("dilatancy", [0.0, 0.3, 0.6, 0.9, 1.0])
+@pytest.mark.parametrize("code", range(4))
+def test_first_power_of_random_bodies(code, dilatancy):
+    """Random shapes, friction angles and directions; spinning or tumbling, with and without cohesion."""
+    rng = np.random.default_rng(0)
+    for case in range(6):
+        axes = -np.sort(-rng.uniform(0.3, 1.0, 3))
+        spin = rng.normal(size=3) * 0.3 if case % 2 else np.array([0.0, 0.0, rng.uniform(0.0, 0.8)])
+        phi, cohesion = np.deg2rad(rng.uniform(15, 45)), 0.05 * (case % 3)
+        x = rng.standard_normal(5)
+        p1, found = initial_powers(
+            axes / np.cbrt(np.prod(axes)),
+            spin,
+            phi,
+            cohesion,
+            dilatancy,
+            code,
+            x / np.linalg.norm(x),
+            5e-3,
+            2.5e-4,
+        )
+        assert found == pytest.approx(p1, rel=1e-3)
 
 
 def test_the_dilation_is_that_of_the_dynamics():

@@ -24,7 +24,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flybystab.core.ellipsoid.potential import index_symbols
-from flybystab.core.ellipsoid.rigid_stress import rigid_stress
+from flybystab.core.ellipsoid.rigid_stress import overload, rigid_stress
 from flybystab.core.energy.flow_work import (
     FADE_BEGINS,
     Flow,
@@ -432,41 +432,79 @@ def _strain_at_maximum(
 
 
 @kernel
+def overload_at(b: Ellipsoid, path: Path, t: float) -> float:
+    """Overload of the body at rest, with its angular momentum, at strain `t` of a path."""
+    state_at(b, path, t)
+    volume = volume_at(path.flow.trace, t)
+    spin = np.empty(3)
+    for k in range(3):
+        spin[k] = np.sum(path.axes.vectors[:, k] * path.axes.spin)
+    q = path.axes.squares
+    stress = np.empty(6)
+    rigid_stress(q[0], q[1], q[2], 1.0 / volume, 1.0 / volume, spin, np.zeros(6), stress)
+    phi = np.arcsin(b.sin)
+    return overload(b.code, phi, b.cohesion / np.cos(phi), stress)
+
+
+@kernel
+def _flows_on(b: Ellipsoid, path: Path, t0: float, t1: float, y0: float, y1: float) -> bool:
+    """Whether the body at rest is overloaded where slow flow gains energy between two strains; `y` its loss there."""
+    tolerance = 1e-9 * max(abs(b.pressure), b.cohesion)
+    if y1 <= 0.0:
+        return overload_at(b, path, t1) > tolerance
+    end = t0 + (t1 - t0) * y0 / (y0 - y1)
+    return overload_at(b, path, 0.5 * (t0 + end)) > tolerance or overload_at(b, path, end) > tolerance
+
+
+@kernel
 def barrier(b: Ellipsoid, x: Array, longest: float, enough: float) -> tuple[float, float]:
-    """Energy needed to reach the strain at which slow flow ceases to lose energy, along ``F = exp(L t)``; that strain.
+    """Energy needed to pass, along ``F = exp(L t)``, the strain from which slow flow goes on by itself; that strain.
 
-    Up to the inertia of the flow (see `_work`) it is the first maximum of ``Phi(t) - Phi(0) + int V sigma*:D dt``: the
-    first zero of its exact slope, bracketed by steps of :data:`STEP`.
+    Up to the inertia of the flow (see `_work`) it is a maximum of ``Phi(t) - Phi(0) + int V sigma*:D dt``, a zero of
+    its exact slope that is bracketed by steps of :data:`STEP`. Beyond it a flow with the direction held gains energy.
+    A slow flow turns to the deviator of the stress and stops where the body at rest is not overloaded. For associative
+    flow it always is; otherwise the pressure of the flow may be lower than at rest. A maximum, or a gain from the
+    start, counts only if the body at rest is overloaded before the flow loses energy again; if it is not, the path
+    goes on and the highest maximum counts.
 
-    The path ends where the axis ratio passes :data:`LARGEST_AXIS_RATIO`, at which the homogeneous model is left: the
-    loss there counts as the maximum. Infinite where the loss grows up to the strain `longest` without either. A loss
-    above `enough` is returned as soon as it is found: the barrier is at least that high.
+    The path ends where the axis ratio passes :data:`LARGEST_AXIS_RATIO`, at which the homogeneous model is left: the loss there
+    counts as a maximum. Infinite where the loss grows up to the strain `longest` without either. A loss above `enough`
+    is returned as soon as it is found: the barrier is at least that high.
     """
     path = path_along(b, x)
-    phi0, y0, ratio2 = state_at(b, path, 0.0)
-    if y0 <= 0.0:
+    phi0, y1, ratio0 = state_at(b, path, 0.0)
+    if y1 <= 0.0 and overload_at(b, path, 0.0) > 1e-9 * max(abs(b.pressure), b.cohesion):
         return 0.0, 0.0
-    limit2 = max(LARGEST_AXIS_RATIO * LARGEST_AXIS_RATIO, LARGER_AXIS_RATIO2 * ratio2)
-    t0 = t1 = 0.0
-    y1, ratio0 = y0, ratio2
-    before = work = 0.0  # work up to t0 and t1
-    held = inertia = 0.0  # the exponent of `_work` there
-    while y1 > 0.0:
+    limit2 = max(LARGEST_AXIS_RATIO * LARGEST_AXIS_RATIO, LARGER_AXIS_RATIO2 * ratio0)
+    top = strain = 0.0  # highest maximum so far
+    t1 = 0.0
+    work = inertia = 0.0  # up to t1; the exponent of `_work` there
+    while True:
         t0, y0 = t1, y1
         before, held = work, inertia
-        t1 = t0 + STEP
-        if t0 >= longest or not y0 < np.inf:
+        if not y0 < np.inf or (t0 >= longest and y0 > 0.0):
             return np.inf, np.inf
+        if t0 >= longest:
+            return top, strain
+        t1 = t0 + STEP
         phi, y1, ratio2 = state_at(b, path, t1)
-        if ratio2 > limit2:
+        at_edge = ratio2 > limit2
+        if at_edge:
             t1 = _strain_at_ratio(b, path, t0, t1, ratio0, ratio2, limit2)
             phi, y1, ratio2 = state_at(b, path, t1)
-            if y1 > 0.0:
-                return phi - phi0 + before + _work(b, path, t0, t1, held)[0], t1
         ratio0 = ratio2
         work, inertia = _work(b, path, t0, t1, held)
         work += before
-        if y1 > 0.0 and phi - phi0 + work > enough:
-            return phi - phi0 + work, t1
-    t, phi = _strain_at_maximum(b, path, t0, t1, y0, y1)
-    return phi - phi0 + before + _work(b, path, t0, t, held)[0], t
+        if y0 > 0.0 and y1 <= 0.0:
+            t, phi = _strain_at_maximum(b, path, t0, t1, y0, y1)
+            lost = phi - phi0 + before + _work(b, path, t0, t, held)[0]
+            if lost > top:
+                top, strain = lost, t
+        if (y0 <= 0.0 or y1 <= 0.0) and _flows_on(b, path, t0, t1, y0, y1):
+            return top, strain
+        if y1 > 0.0:
+            lost = phi - phi0 + work
+            if lost > enough or (at_edge and lost > top):
+                return lost, t1
+        if at_edge:
+            return top, strain

@@ -23,17 +23,15 @@ from flybystab.core.energy.direction_search import (
     YIELD,
     least,
 )
-from flybystab.core.energy.flow_work import volume_at
 from flybystab.core.energy.perturbation import (
     Ellipsoid,
     direction,
     ellipsoid,
-    flow_along,
+    overload_at,
     path_along,
     powers,
     rate_of_strain,
     slope_of_flow,
-    state_at,
 )
 from flybystab.core.energy.potential import MASS, energy_derivatives
 from flybystab.core.energy.trust_region import curvature_form, least_second_order, trust_region
@@ -109,23 +107,8 @@ def overload_rate(b: Ellipsoid, x: Array) -> float:
     changed body is overloaded at rest, and stops where it is not.
     """
     h = 1e-4
-    phi = np.arcsin(b.sin)
-    flow = flow_along(b, x)
     path = path_along(b, x)
-    stress = np.empty(6)
-    spin = np.empty(3)
-    ends = np.empty(2)
-    for i in range(2):
-        t = h if i == 1 else -h
-        volume = volume_at(flow.trace, t)
-        state_at(b, path, t)
-        axes = path.axes
-        for k in range(3):
-            spin[k] = np.sum(axes.vectors[:, k] * axes.spin)
-        q = axes.squares
-        rigid_stress(q[0], q[1], q[2], 1.0 / volume, 1.0 / volume, spin, np.zeros(6), stress)
-        ends[i] = overload(b.code, phi, b.cohesion / np.cos(phi), stress)
-    return (ends[1] - ends[0]) / (2.0 * h)
+    return (overload_at(b, path, h) - overload_at(b, path, -h)) / (2.0 * h)
 
 
 @kernel
@@ -227,6 +210,11 @@ def _finite_perturbations(
         row[ENERGY_2], _ = least(b, SECOND, ENERGY, seeds, DENSE, FOUR, 1e-6, depth > 4, xe)
         row[STRAIN_2], _ = least(b, SECOND, STRAIN, seeds, DENSE, FOUR, 1e-6, depth > 4, xs)
     directions[0], directions[1] = xe, xs
+    # A direction in which friction does not stop a stable body: it turns, and the series along it say nothing.
+    undefined = stable and not b.associative and row[ENERGY_2] <= 0.0
+    if undefined:
+        row[ENERGY_2] = row[STRAIN_2] = np.nan
+        directions[:2] = np.nan
     if stable and row[ENERGY_2] == np.inf:
         row[LEVEL] = 3.0
     if depth < 3:
@@ -237,6 +225,9 @@ def _finite_perturbations(
     if depth > 4:
         row[STRAIN_3], _ = least(b, THIRD, STRAIN, seeds, MEDIUM, THREE, 1e-4, depth > 4, xs)
         directions[3] = xs
+    if undefined:
+        row[ENERGY_3] = row[STRAIN_3] = np.nan
+        directions[2:4] = np.nan
     if depth < 4:
         return
     seeds[2] = xe
