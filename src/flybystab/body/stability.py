@@ -117,7 +117,9 @@ class Stability(Record):
     critical_energy : Orders of Quantity
         Least kinetic energy of deformation, J, that a perturbation of fixed direction needs to overcome friction;
         inf where none does at that order. The barrier is the least energy that leads to the strain where slow flow
-        gains energy, or out of the model (`barrier_kind`): an upper bound, see above.
+        goes on by itself, or out of the model (`barrier_kind`). Below associative flow there may be directions in which
+        friction does not stop a perturbation that keeps its direction, although the body is stable and the dynamics
+        turn the direction and stop it: the series to second and third order are then nan, the barrier is not.
     critical_strain : Orders of float
         Least strain ``e t`` (measured with ``|D'| = 1``) at which a perturbation begins to grow, at second and third
         order; for the barrier, the strain at which the least barrier is passed. In a direction at the apex
@@ -214,7 +216,8 @@ class Stability(Record):
         return LEVELS[self.level]
 
     def __repr__(self) -> str:
-        energies = [f"{float(e / self.binding_energy):.3g}" for e in self.critical_energy]
+        shares = [float(e / self.binding_energy) for e in self.critical_energy]
+        energies = ["undefined" if np.isnan(x) else f"{x:.3g}" for x in shares]
         rotation = (
             "" if self.spin_state.steady and not self.spin_state.unstable else self.spin_state.description
         )
