@@ -467,9 +467,9 @@ def barrier(b: Ellipsoid, x: Array, longest: float, enough: float) -> tuple[floa
     start, counts only if the body at rest is overloaded before the flow loses energy again; if it is not, the path
     goes on and the highest maximum counts.
 
-    The path ends where the axis ratio passes :data:`LARGEST_AXIS_RATIO`, at which the homogeneous model is left: the loss there
-    counts as a maximum. Infinite where the loss grows up to the strain `longest` without either. A loss above `enough`
-    is returned as soon as it is found: the barrier is at least that high.
+    The path ends where the axis ratio passes :data:`LARGEST_AXIS_RATIO`, at which the homogeneous model is left: the
+    loss there counts as a maximum. Infinite where the loss grows up to the strain `longest` without either. A loss
+    above `enough` is returned as soon as it is found: the barrier is at least that high.
     """
     path = path_along(b, x)
     phi0, y1, ratio0 = state_at(b, path, 0.0)
