@@ -4,6 +4,7 @@ import astropy.units as u
 import numpy as np
 import pytest
 from scenes import PILE, earth, material
+from scipy.spatial.transform import Rotation
 
 from flybystab.body.body import Body, Material
 from flybystab.constants import G
@@ -104,6 +105,7 @@ def test_onset_is_an_edge_too():
         r = flyby(PILE.with_(material=material(demanded + shift)), earth(3.0))
         name, distance = r.margins.nearest
         assert (name, distance < 1e-6) == ("friction", True)
+        assert (r.margins.relative["friction"] > 0.0) == (shift > 0.0) == (r.verdict == "INTACT")
 
 
 def test_one_more_class_is_one_more_entry(monkeypatch):
@@ -159,6 +161,10 @@ def test_the_surface_of_an_intact_body_may_slide():
         assert r.surface.share_passing(angle) == exact.share_passing(angle)
     assert r.surface.share_passing(30 * u.deg) > 0.01
     assert r.surface.share_lifted == 0.0
+    askew = Rotation.from_euler("zxz", [0.4, 0.9, -0.3]).as_matrix()  # slopes depend on the attitude of the run
+    turned = flyby(PILE, earth(2.6), askew, error=False, history=False).surface
+    np.testing.assert_allclose(turned.greatest, surface_change(PILE, earth(2.6), askew).greatest, rtol=1e-9)
+    assert abs(turned.largest_change - r.surface.largest_change) > 0.1 * u.deg
     near = flyby(PILE.with_(material=material(35, cohesion=1 * u.kPa)), earth(1.2)).surface
     assert near.share_lifted > 0.0
     assert near.share_lifted == near.area[near.greatest > 90 * u.deg].sum() / near.area.sum()
