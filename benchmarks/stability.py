@@ -167,7 +167,10 @@ def push() -> None:
     print(
         "critical energies / binding energy; dynamics: least and median over 16 directions of the energy from"
     )
-    print("which the body does not come to rest inside the model (flybystab.body.recovery.recovery_energy)")
+    print(
+        "which the body does not come to rest inside the model (flybystab.body.recovery.recovery_energy); nan: a"
+    )
+    print("direction that is held is not stopped by friction, and a series along it says nothing")
     print(
         f"{'body':>22} {'friction':>8} {'cohesion':>12} {'required':>8} {'dilatancy':>9} | {'second':>7} "
         f"{'third':>7} {'barrier':>7}"
@@ -218,7 +221,7 @@ def push() -> None:
             )
     print(
         f"least of the dynamics / barrier: {np.nanmin(ratios):.2f} to {np.nanmax(ratios):.2f}, "
-        f"median {np.nanmedian(ratios):.2f}; nan: the flow gains energy from the start"
+        f"median {np.nanmedian(ratios):.2f}"
     )
 
 

@@ -99,6 +99,16 @@ def test_margins_run_through_zero_at_the_edge_of_the_model():
     assert deep.bound_fraction <= deep.bound_fraction_upper
 
 
+def test_the_strain_is_the_largest_of_the_course():
+    """A weak body is stretched and then shortened: its strain has been larger than at the end."""
+    r = flyby(PILE.with_(material=material(10)), earth(1.9, 10.0), error=False)
+    assert r.verdict == "RESHAPED"
+    axes = np.sqrt(np.linalg.eigvalsh(r._run.history["shape"])[:, ::-1])
+    largest = np.abs(np.log(axes / PILE.axes)).max()
+    assert r.margins.strain == pytest.approx(largest, rel=1e-9)
+    assert largest > 1.1 * np.abs(np.log(r.semi_axes.value / PILE.axes)).max()
+
+
 def test_onset_is_an_edge_too():
     demanded = flyby(PILE, earth(3.0)).max_required_friction_angle.value
     for shift in (-1e-6, 1e-6):
@@ -161,7 +171,9 @@ def test_the_surface_of_an_intact_body_may_slide():
         assert r.surface.share_passing(angle) == exact.share_passing(angle)
     assert r.surface.share_passing(30 * u.deg) > 0.01
     assert r.surface.share_lifted == 0.0
-    askew = Rotation.from_euler("zxz", [0.4, 0.9, -0.3]).as_matrix()  # slopes depend on the attitude of the run
+    askew = Rotation.from_euler(
+        "zxz", [0.4, 0.9, -0.3]
+    ).as_matrix()  # slopes depend on the attitude of the run
     turned = flyby(PILE, earth(2.6), askew, error=False, history=False).surface
     np.testing.assert_allclose(turned.greatest, surface_change(PILE, earth(2.6), askew).greatest, rtol=1e-9)
     assert abs(turned.largest_change - r.surface.largest_change) > 0.1 * u.deg
