@@ -309,3 +309,11 @@ def test_the_default_yield_surface_is_mohr_coulomb():
     plain = flyby(PILE.with_(material=Material()), earth(2.3), history=False, error=False)
     cone = flyby(PILE, earth(2.3), history=False, error=False)
     assert plain.semi_axes[0] > 1.2 * cone.semi_axes[0]
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-4, 1e-6])
+def test_the_error_is_that_of_another_tolerance(tolerance):
+    """Also of the largest tolerance, which has no larger one to compare with."""
+    found, exact = flyby(PILE, earth(2.2), tolerance=tolerance), flyby(PILE, earth(2.2), tolerance=1e-11)
+    true = np.abs(found.semi_axes / exact.semi_axes - 1.0).max()
+    assert true < found.error.semi_axes < max(1e3 * true, 100.0 * tolerance)

@@ -29,13 +29,21 @@ verdict_rows: Any = kernels.verdict_rows
 #: Step tolerance by default: 1e-8 in the shape of the reference cases (``flybystab bench flyby``).
 TOLERANCE = 1e-8
 
+#: Largest tolerance, and the factor between the tolerances of the two runs whose difference measures the error.
+LARGEST, LOOSER = 1e-3, 30.0
+
 #: Steps after which a run is given up.
 MAX_STEPS = 200_000
 
 
 def step_tolerance(value: Any) -> float:
     """The relative error allowed in a step, checked."""
-    return to_si(value, u.dimensionless_unscaled, "tolerance", low=1e-13, high=1e-3)
+    return to_si(value, u.dimensionless_unscaled, "tolerance", low=1e-13, high=LARGEST)
+
+
+def comparison_tolerance(tolerance: float) -> float:
+    """Tolerance of the run that measures the error: `LOOSER` times larger, or smaller where that is not allowed."""
+    return LOOSER * tolerance if LOOSER * tolerance <= LARGEST else tolerance / LOOSER
 
 
 def axis_ratio(value: Any) -> float:

@@ -11,7 +11,16 @@ from flybystab.encounter.attitude import attitude_matrix
 from flybystab.encounter.attitude_at_periapsis import attitude_at_start
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput, NotConverged
-from flybystab.flybys.batch import TOLERANCE, FlybyRun, RowInputs, axis_ratio, one_row, step_tolerance
+from flybystab.flybys.batch import (
+    LOOSER,
+    TOLERANCE,
+    FlybyRun,
+    RowInputs,
+    axis_ratio,
+    comparison_tolerance,
+    one_row,
+    step_tolerance,
+)
 from flybystab.flybys.grains_flyby import handed_on, request
 from flybystab.flybys.inputs import FlybyInputs
 from flybystab.flybys.result import FlybyResult
@@ -19,8 +28,6 @@ from flybystab.flybys.rigid_course import check_tension
 from flybystab.flybys.robustness import phases_of, robustness_of
 from flybystab.progress import Progressing
 
-#: The run that measures the error allows this many times more error in a step.
-LOOSER = 30.0
 #: Rows of history kept at most.
 ROWS = 20_000
 
@@ -56,7 +63,7 @@ def flyby(
     tolerance : float
         Relative error allowed in each integration step.
     error : bool
-        Measure the error with a second, looser run.
+        Measure the error with a second run, at a tolerance 30 times larger, or 30 times smaller from 3e-5 on.
     history : bool
         Keep the history.
     surfaces : str or sequence of str
@@ -132,9 +139,9 @@ def flyby(
 
 
 def _comparison(inputs: FlybyInputs, row: RowInputs) -> FlybyRun:
-    """The run that measures the error: with a looser tolerance, or a tighter one where flow stalls the looser one."""
+    """The run that measures the error: with a tighter tolerance where flow stalls the looser one."""
     tolerance = inputs.tolerance
     try:
-        return inputs._replace(tolerance=min(1e-3, tolerance * LOOSER)).run(required=True, row=row)
+        return inputs._replace(tolerance=comparison_tolerance(tolerance)).run(required=True, row=row)
     except NotConverged:
         return inputs._replace(tolerance=max(1e-13, tolerance / LOOSER)).run(required=True, row=row)

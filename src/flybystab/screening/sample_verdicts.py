@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from flybystab.body.body import Material
 from flybystab.core.ellipsoid.yield_bound import INTACT, UNDECIDED, quick_margins
 from flybystab.errors import FlybystabError
-from flybystab.flybys.flyby import LOOSER
+from flybystab.flybys.batch import comparison_tolerance
 from flybystab.flybys.flyby_many import follow_rows
 from flybystab.flybys.verdict import Verdict
 from flybystab.screening.draws import Attitudes, Draws
@@ -148,7 +148,7 @@ def sample_verdicts(
         Integrate a body although the bound decides if the bound on its mobilised friction angle exceeds the
         angle at rest by more than this, rad: the margin is then a value instead of a lower limit.
     measure : bool
-        Measure the numerical error of the first body by a run with a larger step tolerance.
+        Measure the numerical error of the first body by a run with another step tolerance.
     """
     n = len(draw.rho)
     code = material.surface_code
@@ -190,7 +190,7 @@ def sample_verdicts(
             out.verdict[i] = "" if out.error[i] else str(table.verdict[k])
             out.margin[i] = np.radians(table.margin[k].to_value(u.deg))
         if measure and dynamic[0] and not out.error[0]:
-            looser = follow_rows(rows[:1], [encounter], tolerance=LOOSER * tolerance, workers=1)
+            looser = follow_rows(rows[:1], [encounter], tolerance=comparison_tolerance(tolerance), workers=1)
             pair = [t.max_required_friction_angle[0].to_value(u.deg) for t in (looser, table)]
             out.numerical = 0.0 if pair[0] == pair[1] else float(abs(pair[0] - pair[1]))
     return out
