@@ -3,6 +3,7 @@
 python benchmarks/campaign.py stress [N [SEED]]       two tolerances, energy, verdicts; 1000 flybys, seed 1
 python benchmarks/campaign.py extremes [N [SEED]]     the same at the ends of every range, several at once; 1000, seed 4
 python benchmarks/campaign.py integrators [N [SEED]]  against the integrator that knows no events; 300, seed 2
+python benchmarks/campaign.py tolerances [N [SEED]]   time, errors, verdicts and coverage by step tolerance
 python benchmarks/campaign.py coverage [N [SEED]]     the error estimate against a run at 1e-11; 100 with flow of each
                                                       yield surface at dilatancy 0 and 1, seed 3
 python benchmarks/campaign.py verdicts [N [SEED]]     verdicts, bound mass fractions beyond the model; 5000, seed 5
@@ -413,6 +414,62 @@ def coverage(n: int, seed: int, tolerance: float = 1e-8, tight: float = 1e-11) -
     return shares
 
 
+def tolerances(n: int, seed: int) -> dict[float, dict[str, float]]:
+    """Time, errors against a run at 1e-11, verdicts and coverage of the error estimate by step tolerance."""
+    rng = np.random.default_rng(seed)
+    scenes = [pile(rng, YIELD_SURFACES[k % 4], float(k // 4 % 2)) for k in range(n)]
+    truths = [fs.flyby(*scene, history=False, error=False, tolerance=1e-11) for scene in scenes]
+    flows = np.array([t.onset_time is not None for t in truths])
+    print(
+        f"{n} random flybys, {flows.sum()} with flow, seed {seed}; errors against 1e-11, of those with flow"
+    )
+    print(
+        "tolerance  ms: flow  rigid   axes: 50 %     99 %   spin: 50 %     99 %  verdicts differ  covered: axes    spin"
+        "  events"
+    )
+    out = {}
+    for tolerance in (1e-5, 1e-6, 1e-7, 1e-8, 1e-9):
+        took = np.empty(n)
+        axes, spin = np.empty(n), np.empty(n)
+        covered = np.empty((n, 3), dtype=bool)
+        other = 0
+        for i, (scene, truth) in enumerate(zip(scenes, truths, strict=True)):
+            start = time.process_time()
+            fs.flyby(*scene, history=False, error=False, tolerance=tolerance)
+            took[i] = time.process_time() - start
+            r = fs.flyby(*scene, history=False, tolerance=tolerance)
+            other += truth.verdict != r.verdict
+            axes[i] = np.abs(r.semi_axes / truth.semi_axes - 1.0).max()
+            spin[i] = np.linalg.norm(r.spin_vector - truth.spin_vector) / truth.spin
+            same = [x[0] for x in r.events] == [x[0] for x in truth.events]
+            late = max(
+                (abs(x[1] - y[1]).value for x, y in zip(r.events, truth.events, strict=False)), default=0.0
+            )
+            told = np.nan_to_num(r.error.event_times.value, nan=np.inf)
+            covered[i] = (
+                axes[i] <= max(r.error.semi_axes, 1e-12),
+                spin[i] <= max(r.error.spin, 1e-12),
+                (late if same else np.inf) <= max(told, 1e-6),
+            )
+        row = {
+            "flow_ms": 1e3 * took[flows].mean(),
+            "rigid_ms": 1e3 * took[~flows].mean(),
+            "axes_50": np.quantile(axes[flows], 0.5),
+            "axes_99": np.quantile(axes[flows], 0.99),
+            "spin_50": np.quantile(spin[flows], 0.5),
+            "spin_99": np.quantile(spin[flows], 0.99),
+            "verdicts": other,
+            **dict(zip(("axes", "spin", "events"), covered[flows].mean(axis=0), strict=True)),
+        }
+        print(
+            f"{tolerance:9.0e} {row['flow_ms']:9.2f} {row['rigid_ms']:6.2f}"
+            f"   {row['axes_50']:10.1e} {row['axes_99']:8.1e}   {row['spin_50']:10.1e} {row['spin_99']:8.1e}"
+            f" {other:16d} {row['axes']:14.1%} {row['spin']:7.1%} {row['events']:7.1%}"
+        )
+        out[tolerance] = row
+    return out
+
+
 def verdicts(n: int, seed: int) -> Counter[str]:
     """Verdicts of bodies in equilibrium, and what is known of those that leave the model."""
     rng = np.random.default_rng(seed)
@@ -442,6 +499,7 @@ COMMANDS = {
     "extremes": (extremes, 1000, 4),
     "integrators": (integrators, 300, 2),
     "coverage": (coverage, 100, 3),
+    "tolerances": (tolerances, 400, 6),
     "verdicts": (verdicts, 5000, 5),
 }
 

@@ -52,11 +52,13 @@ def flown(options: argparse.Namespace) -> tuple[Any, Any, Any]:
     from flybystab.encounter.attitude import periapsis_axes
     from flybystab.encounter.encounter import Encounter
     from flybystab.errors import NoEncounter
+    from flybystab.flybys import precompile
     from flybystab.flybys.flyby import flyby
     from flybystab.flybys.spin_sample import spin_sample
     from flybystab.orbit.search.encounter_finder import find_encounters
 
     asteroid = asteroid_of(options)
+    precompile.start()
     if options.date is None:
         table = find_encounters(
             asteroid, tdb(SPAN[0], "start"), tdb(SPAN[1], "stop"), planets=[options.planet]
@@ -76,6 +78,7 @@ def flown(options: argparse.Namespace) -> tuple[Any, Any, Any]:
         import astropy.units as u
 
         attitude = periapsis_axes(encounter) @ asteroid.attitude(0 * u.deg)
+    precompile.wait()
     result = flyby(
         asteroid.body,
         encounter,

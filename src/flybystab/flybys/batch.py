@@ -23,8 +23,27 @@ from flybystab.flybys.verdict import Verdict, verdict_of
 from flybystab.typing import Array
 from flybystab.units import to_si
 
-#: :func:`flybystab.core.dynamics.verdict_row.verdict_rows`, without its type.
-verdict_rows: Any = kernels.verdict_rows
+
+def verdict_rows(
+    rows: NDArray[np.int64],
+    bodies: NDArray[Any],
+    encounters: Encounters,
+    limits: Limits,
+    required: bool,
+    output: Output,
+) -> None:
+    """:func:`flybystab.core.dynamics.verdict_row.verdict_rows`; without the kernels of flow as long as no body yields.
+
+    In a process in which no body has yielded yet the bodies are first followed up to yield, by kernels that are
+    compiled (or loaded) in a fraction of the time. The outcomes are the same.
+    """
+    full: Any = kernels.verdict_rows
+    if not getattr(full, "overloads", True):
+        kernels.rigid_rows(rows, bodies, encounters, limits, output)
+        rows = rows[output.outcomes["verdict"][rows] == kernels.YIELDS]
+    if len(rows):
+        full(rows, bodies, encounters, limits, required, output)
+
 
 #: Step tolerance by default: 1e-8 in the shape of the reference cases (``flybystab bench flyby``).
 TOLERANCE = 1e-8

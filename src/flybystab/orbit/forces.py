@@ -20,7 +20,6 @@ from dataclasses import dataclass
 from types import MappingProxyType
 
 import numpy as np
-from scipy.integrate import trapezoid
 
 from flybystab.constants import AU, C_LIGHT, DAY
 from flybystab.core.numerics.jit import kernel, pasted_kernel
@@ -387,7 +386,8 @@ def shares(window: Window, t: Array, states: Array, nongrav: NonGravitational | 
     sizes = np.empty((t.size, len(FORCES)))
     _sizes(full, np.ascontiguousarray(t), np.ascontiguousarray(states), sizes)
     weight = 3.0 * np.abs(t[-1] - t)
-    integral = np.abs(trapezoid(sizes * weight[:, None], t, axis=0))
+    values = sizes * weight[:, None]
+    integral = np.abs(0.5 * np.diff(t) @ (values[1:] + values[:-1]))
     return {name: float(value) for name, value in zip(FORCES, integral, strict=True)}
 
 

@@ -4,12 +4,11 @@ import ast
 import os
 import subprocess
 import sys
-import textwrap
 
 from flybystab.core.numerics import kernel_cache
 from flybystab.core.numerics.kernel_cache import ROOT, imports, sources
 
-COMPILED = {key: value for key, value in os.environ.items() if key != "NUMBA_DISABLE_JIT"}
+COMPILED = {k: v for k, v in os.environ.items() if k not in ("NUMBA_DISABLE_JIT", "FLYBYSTAB_KERNELS")}
 
 
 def imported(file):
@@ -36,9 +35,9 @@ def test_sources_reach_through_other_files():
     assert not any("cli" in f.parts for f in sources(ROOT / "core" / "dynamics" / "run.py"))
 
 
-def test_a_changed_callee_is_seen(tmp_path):
-    """A caller that did not change answers with the new code of what it calls, and is cached where nothing changed."""
-    package = tmp_path / "flybystab"
+def small_package(folder):
+    """A package of that name with one kernel that calls another; a script that calls it and counts what is loaded."""
+    package = folder / "flybystab"
     (package / "core" / "numerics").mkdir(parents=True)
     for name in ("core/numerics/kernel_cache.py", "core/numerics/jit.py"):
         (package / name).write_bytes((ROOT / name).read_bytes())
@@ -54,22 +53,55 @@ def test_a_changed_callee_is_seen(tmp_path):
         "from flybystab.core.numerics.jit import kernel\nfrom flybystab.inner import inner\n\n"
         "@kernel\ndef outer(x):\n    return inner(x) + 1.0\n"
     )
-    script = textwrap.dedent("""
-        from flybystab.outer import outer
-        print(outer(10.0), sum(outer.stats.cache_hits.values()))
-    """)
+    script = "from flybystab.outer import outer; print(outer(10.0), sum(outer.stats.cache_hits.values()))"
 
-    def run():
+    def run(**environment):
         done = subprocess.run(
-            [sys.executable, "-c", script], capture_output=True, text=True, cwd=tmp_path, env=COMPILED
+            [sys.executable, "-c", script],
+            capture_output=True,
+            text=True,
+            cwd=folder,
+            env=COMPILED | environment,
         )
         assert done.returncode == 0, done.stderr
         return done.stdout.split()
 
+    return package, run
+
+
+def test_a_changed_callee_is_seen(tmp_path):
+    """A caller that did not change answers with the new code of what it calls, and is cached where nothing changed."""
+    package, run = small_package(tmp_path)
     assert run() == ["21.0", "0"]
     assert run() == ["21.0", "1"]
     (package / "values.py").write_text("FACTOR = 3.0\n")
     assert run() == ["31.0", "0"]
+
+
+def test_installations_share_a_folder(tmp_path):
+    """Kernels are found by their sources wherever these are; not with other sources or for another processor."""
+    (_, one), (package, two) = small_package(tmp_path / "one"), small_package(tmp_path / "two")
+    shared = {"FLYBYSTAB_KERNELS": str(tmp_path / "kernels")}
+    assert one(**shared) == ["21.0", "0"]
+    assert two(**shared) == ["21.0", "1"]
+    assert not list((tmp_path / "two").rglob("*.nbi"))
+    generic = {"NUMBA_CPU_NAME": "generic", "NUMBA_CPU_FEATURES": ""}
+    assert two(**shared, **generic) == ["21.0", "0"]
+    assert one(**shared, **generic) == ["21.0", "1"]  # both kinds lie beside each other
+    assert one(**shared) == ["21.0", "1"]
+    (package / "values.py").write_text("FACTOR = 3.0\n")
+    assert two(**shared) == ["31.0", "0"]
+    assert one(**shared) == ["21.0", "1"]
+
+
+def test_old_versions_in_a_shared_folder_are_removed(tmp_path):
+    package, run = small_package(tmp_path)
+    shared = {"FLYBYSTAB_KERNELS": str(tmp_path / "kernels")}
+    for factor in range(kernel_cache.KEPT + 2):
+        (package / "values.py").write_text(f"FACTOR = {factor}.0\n")
+        assert run(**shared) == [f"{10 * factor + 1}.0", "0"]
+    assert len(list((tmp_path / "kernels" / "outer").iterdir())) == kernel_cache.KEPT
+    assert run(**shared)[1] == "1"
 
 
 def test_an_index_that_names_a_class_no_longer_there_is_out_of_date(tmp_path):

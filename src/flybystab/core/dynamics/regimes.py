@@ -289,9 +289,60 @@ def follow(
     else:
         reason = STUCK
     if regime == RIGID:
-        rigid_excess(t, ws.y, par, tide, ws.work, ws.stress)
-        begin_flow(ws.y, par, ws)
-        for i in range(6, 12):
-            ws.y[i] = 0.0
+        _to_full_state(t, par, tide, ws)
     copy(ws.y, y, N_FULL)
     return reason, t, regime, peak
+
+
+@kernel
+def _to_full_state(t: float, par: Parameters, tide: TidePanels, ws: Workspace) -> None:
+    """Turn the RIGID state ``ws.y[:7]`` into the 15-number state of the same body."""
+    rigid_excess(t, ws.y, par, tide, ws.work, ws.stress)
+    begin_flow(ws.y, par, ws)
+    for i in range(6, 12):
+        ws.y[i] = 0.0
+
+
+@kernel
+def follow_rigidly(
+    span: Span,
+    y: Array,
+    par: Parameters,
+    tide: TidePanels,
+    ground: Ground,
+    limits: Limits,
+    unyielding: bool,
+    log: Log,
+    room: Workspace,
+) -> tuple[int, float, Peak]:
+    """`follow` for a body that starts rigid, up to yield (ONSET): without the kernels of flow.
+
+    Arguments as in `follow`; `y` is not written where the body yields.
+
+    Returns
+    -------
+    reason, time, peak
+        DONE, TOUCH, STUCK or ONSET; the time reached; the largest mobilised friction.
+    """
+    ws = borrowed_workspace(room)
+    log = borrowed_log(log)
+    y = borrowed(y)
+    tide = TidePanels(tide.tau, tide.start, tide.width, borrowed(tide.coefficients))
+    copy(y, ws.y, N_FULL)
+    reason, t, _, peak = follow_rigid(
+        span.start,
+        min(span.stop, span.rest),
+        0.0,
+        par,
+        tide,
+        ground,
+        limits,
+        unyielding,
+        Peak(-1.0, 0.0),
+        ws,
+        log,
+    )
+    if reason != ONSET:
+        _to_full_state(t, par, tide, ws)
+        copy(ws.y, y, N_FULL)
+    return reason, t, peak

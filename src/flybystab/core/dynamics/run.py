@@ -15,6 +15,7 @@ from flybystab.constants import G
 from flybystab.core.dynamics import regimes, state
 from flybystab.core.dynamics.ground import Ground, no_ground
 from flybystab.core.dynamics.regimes import Span
+from flybystab.core.dynamics.state import RIGID
 from flybystab.core.dynamics.workspace import Limits, Log, Peak, new_log, workspace
 from flybystab.core.ellipsoid.tide import TidePanels
 from flybystab.core.material.parameters import material_parameters
@@ -160,6 +161,80 @@ def _set_flowing(axes: Array, omega: Array, deformation: Array, attitude: Array,
     state.set_gradient(a, y)
 
 
+class Scaled(NamedTuple):
+    """A run in the units of the body: state, parameters, span, tide and ground, and the units of time and length."""
+
+    y: Array
+    par: state.Parameters
+    span: Span
+    tide: TidePanels
+    ground: Ground
+    t0: float
+    a0: float
+
+
+@kernel
+def scaled(body: BodyState, span: Span, tide: TidePanels, ground: Ground) -> Scaled:
+    """A run of a body that starts rigid, in its own units."""
+    t0 = 1.0 / np.sqrt(np.pi * G * body.rho)
+    a0 = np.cbrt(body.axes[0] * body.axes[1] * body.axes[2])
+    par = parameters(
+        body.axes, body.rho, body.phi, body.cohesion, body.dilatancy, body.surface, 0.0, body.expansion
+    )
+    y = np.zeros(state.N_FULL)
+    regimes.quaternion(body.attitude, y)
+    for i in range(3):
+        y[4 + i] = body.omega[i] * t0
+    return Scaled(
+        y, par, Span(span.start / t0, span.rest / t0, span.stop / t0),
+        TidePanels(tide.tau / t0, tide.start, tide.width, tide.coefficients * t0**2),
+        Ground(ground.tau / t0, ground.start, ground.width, ground.floor, ground.least, a0, ground.coefficients),
+        t0, a0,
+    )  # fmt: skip
+
+
+@kernel
+def to_si(rho: float, run: Scaled, shape: Array, gradient: Array, log: Log) -> None:
+    """Write ``S`` (m2) and ``L`` (1/s) at the end of a run, and its log in SI units."""
+    t0, a0 = run.t0, run.a0
+    unpack(run.y[0:6], shape)
+    state.gradient(run.y, gradient)
+    for i in range(3):
+        for j in range(3):
+            shape[i, j] *= a0 * a0
+            gradient[i, j] /= t0
+    for i in range(log.counts[0]["rows"]):
+        row = log.history[i]
+        # T = 5 sigma/rho, and the density has changed with the volume
+        stress = rho * a0**2 / t0**2 / 5.0 / np.sqrt(determinant(row["state"]))
+        row["time"] *= t0
+        row["pressure"] *= stress
+        row["deviator"] *= stress
+    for i in range(min(log.counts[0]["events"], log.events.shape[0])):
+        log.events[i]["time"] *= t0
+
+
+@inlined
+def evolve_rigid(
+    body: BodyState,
+    span: Span,
+    tide: TidePanels,
+    ground: Ground,
+    limits: Limits,
+    unyielding: bool,
+    shape: Array,
+    gradient: Array,
+    log: Log,
+) -> FinalState:
+    """`evolve` up to yield, where its reason is ONSET; `shape` and `gradient` are meaningless then."""
+    run = scaled(body, span, tide, ground)
+    reason, t, peak = regimes.follow_rigidly(
+        run.span, run.y, run.par, run.tide, run.ground, limits, unyielding, log, workspace()
+    )
+    to_si(body.rho, run, shape, gradient, log)
+    return FinalState(reason, t * run.t0, RIGID, Peak(peak.friction, peak.time * run.t0))
+
+
 @inlined
 def evolve(
     body: BodyState,
@@ -179,47 +254,21 @@ def evolve(
     (m2) and ``L`` (1/s) at the end; history (in the units of the body, but with the stresses in Pa and times in s),
     events and counts go to `log`.
     """
-    t0 = 1.0 / np.sqrt(np.pi * G * body.rho)
-    a0 = np.cbrt(body.axes[0] * body.axes[1] * body.axes[2])
-    par = parameters(
-        body.axes, body.rho, body.phi, body.cohesion, body.dilatancy, body.surface, 0.0, body.expansion
-    )
-    y = np.zeros(state.N_FULL)
-    regimes.quaternion(body.attitude, y)
-    for i in range(3):
-        y[4 + i] = body.omega[i] * t0
-    start = state.RIGID
+    run = scaled(body, span, tide, ground)
+    start = RIGID
     if np.any(deformation != 0.0):
         start = state.FLOWING
-        _set_flowing(body.axes / a0, body.omega * t0, deformation * t0, body.attitude, y)
-    scaled = TidePanels(tide.tau / t0, tide.start, tide.width, tide.coefficients * t0**2)
-    below = Ground(
-        ground.tau / t0, ground.start, ground.width, ground.floor, ground.least, a0, ground.coefficients
-    )
+        _set_flowing(body.axes / run.a0, body.omega * run.t0, deformation * run.t0, body.attitude, run.y)
     reason, t, regime, peak = regimes.follow(
-        Span(span.start / t0, span.rest / t0, span.stop / t0), start, y, par, scaled, below, limits,
-        body.brittle, unyielding, log, workspace(),
+        run.span, start, run.y, run.par, run.tide, run.ground, limits, body.brittle, unyielding, log, workspace(),
     )  # fmt: skip
-    unpack(y[0:6], shape)
-    state.gradient(y, gradient)
-    for i in range(3):
-        for j in range(3):
-            shape[i, j] *= a0 * a0
-            gradient[i, j] /= t0
-    for i in range(log.counts[0]["rows"]):
-        row = log.history[i]
-        # T = 5 sigma/rho, and the density has changed with the volume
-        stress = body.rho * a0**2 / t0**2 / 5.0 / np.sqrt(determinant(row["state"]))
-        row["time"] *= t0
-        row["pressure"] *= stress
-        row["deviator"] *= stress
-    for i in range(min(log.counts[0]["events"], log.events.shape[0])):
-        log.events[i]["time"] *= t0
-    return FinalState(reason, t * t0, regime, Peak(peak.friction, peak.time * t0))
+    to_si(body.rho, run, shape, gradient, log)
+    return FinalState(reason, t * run.t0, regime, Peak(peak.friction, peak.time * run.t0))
 
 
-# Outside of a kernel the plain function, which calls the compiled `follow`; as a kernel it would be compiled anew.
-_evolve = getattr(evolve, "py_func", evolve)
+# Outside of a kernel the plain functions, which call the compiled `follow`; as kernels they would be compiled anew.
+_evolve: Any = getattr(evolve, "py_func", evolve)
+_evolve_rigid: Any = getattr(evolve_rigid, "py_func", evolve_rigid)
 
 
 def integrate(
@@ -292,18 +341,13 @@ def integrate(
         expansion,
     )
     span = Span(float(t_start), float(t_stop if t_rest is None else t_rest), float(t_stop))
-    end = _evolve(
-        body,
-        span,
-        tide,
-        no_ground() if ground is None else ground,
-        Limits(float(tolerance), float(max_axis_ratio), max_steps),
-        unyielding,
-        np.zeros((3, 3)) if deformation is None else np.array(deformation, dtype=float, order="C"),
-        shape,
-        gradient,
-        log,
-    )
+    below = no_ground() if ground is None else ground
+    limits = Limits(float(tolerance), float(max_axis_ratio), max_steps)
+    if unyielding and deformation is None:
+        end = _evolve_rigid(body, span, tide, below, limits, True, shape, gradient, log)
+    else:
+        start = np.zeros((3, 3)) if deformation is None else np.array(deformation, dtype=float, order="C")
+        end = _evolve(body, span, tide, below, limits, unyielding, start, shape, gradient, log)
     counts = log.counts[0]
     return Run(
         EVENTS[end.reason],

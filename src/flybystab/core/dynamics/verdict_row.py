@@ -1,4 +1,9 @@
-"""A body through an encounter and its verdict, for many rows, without Python objects."""
+"""A body through an encounter and its verdict, for many rows, without Python objects.
+
+`rigid_rows` follows bodies up to yield only: it does not contain the kernels of flow, whose compilation takes several
+times as long. The rows that it leaves with the verdict YIELDS are for `verdict_rows`, which gives the same outcomes for
+the others.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +15,7 @@ from numpy.typing import NDArray
 from flybystab.constants import G
 from flybystab.core.dynamics.ground import Ground
 from flybystab.core.dynamics.regimes import Span
-from flybystab.core.dynamics.run import EXPANSION, BodyState, evolve
+from flybystab.core.dynamics.run import EXPANSION, BodyState, FinalState, evolve, evolve_rigid
 from flybystab.core.dynamics.state import RIGID
 from flybystab.core.dynamics.workspace import BEYOND, ONSET, STUCK, TOUCH, Limits, Log, new_log, reset
 from flybystab.core.ellipsoid.bound_mass import (
@@ -22,7 +27,7 @@ from flybystab.core.ellipsoid.bound_mass import (
 )
 from flybystab.core.ellipsoid.rigid_stress import demand, overload, rigid_stress
 from flybystab.core.ellipsoid.tide import TidePanels
-from flybystab.core.numerics.jit import inlined, kernel
+from flybystab.core.numerics.jit import code, inlined, kernel
 from flybystab.core.verdict_codes import BEYOND_MODEL, FAILED, FLOWED, IMPACT, INTACT, NOT_IN_EQUILIBRIUM
 from flybystab.typing import Array
 
@@ -82,6 +87,12 @@ OUTCOME = np.dtype(
 #: A body whose centre stays higher than this many long semi-axes is not tested for contact with the ground.
 NEAR_GROUND = 100.0
 
+#: Verdict of a body that `rigid_rows` does not follow any further.
+YIELDS = code(-2)
+# Typed constants: numba compiles a kernel anew for each literal argument.
+_UNYIELDING: Any = np.bool_(True)
+_NO_ROWS, _ONE = code(0), code(1)
+
 
 class Encounters(NamedTuple):
     """Encounters of many rows.
@@ -130,16 +141,30 @@ def _equilibrium(body: BodyState, stress: Array) -> bool:
 
 
 @kernel
-def _final_state(body: BodyState, regime: int, holds: bool, out: Any, shape: Array, gradient: Array) -> None:
-    """Write axes, spin, bound mass fraction and their changes from the state at the end."""
-    axes, vectors = out["axes"], np.empty((3, 3))
+def _write_end(
+    body: BodyState,
+    end: FinalState,
+    holds: bool,
+    stress: Array,
+    out: Any,
+    shape: Array,
+    gradient: Array,
+    log: Log,
+) -> None:
+    """Write what does not depend on flow: the end of the run, friction, lacking cohesion, axes and spin."""
+    out["time"], out["reason"], out["regime"] = end.time, end.reason, end.regime
+    out["steps"] = log.counts[0]["steps"]
+    out["friction"], out["friction_time"] = end.peak.friction, end.peak.time
+    out["lacking"] = 0.0
+    if not holds:
+        out["lacking"] = demand(body.surface, body.phi, body.cohesion, stress)[1]
+    out["bound_fraction"] = 1.0
+    axes, spin, vectors = np.empty(3), np.empty(3), np.empty((3, 3))
     principal_axes(shape, axes, vectors)
-    spin_vector(gradient, out["spin"])
-    bound = 1.0
-    if holds and regime != RIGID:
-        rho_now = body.rho * body.axes[0] * body.axes[1] * body.axes[2] / (axes[0] * axes[1] * axes[2])
-        bound = bound_share(shape, gradient, rho_now)
-    out["bound_fraction"] = bound
+    spin_vector(gradient, spin)
+    for i in range(3):
+        out["axes"][i] = axes[i]
+        out["spin"][i] = spin[i]
     before, after = np.empty(3), np.empty(3)
     rate = momentum(shape, gradient, after)
     first = np.empty((3, 3))
@@ -148,6 +173,28 @@ def _final_state(body: BodyState, regime: int, holds: bool, out: Any, shape: Arr
     rate_before = momentum(still, first, before)
     out["spin_ratio"] = rate / rate_before if rate_before > 0.0 else (np.inf if rate > 0.0 else 1.0)
     out["pole_change"] = angle_between(before, after)
+
+
+@inlined
+def _rigid_row(
+    body: BodyState,
+    span: Span,
+    tide: TidePanels,
+    ground: Ground,
+    limits: Limits,
+    out: Any,
+    shape: Array,
+    gradient: Array,
+    log: Log,
+) -> None:
+    """`verdict_row` for a body that does not yield; the verdict of one that does is YIELDS and the rest not written."""
+    stress = np.empty(6)
+    holds = _equilibrium(body, stress)
+    end = evolve_rigid(body, span, tide, ground, limits, not holds, shape, gradient, log)
+    out["verdict"] = YIELDS
+    if end.reason != ONSET:
+        _write_end(body, end, holds, stress, out, shape, gradient, log)
+        out["verdict"] = _verdict(end.reason, holds, end.reason == TOUCH or ground.least < 0.0, False)
 
 
 @inlined
@@ -193,22 +240,15 @@ def verdict_row(
     # A body that cannot exist on its own does not yield in the run: its demand at the start is the answer.
     end = evolve(body, span, tide, ground, limits, not holds, np.zeros((3, 3)), shape, gradient, log)
     reason = end.reason
-    out["time"], out["reason"], out["regime"] = end.time, end.reason, end.regime
-    out["steps"] = log.counts[0]["steps"]
-    out["friction"], out["friction_time"] = end.peak.friction, end.peak.time
-    out["lacking"] = 0.0
-    if not holds:
-        out["lacking"] = demand(body.surface, body.phi, body.cohesion, stress)[1]
     yielded = log.counts[0]["events"] > 0 and log.events[0]["code"] == ONSET
-    _final_state(body, end.regime, holds, out, shape, gradient)
+    _write_end(body, end, holds, stress, out, shape, gradient, log)
+    if holds and end.regime != RIGID:
+        axes = out["axes"]
+        rho = body.rho * body.axes[0] * body.axes[1] * body.axes[2] / (axes[0] * axes[1] * axes[2])
+        out["bound_fraction"] = bound_share(shape, gradient, rho)
     if yielded and required and reason != STUCK:
-        tough = BodyState(
-            body.axes, body.rho, body.omega, body.attitude, body.phi, body.cohesion, body.dilatancy,
-            body.surface, False, body.expansion,
-        )  # fmt: skip
-        second = evolve(
-            tough, span, tide, ground, limits, True, np.zeros((3, 3)), np.empty((3, 3)), np.empty((3, 3)),
-            new_log(0, 1),
+        second = evolve_rigid(
+            body, span, tide, ground, limits, _UNYIELDING, np.empty((3, 3)), np.empty((3, 3)), new_log(_NO_ROWS, _ONE)
         )  # fmt: skip
         out["friction"], out["friction_time"] = second.peak.friction, second.peak.time
         reason = STUCK if second.reason == STUCK else reason
@@ -256,6 +296,22 @@ def _body(row: Any) -> BodyState:
 
 
 @kernel
+def _encounter(row: Any, encounters: Encounters) -> tuple[Span, TidePanels, Ground]:
+    """Span, tide and ground of the encounter of a row of BODY."""
+    e = encounters.rows[row["encounter"]]
+    s = e["tide"]
+    panels = np.ascontiguousarray(encounters.tides[s["first"] : s["last"]])
+    g = e["ground"]
+    last = g["first"] if e["least"] > NEAR_GROUND * row["axes"][0] else g["last"]
+    positions = np.ascontiguousarray(encounters.positions[g["first"] : last])
+    return (
+        Span(e["start"], e["rest"], e["stop"]),
+        TidePanels(s["tau"], s["start"], s["width"], panels),
+        Ground(g["tau"], g["start"], g["width"], e["floor"], e["least"], 1.0, positions),
+    )
+
+
+@kernel
 def verdict_rows(
     rows: NDArray[np.int64],
     bodies: NDArray[Any],
@@ -277,16 +333,23 @@ def verdict_rows(
     """
     for i in rows:
         body = _body(bodies[i])
-        e = encounters.rows[bodies[i]["encounter"]]
-        s = e["tide"]
-        panels = np.ascontiguousarray(encounters.tides[s["first"] : s["last"]])
-        tide = TidePanels(s["tau"], s["start"], s["width"], panels)
-        g = e["ground"]
-        last = g["first"] if e["least"] > NEAR_GROUND * body.axes[0] else g["last"]
-        positions = np.ascontiguousarray(encounters.positions[g["first"] : last])
-        ground = Ground(g["tau"], g["start"], g["width"], e["floor"], e["least"], 1.0, positions)
+        span, tide, ground = _encounter(bodies[i], encounters)
         reset(output.log)
         verdict_row(
-            body, Span(e["start"], e["rest"], e["stop"]), tide, ground, limits, required,
+            body, span, tide, ground, limits, required,
             output.outcomes[i], output.shape, output.gradient, output.log,
         )  # fmt: skip
+
+
+@kernel
+def rigid_rows(
+    rows: NDArray[np.int64], bodies: NDArray[Any], encounters: Encounters, limits: Limits, output: Output
+) -> None:
+    """`verdict_rows` for the bodies that do not yield; the others have the verdict YIELDS."""
+    for i in rows:
+        body = _body(bodies[i])
+        span, tide, ground = _encounter(bodies[i], encounters)
+        reset(output.log)
+        _rigid_row(
+            body, span, tide, ground, limits, output.outcomes[i], output.shape, output.gradient, output.log
+        )

@@ -6,8 +6,12 @@ combinations of the stages are pasted into their callers, where they follow the 
 
 from __future__ import annotations
 
+import runpy
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
 import numpy as np
-from scipy.integrate import DOP853
 
 from flybystab.core.numerics.jit import pasted_kernel
 from flybystab.typing import Array
@@ -18,17 +22,33 @@ N_EXTENDED = 16
 #: Powers of the dense output.
 N_POWERS = 7
 
+
+def coefficients() -> Any:
+    """Coefficients A, C, E3, E5 and D of the method in SciPy.
+
+    They are read from the file that has them, if it is where it has been since SciPy 1.4: the package
+    ``scipy.integrate`` takes 0.2 s to import.
+    """
+    scipy = find_spec("scipy")
+    for folder in (scipy and scipy.submodule_search_locations) or ():
+        file = Path(folder) / "integrate" / "_ivp" / "dop853_coefficients.py"
+        if file.is_file():
+            found = runpy.run_path(str(file))
+            if {"A", "C", "E3", "E5", "D"} <= found.keys():
+                return tuple(found[name] for name in ("A", "C", "E3", "E5", "D"))
+    from scipy.integrate import DOP853
+
+    a = np.zeros((N_EXTENDED, N_EXTENDED))
+    a[:N_STAGES, :N_STAGES], a[N_STAGES, :N_STAGES], a[N_STAGES + 1 :] = DOP853.A, DOP853.B, DOP853.A_EXTRA
+    return a, np.concatenate([DOP853.C, [1.0], DOP853.C_EXTRA]), DOP853.E3, DOP853.E5, DOP853.D
+
+
+_A, NODE, _E3, _E5, _D = (np.ascontiguousarray(table) for table in coefficients())
 # Rows of the tableau without their zeros (a third of it): row s combines the stages STAGE[FROM[s] : FROM[s + 1]]. Row
-# 12 gives the solution, rows 13 to 15 the stages of the dense output.
-_ROWS = [*(DOP853.A[s, :s] for s in range(N_STAGES)), DOP853.B, *DOP853.A_EXTRA]
-STAGE = np.concatenate([np.flatnonzero(row) for row in _ROWS])
-WEIGHT = np.concatenate([row[row != 0.0] for row in _ROWS])
-FROM = np.concatenate([[0], np.cumsum([np.count_nonzero(row) for row in _ROWS])])
-#: Nodes of the rows.
-NODE = np.concatenate([DOP853.C[:N_STAGES], [1.0], DOP853.C_EXTRA])
-_E3 = np.ascontiguousarray(DOP853.E3)
-_E5 = np.ascontiguousarray(DOP853.E5)
-_D = np.ascontiguousarray(DOP853.D)
+# 12 gives the solution, rows 13 to 15 the stages of the dense output. NODE has their nodes.
+STAGE = np.concatenate([np.flatnonzero(row) for row in _A])
+WEIGHT = _A[_A != 0.0]
+FROM = np.concatenate([[0], np.cumsum([np.count_nonzero(row) for row in _A])])
 
 
 @pasted_kernel

@@ -285,4 +285,10 @@ def rate(field: Field, law: Array, t: float, y: Array, places: Places, out: Arra
         _push(law, y, places, out)
 
 
-__all__ = ["Field", "borrowed_field", "empty_places", "field", "rate"]
+@kernel
+def first_rate(field: Field, law: Array, t: float, y: Array, places: Places, out: Array) -> None:
+    """`rate` as a kernel of its own, for the start of an integration: it is compiled once instead of once a caller."""
+    rate(field, law, t, y, places, out)
+
+
+__all__ = ["Field", "borrowed_field", "empty_places", "field", "first_rate", "rate"]

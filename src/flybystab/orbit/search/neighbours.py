@@ -21,7 +21,7 @@ from flybystab.orbit.kepler import two_body
 from flybystab.orbit.orbit import seconds
 from flybystab.orbit.planets import planet
 from flybystab.orbit.predictability import Deviations, predictability, undisturbed_error
-from flybystab.orbit.search.acceleration import Field, borrowed_field, rate
+from flybystab.orbit.search.acceleration import Field, borrowed_field, first_rate
 from flybystab.orbit.search.dop853 import Room, advance, borrowed_room, empty_room
 from flybystab.typing import Array
 
@@ -47,7 +47,7 @@ def carry(
     new = np.empty(6)
     h = DAY
     t = t0
-    rate(field, law, t, y, places, k[0])
+    first_rate(field, law, t, y, places, k[0])
     for n in range(times.size):
         while t != times[n]:
             t, h = advance(field, law, t, y, h, times[n], tolerance, k, new, places)

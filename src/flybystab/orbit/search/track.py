@@ -10,10 +10,10 @@ from __future__ import annotations
 import numpy as np
 
 from flybystab.constants import DAY
-from flybystab.core.numerics.jit import kernel
+from flybystab.core.numerics.jit import code, kernel
 from flybystab.orbit.almanac import gather
 from flybystab.orbit.ephemeris import N_BODIES, body_state
-from flybystab.orbit.search.acceleration import Field, borrowed_field, empty_places, rate
+from flybystab.orbit.search.acceleration import Field, borrowed_field, empty_places, first_rate
 from flybystab.orbit.search.dop853 import Room, advance, borrowed_room, empty_room
 from flybystab.orbit.search.force_selection import reduced, shares_along
 from flybystab.orbit.search.minima import BENDING, FINE, chord_distance, crash, look
@@ -23,6 +23,8 @@ from flybystab.typing import Array
 FULL, STALLED, INSIDE, EXHAUSTED = 1, 2, 3, 4
 #: Most steps from the epoch to the end of the span; an asteroid of the inner main belt takes about 60 a year.
 MAX_STEPS = 1_000_000
+# Typed: numba compiles a kernel anew for each literal argument.
+_NO_ROWS = code(0)
 
 
 @kernel
@@ -80,7 +82,7 @@ def track_encounters(
     sign = 1.0 if t_end >= t0 else -1.0
     h = DAY
     t = t0
-    rate(field, law, t, y, places, k[0])
+    first_rate(field, law, t, y, places, k[0])
     gather(places, now)
     for body in range(N_BODIES):
         if (y[0] - now[body, 0]) ** 2 + (y[1] - now[body, 1]) ** 2 + (y[2] - now[body, 2]) ** 2 < floors[
@@ -184,7 +186,7 @@ def search(
     float
         Time at which it did, s; for 3 the number of the body.
     """
-    n = 0
+    n = _NO_ROWS
     room, spare_room, places = empty_room(), empty_room(), empty_places()
     for i in range(first, epochs.size):
         t0 = epochs[i]

@@ -1,0 +1,56 @@
+"""Compilation of the kernels of a flyby in a second process, while this one looks for the encounter.
+
+On a fresh machine the kernels of the orbit and those of the body take about as long to compile. numba compiles in one
+thread of a process only; a second process leaves its kernels on the disk, from where this one loads them.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from typing import Any
+
+from flybystab.core.dynamics import verdict_row
+from flybystab.core.numerics.jit import CACHE
+
+#: A flyby and a sample of attitudes without yield, whose kernels are those of the first answer.
+_RIGID = """
+import astropy.units as u
+import flybystab as fs
+body = fs.Body([3, 2, 1] * u.m, 2000 * u.kg / u.m**3, spin_period=9 * u.h)
+far = fs.Encounter.hyperbolic("earth", 20 * fs.R_earth, 5 * u.km / u.s)
+repr(fs.flyby(body, far)), fs.spin_sample(body, far, 2)
+"""
+
+_running: subprocess.Popen[bytes] | None = None
+
+
+def on_disk(kernel: Any) -> bool:
+    """Whether a kernel that is up to date lies on the disk, or nothing can be said about it."""
+    try:
+        return bool(kernel._cache._cache_file._load_index())
+    except AttributeError:  # without a cache, or with another version of numba
+        return True
+
+
+def start() -> bool:
+    """Begin to compile the kernels that are not on disk; False where there is nothing to gain."""
+    global _running
+    if _running is None and CACHE and (os.cpu_count() or 1) > 1 and not on_disk(verdict_row.rigid_rows):
+        _running = subprocess.Popen(
+            [sys.executable, "-c", _RIGID], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
+        )
+        return True
+    return False
+
+
+def wait() -> None:
+    """Return when the process that :func:`start` has begun has ended; at once without one.
+
+    What it has not compiled, for whatever reason, is compiled here.
+    """
+    global _running
+    if _running is not None:
+        _running.wait()
+        _running = None
