@@ -250,7 +250,7 @@ def _plot(rows: list[dict[str, Any]], path: str | Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
-    figure = Figure(figsize=(6.0, 4.2), layout="constrained")
+    figure = Figure(figsize=(7.4, 4.2), layout="constrained")
     FigureCanvasAgg(figure)
     panel: Any = figure.subplots()
     for method, marker in zip(dict.fromkeys(r["method"] for r in rows), "oxs^Dv*", strict=False):
@@ -259,5 +259,5 @@ def _plot(rows: list[dict[str, Any]], path: str | Path) -> None:
     panel.set(
         xlabel="processor time (ms)", ylabel="relative error of the semi-axes", title="Flyby P1, with flow"
     )
-    panel.legend(frameon=False)
+    figure.legend(loc="outside right upper", frameon=False)
     save(figure, path)
