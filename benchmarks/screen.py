@@ -2,6 +2,7 @@
 
 python benchmarks/screen.py throughput     samples per second by distance and workers; cost of 10^8 samples
 python benchmarks/screen.py memory         resident memory while 10^6 rows are written
+python benchmarks/screen.py samples        resident memory for 10^6 samples of one passage
 python benchmarks/screen.py catalogue [FILE] [--jobs N] [--samples N] [--output FILE]
                                            a whole run: time, verdicts, the ten closest to failure
 python benchmarks/screen.py cneos RESULT   a table of results against the passages that CNEOS predicted in 2021
@@ -32,7 +33,7 @@ from flybystab.catalogues.completion import with_physical_data
 from flybystab.constants import AU, R_EARTH
 from flybystab.encounter.encounter import Encounter
 from flybystab.screening.encounters import Passage
-from flybystab.screening.progress import ProgressBar, duration
+from flybystab.screening.progress import ProgressBar
 from flybystab.screening.results import read_results
 from flybystab.screening.screening import Screening
 from flybystab.screening.settings import Settings, settings
@@ -61,6 +62,14 @@ def four(asteroid: Asteroid, settings: Settings) -> list[Passage]:
 
 def two(asteroid: Asteroid, settings: Settings) -> list[Passage]:
     return at(DISTANCES["2 R_E"], asteroid, settings)
+
+
+def duration(seconds: float) -> str:
+    """A duration with a suitable unit: 48 s, 3 min, 2.5 h, 4 d."""
+    for size, unit in ((86400.0, "d"), (3600.0, "h"), (60.0, "min")):
+        if seconds >= 1.5 * size:
+            return f"{seconds / size:.2g} {unit}"
+    return f"{seconds:.0f} s"
 
 
 #: Distance, asteroids, samples of each.
@@ -199,6 +208,18 @@ def memory(count: int) -> None:
                 )
 
 
+def sample_memory(count: int) -> None:
+    """Peak resident memory of one passage with up to `count` samples."""
+    base = Asteroid.from_catalogue("Anteros")
+    print(f"{'samples':>9} {'peak memory (MB)':>17} {'processor time (s)':>19}")
+    with tempfile.TemporaryDirectory() as where:
+        for n in (100, count // 10, count):
+            began = time.process_time()
+            Screening([base], settings(*SPAN, samples=n), far).run(Path(where) / f"x{n}.ecsv")
+            peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+            print(f"{n:9d} {peak:17.0f} {time.process_time() - began:19.1f}")
+
+
 def whole(args: argparse.Namespace) -> None:
     asteroids = with_physical_data(catalogue(args.file)) if args.file else catalogue()
     run = Screening(asteroids, settings(*SPAN, samples=args.samples, seed=args.seed))
@@ -262,7 +283,7 @@ def main() -> int:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("what", choices=("throughput", "memory", "catalogue", "cneos"))
+    parser.add_argument("what", choices=("throughput", "memory", "samples", "catalogue", "cneos"))
     parser.add_argument("file", nargs="?", type=Path)
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--samples", type=int, default=100)
@@ -275,6 +296,8 @@ def main() -> int:
         throughput()
     elif args.what == "memory":
         memory(args.rows)
+    elif args.what == "samples":
+        sample_memory(args.rows)
     elif args.what == "cneos":
         cneos(args.file, args.data)
     else:

@@ -30,6 +30,7 @@ TABLES = {
     "orbit_errors": "python benchmarks/orbit_errors.py",
     "other_planets": "python benchmarks/encounters.py planets",
     "outcomes": "python benchmarks/piles.py map",
+    "samples": "python benchmarks/screen.py samples",
     "screen": "flybystab bench screen",
     "kappa": "python benchmarks/stability.py kappa",
     "margin": "python benchmarks/margin.py",
