@@ -134,7 +134,7 @@ def _solution(name: str, lines: Sequence[str], file: str) -> Entry:
     values = [number(t, n, file) for n, t in zip(names, texts, strict=True)]
     if "tp" in names:
         values[5] += MJD - jd
-    row = _identity(name) | {"orbit_solution": "NEOCC OEF2", "frame": FRAME}
+    row = _identity(name) | {"orbit_solution": "NEOCC OEF2" if kinds[0] == "KEP" else "OEF2", "frame": FRAME}
     row["orbit_source"] = f"ESA NEOCC ({file})" if kinds[0] == "KEP" else f"OrbFit {kinds[0]} ({file})"
     row |= elements_row(jd, names, texts, values)
     if "MAG" in words and number(words["MAG"][0], "MAG", file) > -9.0:
