@@ -188,7 +188,7 @@ def deviation(orbit: Orbit, truth: Orbit, time: Time, window: Window) -> float:
     return float((points[-1] - points[-2]) @ axes[:, -1] / np.sqrt(values[-1]))
 
 
-def pairs(size: int = 300) -> dict[str, list[tuple[Orbit, Orbit]]]:
+def pairs(size: int = 200) -> dict[str, list[tuple[Orbit, Orbit]]]:
     """Orbits with their stated errors, and later or better orbits of the same asteroids, by source of the errors."""
     old, new, mpc = read(OLD), read(NEW), read(MPC)
     late = {k: a.orbit for k, a in new.items() if abs(seconds(a.epoch, MEETING)) < 2.0 * YEAR}
@@ -216,8 +216,15 @@ def pairs(size: int = 300) -> dict[str, list[tuple[Orbit, Orbit]]]:
         out[f"JPL 2020, code {label} alone"] = [(plain(old[k]), late[k]) for k in chosen]
     for label, low, high in (("0", 0, 0), ("1-2", 1, 2), ("3-5", 3, 5), ("6-9", 6, 9)):
         keys = [k for k in mpc if k in late and mpc[k].row["condition_code"].isdigit()]
-        keys = [k for k in keys if low <= int(mpc[k].row["condition_code"]) <= high]
-        out[f"MPC 2026, digits and U {label}"] = [(mpc[k].orbit, late[k]) for k in some(keys)]
+        keys = [
+            k for k in keys if low <= int(mpc[k].row["condition_code"]) <= high and mpc[k].row["observed_jd"]
+        ]
+        ago = {k: (MEETING.jd - float(mpc[k].row["observed_jd"])) / 365.25 for k in keys}
+        for when, among in (
+            ("< 8 yr", [k for k in keys if ago[k] < 8.0]),
+            ("> 8 yr", [k for k in keys if ago[k] >= 8.0]),
+        ):
+            out[f"MPC 2026, U {label}, {when}"] = [(mpc[k].orbit, late[k]) for k in some(among)]
     files = sorted((DATA / "neocc").glob("*.ke1"))
     own = [catalogue(f)[0] for f in files]
     out["NEOCC, covariances"] = [(a.orbit, late[identity(a)]) for a in own if identity(a) in late]
@@ -229,12 +236,15 @@ def coverage() -> list[str]:
     window = ephemeris("de440").window(MEETING, -8.0 * YEAR, 2.0 * YEAR)
     out = [
         "Stated errors against JPL's orbits of 2026-07 at their epoch, along the direction least known",
+        "(years: of the MPC, since the middle of the observed arc)",
         "source                          orbits  median |z|  within 1 sigma  within 3 sigma",
         "normal distribution                          0.67            68 %            99.7 %",
     ]
     for label, found in pairs().items():
         z = np.array([abs(deviation(a, b, later(MEETING, 1.0), window)) for a, b in found])
         z = z[np.isfinite(z)]
+        if not len(z):
+            continue
         shares = [np.mean(z < n) for n in (1.0, 3.0)]
         spreads = [np.sqrt(max(p * (1.0 - p), 0.25 / len(z)) / len(z)) for p in shares]
         cells = "   ".join(

@@ -1,7 +1,9 @@
 """From the orbit file of an agency to the verdict and the page, by the commands."""
 
+import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from flybystab.catalogues.catalogue import Asteroid
@@ -41,13 +43,26 @@ END_OF_HEADER
 """
 
 
-@pytest.mark.parametrize("agency", ["JPL", "MPC", "NEOCC", "Find_Orb", "Horizons"])
+def neodys():
+    """The orbit of NEOCC in equinoctial elements (Broucke & Cefola 1972)."""
+    node, peri, i = (np.radians(float(x)) for x in (NODE, PERI, I))
+    e = float(E)
+    values = [
+        float(A), e * np.sin(node + peri), e * np.cos(node + peri), np.tan(i / 2) * np.sin(node),
+        np.tan(i / 2) * np.cos(node), (float(M) + float(NODE) + float(PERI)) % 360.0,
+    ]  # fmt: skip
+    line = " EQU   " + " ".join(f"{float(x)!r}" for x in values)
+    return "\n".join(line if x.startswith(" KEP") else x for x in NEOCC.splitlines()) + "\n"
+
+
+@pytest.mark.parametrize("agency", ["JPL", "MPC", "NEOCC", "NEODyS", "Find_Orb", "Horizons"])
 def test_an_orbit_file_gives_a_verdict_and_a_page(tmp_path, capsys, agency):
     """Apophis in 2029 from five publishers; its body is known by its number."""
     content = {
         "JPL": (FILES / "sbdb_covariance_same_epoch.json").read_text(),
         "MPC": (FILES / "apophis_2010.dat").read_text(),
         "NEOCC": NEOCC,
+        "NEODyS": neodys(),
         "Find_Orb": FIND_ORB,
         "Horizons": HORIZONS,
     }[agency]
@@ -72,3 +87,36 @@ def test_a_file_of_several_orbits_asks_for_a_name(tmp_path, capsys):
     error = capsys.readouterr().err
     assert "C/2020 F3 (NEOWISE)" in error
     assert "--catalogue" in error
+
+
+@pytest.mark.parametrize(
+    ("name", "date", "more"),
+    [
+        ("2020AB.json", "2019-12-29", ["--H", "27.5"]),  # MPC, a file without H
+        ("2024BX1.ke1", "2024-01-21", []),  # NEOCC
+        ("2018VP1.eq0", "2018-11-02", []),  # NEODyS
+        ("find_orb_total.json", "2031-08-25", []),
+    ],
+)
+def test_a_newly_found_object_has_a_verdict_by_the_population(capsys, name, date, more):
+    """None of them is in the catalogue: --assume takes the body from the population and says so."""
+    words = ["flyby", str(FILES / name), "--date", date, "--attitudes", "2", "--assume", *more]
+    assert main(words) == 0
+    shown = capsys.readouterr().out
+    assert f"{date} " in shown
+    assert "median of the population: diameter (from H and albedo)" in shown
+    assert re.search(r"^verdict +[A-Z]", shown, re.MULTILINE)
+
+
+def test_physical_parameters_of_a_file_complete_its_orbit(tmp_path, capsys):
+    """The orbit of one file and the spin solutions of another; the page names their source."""
+    spins = tmp_path / "spins.csv"
+    spins.write_text(
+        "period_h,lon_deg,lat_deg,weight,source\n0.05,10,20,2,lightcurve 1\n0.08,190,-20,1,lightcurve 2\n"
+    )
+    words = ["flyby", str(FILES / "2018VP1.eq0"), "--date", "2018-11-02", "--attitudes", "2", "--assume"]
+    assert main([*words, "--phys", str(spins)]) == 0
+    shown = capsys.readouterr().out
+    assert "one of 2 rival spin solutions (weight 67%)" in shown
+    assert "pole unknown" not in shown
+    assert "spin period" not in shown.partition("assumed")[2]
