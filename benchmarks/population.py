@@ -259,6 +259,7 @@ def nbody(years=3000.0, particles=200, within=0.1):
     """Passages counted in an N-body integration of known asteroids, and expected from their changing orbits."""
     import rebound
 
+    years, particles = float(years), int(particles)
     orbits, h = catalogue()
     rows = read("nea_mpc_2026-02.csv.gz")
     rng = np.random.default_rng(3)
@@ -416,6 +417,10 @@ if __name__ == "__main__":
     commands = (counts, search, published, answers, nbody, verdicts, convergence, scale, binaries)
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("what", choices=[c.__name__ for c in commands])
-    parser.add_argument("arguments", nargs="*", help="search: limit of the absolute magnitude (17.75)")
+    parser.add_argument(
+        "arguments",
+        nargs="*",
+        help="search: limit of the absolute magnitude (17.75); nbody: years and number of particles",
+    )
     options = parser.parse_args()
     {c.__name__: c for c in commands}[options.what](*options.arguments)

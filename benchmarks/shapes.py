@@ -78,7 +78,7 @@ def published(file=None):
         for density, reference in quoted.items():
             body = fs.Body.from_shape(shape, density=density * u.g / u.cm**3, spin_period=30.5 * u.h)
             most, ranges, nearly, steepest = [], [], [], []
-            for rotation in spin_states(body, 16, 1)[1]:
+            for rotation in spin_states(body, 16, 1).rotations:
                 history = fs.surface_history(body, encounter, rotation, shape=shape, instants=80)
                 change = history.extremes.change.to_value(u.deg)
                 order = np.argsort(change)

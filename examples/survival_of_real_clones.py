@@ -45,8 +45,8 @@ passages = [
     fs.Encounter.hyperbolic("earth", q, v) for q, v in zip(clones.distance, clones.v_inf, strict=True)
 ]
 frame = fs.periapsis_axes(fs.Encounter.from_orbit(apophis.orbit, "earth", clones.time))
-bodies, rotations = spin_states(apophis, N, seed=1)
-attitudes = [frame @ r for r in rotations]
+states = spin_states(apophis, N, seed=1)
+bodies, attitudes = states.bodies(), list(frame @ states.rotations)
 tables = {
     "orbit and attitude": fs.flyby_many(bodies, passages, attitudes),
     "orbit alone": fs.flyby_many([bodies[0]] * N, passages, [attitudes[0]] * N),

@@ -21,7 +21,7 @@ def histories():
         body = fs.Body.from_shape(RELIEF, density=density * u.g / u.cm**3, spin_period=30.5 * u.h)
         found[density] = [
             fs.surface_history(body, encounter, r, shape=RELIEF, instants=80)
-            for r in spin_states(body, 4, 1)[1]
+            for r in spin_states(body, 4, 1).rotations
         ]
     return found
 
