@@ -1,5 +1,6 @@
 """The report page: complete, self-contained, readable on a phone and in print."""
 
+import base64
 import re
 import shutil
 import subprocess
@@ -11,7 +12,7 @@ import pytest
 from flybystab.cli.main import main
 
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
-VOID = {"meta", "link", "img", "br"}
+VOID = {"meta", "link", "img", "br", "source"}
 
 
 class Page(HTMLParser):
@@ -80,6 +81,16 @@ def test_nothing_is_loaded_from_elsewhere(page):
     assert all(image["alt"] for image in parsed.images)
     assert all(link.startswith("data:") for link in parsed.links)
     assert "url(" not in re.search("<style>.*</style>", page.read_text(), re.S).group()
+
+
+def test_figures_are_drawn_anew_for_a_phone(page):
+    text = page.read_text()
+    narrow = re.findall(r'<source media="\(max-width: 640px\)" srcset="data:([^"]+)"', text)
+    wide = re.findall(r'<img src="data:([^"]+)"', text)
+    assert len(narrow) == len(wide) == 3
+    assert not set(narrow) & set(wide)
+    svg = base64.b64decode(narrow[0].split(",")[1]).decode()
+    assert float(re.search(r'width="([0-9.]+)pt"', svg)[1]) == pytest.approx(4.0 * 72, rel=0.01)
 
 
 def chromium(*arguments):

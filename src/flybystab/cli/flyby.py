@@ -44,7 +44,8 @@ def run(options: argparse.Namespace) -> None:
     write_map(options, surface)
     encounter = result.encounter
     for target in filter(None, (options.output, options.movie)):
-        write_picture(result, f"{asteroid.label}, {encounter.time.tdb.iso[:10]}", target)
+        where = encounter.planet.name.capitalize()
+        write_picture(result, f"{asteroid.label} at {where}, {encounter.time.tdb.iso[:10]}", target)
     show(
         options,
         lambda: document.flyby_document(

@@ -38,6 +38,7 @@ COLUMNS = (
     ("Planet", False),
     ("Distance (km)", True),
     ("v_inf (km/s)", True),
+    ("P(intact)", True),
     ("Verdict", False),
     ("P(yield)", True),
     ("Margin (deg)", True),
@@ -181,8 +182,9 @@ def _index(pages: jinja2.Environment, table: QTable, entries: list[dict[str, Any
     settings = settings if isinstance(settings, dict) else {}
     span = f"{dates[0]} to {dates[-1]}" if dates else "no dates"
     summary = (
-        f"{len(entries)} encounters of {asteroids} asteroids, {span}. The verdict is that for the catalogue values and "
-        "the chosen material; P(yield) is the fraction of the samples in equilibrium that yield or reach the planet."
+        f"{len(entries)} encounters of {asteroids} asteroids, {span}. P(intact) is the fraction of the samples of the "
+        "uncertain inputs, P(yield) that among the samples in equilibrium; yielding includes reaching the planet. The "
+        "verdict is that for the catalogue values and the chosen material."
     )
     return pages.get_template("index.html").render(
         title=title or f"Encounters of asteroids, {span}",
@@ -216,6 +218,7 @@ def _entry(row: Any, position: int) -> dict[str, Any]:
     planet = str(row["planet"]).capitalize()
     distance, speed = _number(row["distance"], u.km), _number(row["v_inf"], u.km / u.s)
     margin, probability = _number(row["margin"], u.deg), _number(row["p_yield"])
+    intact = _number(row[share_of(Verdict.INTACT)])
     slug = re.sub(
         r"[^a-z0-9]+", "-", unicodedata.normalize("NFKD", name).encode("ascii", "ignore").decode().lower()
     )
@@ -236,6 +239,8 @@ def _entry(row: Any, position: int) -> dict[str, Any]:
         "distance_text": "" if distance is None else f"{distance:,.0f}",
         "v_inf": speed,
         "v_inf_text": "" if speed is None else f"{speed:.2f}",
+        "intact": intact,
+        "intact_text": "" if intact is None else f"{intact:.3g}",
         "probability": probability,
         "probability_text": "" if probability is None else f"{probability:.3g}",
         "margin": margin,
@@ -263,6 +268,8 @@ def _number(value: Any, unit: u.UnitBase | None = None) -> float | None:
 def _margin_text(row: Any, margin: float | None, verdict: str) -> str:
     if margin is None:
         return "none suffices" if verdict and float(row["margin"].value) == -np.inf else ""
+    if verdict == Verdict.NOT_IN_EQUILIBRIUM:  # the body has none before the encounter
+        return ""
     return ("≥ " if str(row["decided_by"]) == "bound" else "") + f"{margin:.2f}"
 
 

@@ -6,6 +6,7 @@ import base64
 import io
 import platform
 import sys
+from collections.abc import Callable
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
@@ -41,6 +42,7 @@ from flybystab.plots.flyby import BLUE, flyby_panels
 from flybystab.plots.grains import grains_figure, grains_scene_plot
 from flybystab.plots.scene import scene_plot
 from flybystab.plots.shape_map import surface_history_figure
+from flybystab.plots.style import styled
 
 #: Rows of a table: label and text.
 Rows = list[tuple[str, str]]
@@ -49,6 +51,7 @@ Rows = list[tuple[str, str]]
 PACKAGES = ("numpy", "scipy", "numba", "astropy", "rebound", "jplephem", "skyfield-data")
 
 
+@styled
 def report(
     asteroid: Asteroid,
     result: FlybyResult,
@@ -99,7 +102,7 @@ def report(
             "sample": _sample_picture(sample),
             "scene": _scene_picture(result),
             "surface": None if surface is None else _surface_picture(surface),
-            "grains": None if result.grains is None else _bitmap(grains_figure(result)),
+            "grains": None if result.grains is None else (_bitmap(grains_figure(result)), None),
             "grains_scene": None if result.grains is None else _grains_scene(result),
         },
     )
@@ -227,8 +230,12 @@ def _probability_rows(row: Row) -> Rows:
             f"{float(row['p_yield_high']):.2g}), among bodies in equilibrium before the encounter",
         ),
         ("not in equilibrium", f"{float(row['p_not_in_equilibrium']):.3g} of the samples"),
-        ("drawn from distributions", str(row["drawn"])),
-        ("margin most sensitive to (Spearman rho)", str(row["contributors"])),
+        *([("drawn from distributions", str(row["drawn"]))] if row["drawn"] else []),
+        *(
+            [("margin most sensitive to (Spearman rho)", str(row["contributors"]))]
+            if row["contributors"]
+            else []
+        ),
     ]
 
 
@@ -294,6 +301,12 @@ def _embedded(figure: Any) -> str:
     return "data:image/svg+xml;base64," + base64.b64encode(stream.getvalue()).decode()
 
 
+#: A figure as a data URL, and the same drawn anew for a narrow screen; None where it has too many panels for one.
+_Pictures = tuple[str, str | None]
+#: Width of a figure on a phone, inches: 390 px with text of its full size.
+_PHONE = 4.0
+
+
 def _blank(width: float, height: float) -> Any:
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
@@ -303,44 +316,46 @@ def _blank(width: float, height: float) -> Any:
     return figure
 
 
-def _history_picture(r: FlybyResult) -> str:
-    figure = _blank(7.2, 8.0)
-    flyby_panels(figure.subplots(4, 1, sharex=True), r)
-    return _embedded(figure)
+def _twice(draw: Callable[[Any], Any], wide: tuple[float, float], narrow: float, encode: Any) -> _Pictures:
+    """A figure in its size, and as wide as a phone with the height `narrow`."""
+    out = []
+    for width, height in (wide, (_PHONE, narrow)):
+        figure = _blank(width, height)
+        draw(figure)
+        out.append(encode(figure))
+    return out[0], out[1]
+
+
+def _history_picture(r: FlybyResult) -> _Pictures:
+    return _twice(
+        lambda figure: flyby_panels(figure.subplots(4, 1, sharex=True), r), (7.2, 8.0), 7.6, _embedded
+    )
 
 
 def _bitmap(figure: Any) -> str:
     """A figure of many small parts, for which a bitmap is smaller than vectors."""
     stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=120)
+    figure.savefig(stream, format="png", dpi=130)
     return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
 
 
-def _grains_scene(r: FlybyResult) -> str:
-    figure = _blank(7.2, 4.2)
-    grains_scene_plot(figure.subplots(), r)
-    return _bitmap(figure)
+def _grains_scene(r: FlybyResult) -> _Pictures:
+    return _twice(lambda figure: grains_scene_plot(figure.subplots(), r), (7.2, 4.2), 3.0, _bitmap)
 
 
-def _surface_picture(surface: SurfaceHistory) -> str:
-    figure = surface_history_figure(surface, REPOSE, figure=_blank(8.0, 9.0))
-    stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=120)
-    return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
+def _surface_picture(surface: SurfaceHistory) -> _Pictures:
+    return _bitmap(surface_history_figure(surface, REPOSE, figure=_blank(8.0, 9.0))), None
 
 
-def _scene_picture(r: FlybyResult) -> str:
-    figure = _blank(7.2, 3.2)
-    scene_plot(figure.add_subplot(projection="3d"), r)
-    stream = io.BytesIO()
-    figure.savefig(stream, format="png", dpi=130)  # a bitmap is smaller than thousands of vector facets
-    return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
+def _scene_picture(r: FlybyResult) -> _Pictures:
+    def draw(figure: Any) -> None:
+        scene_plot(figure.add_subplot(projection="3d"), r)
+
+    return _twice(draw, (7.2, 3.2), 2.4, _bitmap)
 
 
-def _sample_picture(s: SpinSample) -> str:
-    figure = _blank(6.4, 3.6)
-    sample_plot(figure.subplots(), s)
-    return _embedded(figure)
+def _sample_picture(s: SpinSample) -> _Pictures:
+    return _twice(lambda figure: sample_plot(figure.subplots(), s), (6.4, 3.6), 3.2, _embedded)
 
 
 def sample_plot(axes: Any, sample: SpinSample) -> Any:

@@ -7,6 +7,7 @@ clump that they belong to at the end; grey ones are loose.
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import astropy.units as u
@@ -120,10 +121,8 @@ def grains_scene_plot(
         )  # fmt: skip
     axes.set(aspect="equal", xlabel="y (1000 km)", ylabel="x (1000 km)")
     axes.margins(0.08)
-    axes.set_title(
-        f"{encounter.planet.name.capitalize()} to scale, pile {magnification:,.0f} times larger; "
-        "colours: clumps at the end",
-    )
+    text = f"{encounter.planet.name.capitalize()} to scale, pile {magnification:,.0f} times larger; "
+    axes.set_title(fill(f"{text}colours: clumps at the end", int(13.0 * axes.figure.get_figwidth())))
     return axes
 
 

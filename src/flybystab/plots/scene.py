@@ -7,6 +7,7 @@ of a kilometre would be a dot, so it is magnified, by a factor that stands in th
 from __future__ import annotations
 
 from pathlib import Path
+from textwrap import fill
 from typing import Any
 
 import astropy.units as u
@@ -84,9 +85,10 @@ def scene_plot(
     axes.set_ylabel("y (1000 km)", labelpad=8)
     axes.set_zticks([])
     name = encounter.planet.name.capitalize()
-    axes.set_title(
-        f"{name} to scale, body {magnification:,.0f} times larger; grey rigid, orange flowing",
-    )
+    text = f"{name} to scale, body {magnification:,.0f} times larger; grey rigid, orange flowing"
+    title = fill(text, int(13.0 * axes.figure.get_figwidth()))
+    # The axes fill the figure: further lines go into them.
+    axes.set_title(title, pad=6.0 - 12.0 * title.count("\n"))
     limits = np.array([getattr(axes, f"get_{n}lim")() for n in "xyz"])
     # The scene is wide, the square that matplotlib draws it in is as high as the figure: it may reach out to the sides.
     room, (width, height) = axes.get_position(original=True), axes.figure.get_size_inches()
