@@ -354,6 +354,15 @@ def test_softening_never_takes_the_pressure_below_that_of_the_apex(kappa):
         assert loss_at(b, x, t, np.bool_(True)) == pytest.approx(phi + work[i], rel=1e-6)
 
 
+def test_a_softening_body_has_the_barrier_of_its_first_maximum():
+    """With a plastic bulk modulus the pressure of the flow is that at rest: beyond the maximum the flow goes on."""
+    b = body((1, 0.8, 0.7), 0.7, friction_angle=30 * u.deg)
+    soft = b.with_(material=b.material.with_(bulk_modulus=1e3 * equilibrium(b).mean_pressure))
+    s = stability(soft, dilatancy=0.1)
+    assert s.barrier_kind == "maximum"
+    assert s.critical_energy.barrier.value == pytest.approx(s.critical_energy.second.value, rel=0.1)
+
+
 def test_push_reports_its_loss_to_each_order():
     b = body((1, 0.8, 0.7), 0.5)
     p = push(b, np.array([[1, 0.5, 0], [0.5, 0, 0.2], [0, 0.2, -1]]), np.linspace(0, 0.1, 11))

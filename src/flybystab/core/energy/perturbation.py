@@ -448,7 +448,12 @@ def overload_at(b: Ellipsoid, path: Path, t: float) -> float:
 
 @kernel
 def _flows_on(b: Ellipsoid, path: Path, t0: float, t1: float, y0: float, y1: float) -> bool:
-    """Whether the body at rest is overloaded where slow flow gains energy between two strains; `y` its loss there."""
+    """Whether slow flow goes on by itself where it gains energy between two strains; `y` is the loss there.
+
+    With a plastic bulk modulus, whose pressure is that of the flow at rest too, it does.
+    """
+    if path.flow.kappa > 0.0:
+        return True
     tolerance = 1e-9 * max(abs(b.pressure), b.cohesion)
     if y1 <= 0.0:
         return overload_at(b, path, t1) > tolerance
@@ -473,7 +478,7 @@ def barrier(b: Ellipsoid, x: Array, longest: float, enough: float) -> tuple[floa
     """
     path = path_along(b, x)
     phi0, y1, ratio0 = state_at(b, path, 0.0)
-    if y1 <= 0.0 and overload_at(b, path, 0.0) > 1e-9 * max(abs(b.pressure), b.cohesion):
+    if y1 <= 0.0 and _flows_on(b, path, 0.0, 0.0, y1, y1):
         return 0.0, 0.0
     limit2 = max(LARGEST_AXIS_RATIO * LARGEST_AXIS_RATIO, LARGER_AXIS_RATIO2 * ratio0)
     top = strain = 0.0  # highest maximum so far
