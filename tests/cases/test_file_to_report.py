@@ -2,12 +2,16 @@
 
 import re
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from astropy.time import Time
 
-from flybystab.catalogues.catalogue import Asteroid
+from flybystab.catalogues.catalogue import Asteroid, catalogue
 from flybystab.cli.main import main
+from flybystab.encounter.encounter import Encounter
+from flybystab.io.report import _encounter_rows
 
 FILES = Path(__file__).parent / "files"
 APOPHIS = Asteroid.from_catalogue("Apophis").row
@@ -120,3 +124,12 @@ def test_physical_parameters_of_a_file_complete_its_orbit(tmp_path, capsys):
     assert "one of 2 rival spin solutions (weight 67%)" in shown
     assert "pole unknown" not in shown
     assert "spin period" not in shown.partition("assumed")[2]
+
+
+def test_the_page_of_an_impact_has_time_and_place_of_entry():
+    """2024 BX1: seen west of Berlin at 00:32 to 00:33 UTC, which is 69 s before the same time in TDB."""
+    orbit = catalogue(FILES / "2024BX1.ke1")[0].orbit
+    e = Encounter.from_orbit(orbit, "earth", Time("2024-01-21", scale="tdb"))
+    rows = dict(_encounter_rows(SimpleNamespace(encounter=e, contact=None), ""))
+    assert "enters the atmosphere on 2024-01-21 00:33:4" in rows["impact"]
+    assert "52.58 N 12.3" in rows["impact"]

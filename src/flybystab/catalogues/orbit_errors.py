@@ -5,8 +5,8 @@ of the runoff in longitude after ten years (https://minorplanetcenter.net/iau/in
 offer as a predictor for near-Earth asteroids. Here a third of the runoff in the middle of its class (three being the
 factor by which the MPC widens formal errors) counts as one sigma of the mean motion, of an asteroid that was where it
 was observed, in the middle of the arc. Held against later orbits that is about what it is called: 82 % of JPL's orbits
-of 2020 were within one sigma and 91 % within two
-(``python benchmarks/orbit_errors.py``).
+of 2020 were within one sigma and 91 % within two (``python benchmarks/orbit_errors.py runoff``). For short arcs of one
+apparition it is too small after eight years (``python benchmarks/orbit_errors.py coverage``).
 """
 
 from __future__ import annotations

@@ -29,6 +29,7 @@ from flybystab.io.text import (
     MEANING,
     angle,
     contact,
+    entry,
     extent,
     friction_extent,
     known,
@@ -142,7 +143,10 @@ def _encounter_rows(r: FlybyResult, when: str) -> Rows:
         ("closest approach", when or "hyperbolic encounter without a date"),
         ("distance between the centres", f"{q:,.1f} km ({q * 1e3 / e.planet.radius:.3f} planet radii)"),
         ("speed at closest approach", f"{e.v_periapsis.to_value(u.km / u.s):.4f} km/s"),
-        ("hyperbolic excess speed", f"{e.v_inf.to_value(u.km / u.s):.4f} km/s"),
+        (
+            "hyperbolic excess speed",
+            "none: bound to the planet" if e.bound else f"{e.v_inf.to_value(u.km / u.s):.4f} km/s",
+        ),
     ]
     if e.distance_error is not None and e.time_error is not None:
         rows.append(
@@ -154,7 +158,7 @@ def _encounter_rows(r: FlybyResult, when: str) -> Rows:
         )
         rows.append(("orbit quality", known(e)))
     if e.impact:
-        rows.append(("impact", f"reaches the {e.impact_level}"))
+        rows.append(("impact", f"reaches the {e.impact_level}{entry(e)}"))
     if r.contact is not None:
         rows.append(("contact", contact(r)))
     return rows
