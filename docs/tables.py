@@ -49,7 +49,6 @@ TABLES = {
     "push": "python benchmarks/stability.py push",
     "sky": "flybystab bench sky",
     "stages": "python benchmarks/completeness.py stages",
-    "start": "flybystab bench start",
     "tolerances": "python benchmarks/campaign.py tolerances",
     "shortcut_distant": "python benchmarks/shortcuts.py distant",
     "shortcut_planar": "python benchmarks/shortcuts.py planar",
