@@ -1,19 +1,21 @@
 """What digits and U of a catalogue say of its orbits, held against later and better orbits, as tables.
 
-Usage: ``python benchmarks/orbit_errors.py [runoff] [digits] [impacts] [model] [coverage]``. Reference data are read
-from ``../shared/data`` (or ``$FLYBYSTAB_SHARED/data``); nothing is downloaded.
+Usage: ``python benchmarks/orbit_errors.py [runoff] [digits] [impacts] [model] [coverage] [growth]``. Reference data are
+read from ``../shared/data`` (or ``$FLYBYSTAB_SHARED/data``); nothing is downloaded.
 """
 
 from __future__ import annotations
 
 import os
 import sys
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
 import astropy.units as u
 import numpy as np
 from astropy.coordinates import GCRS, ITRS, CartesianRepresentation
+from astropy.table import QTable
 from astropy.time import Time
 from numpy.typing import NDArray
 
@@ -26,6 +28,7 @@ from flybystab.orbit.ephemeris import Window, ephemeris
 from flybystab.orbit.forces import FORCES, LAW_SIZE
 from flybystab.orbit.orbit import Orbit, later, seconds
 from flybystab.orbit.predictability import deviations_of
+from flybystab.orbit.search import neighbours
 from flybystab.orbit.search.acceleration import field
 from flybystab.orbit.search.dop853 import empty_room
 from flybystab.orbit.search.encounter_finder import find_encounters
@@ -290,9 +293,48 @@ def model() -> list[str]:
     return out
 
 
+def growth() -> list[str]:
+    """``find_encounters(growth=True)`` by state transition matrices against sigma points; time over a plain search."""
+    asteroids = [a for a in catalogue() if a.orbit.covariance is not None][::3]
+    span = Time("1960-01-01", scale="tdb"), Time("2080-01-01", scale="tdb")
+
+    def run(asteroid: Asteroid, how: bool, linear: float) -> tuple[QTable, float]:
+        neighbours._LINEAR, begin = linear, time.process_time()
+        found = find_encounters(asteroid, *span, within=0.1 * u.au, growth=how, workers=1)
+        return found, time.process_time() - begin
+
+    used = neighbours._LINEAR
+    for linear in (used, -1.0):  # compilation
+        run(next(a for a in asteroids if a.name == "Apophis"), True, linear)
+    seconds_used, gaps, classes = np.zeros(3), [], 0
+    for asteroid in asteroids:
+        runs = [run(asteroid, False, used), run(asteroid, True, used), run(asteroid, True, -1.0)]
+        seconds_used += [r[1] for r in runs]
+        ours, points = (r[0] for r in runs[1:])
+        if len(ours):
+            gaps += list(np.abs((ours["displacement"] / points["displacement"]).to_value(u.one) - 1.0))
+            classes += int(np.sum(ours["predictability"] != points["predictability"]))
+    neighbours._LINEAR = used
+    plain, ours_s, points_s = seconds_used
+    return [
+        f"{len(asteroids)} asteroids, {len(gaps)} encounters within 0.1 au of the Earth, 1960 to 2080, one thread",
+        f"plain search {plain:.1f} s, growth=True {ours_s:.1f} s ({ours_s / plain:.1f} times as long), "
+        f"with sigma points for all {points_s:.1f} s ({points_s / plain:.1f})",
+        f"displacement: relative difference {np.median(gaps):.1e} (median), {np.max(gaps):.1e} (largest); "
+        f"{classes} of other predictability",
+    ]
+
+
 def main(arguments: list[str]) -> int:
     """Print the tables that were asked for, by default all."""
-    known = {"runoff": runoff, "digits": digits, "impacts": impacts, "model": model, "coverage": coverage}
+    known = {
+        "runoff": runoff,
+        "digits": digits,
+        "impacts": impacts,
+        "model": model,
+        "coverage": coverage,
+        "growth": growth,
+    }
     for name in arguments or list(known):
         if name not in known:
             print(f"no table {name!r}: there are {', '.join(known)}", file=sys.stderr)

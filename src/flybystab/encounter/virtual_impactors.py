@@ -23,7 +23,7 @@ from flybystab.encounter.linear_target_plane import disc_probability
 from flybystab.errors import InvalidInput
 from flybystab.orbit.covariance import PUSHES, Covariance
 from flybystab.orbit.ephemeris import Ephemeris
-from flybystab.orbit.orbit import Orbit, _ephemeris, deviated, later, seconds
+from flybystab.orbit.orbit import Orbit, deviated, later, seconds
 from flybystab.orbit.planets import Planet, planet
 from flybystab.orbit.search.encounter_finder import find_encounters
 from flybystab.orbit.target_plane import capture_radius
@@ -35,7 +35,7 @@ from flybystab.units import checked_time, to_si, whole
 _TOGETHER = 10.0 * DAY
 #: Orbits of a refinement, and how often it is repeated at most.
 _GRID, _ROUNDS = 9, 14
-#: Deviations for the direction of the line, in standard deviations.
+#: Deviations of the elements from which those of the state follow, in standard deviations.
 _SMALL = 1e-2
 #: Displacement on the target plane of the differences for M, over the radius of the disc.
 _STEP = 0.2
@@ -57,17 +57,15 @@ class _Line:
     def weak_direction(self, time: Time) -> Array:
         """Direction of largest uncertainty of the position at `time`, a unit vector of the standard normal variables.
 
-        Small deviations along the principal axes of the covariance are integrated with all forces.
+        By the state transition matrix of the orbit.
         """
         covariance = self.covariance
-        t = seconds(time, covariance.epoch)
-        window = _ephemeris(self.eph).window(covariance.epoch, min(t, 0.0), max(t, 0.0))
-        ends = []
-        for step in (_SMALL, -_SMALL):
-            found = covariance.deviations(covariance.values + step * covariance.factor.T)
-            orbits = deviated(self.orbit, covariance.epoch, *found, "variation", self.eph)
-            ends.append(np.array([o.flight(window).to(t)[:3] for o in orbits]))
-        return np.asarray(np.linalg.svd(ends[0] - ends[1])[0][:, 0])
+        steps = _SMALL * covariance.factor.T
+        ahead, back = (covariance.deviations(covariance.values + s * steps) for s in (1.0, -1.0))
+        states, pushes = ((0.5 * (x - y) / _SMALL).T for x, y in zip(ahead, back, strict=True))
+        change = self.orbit.state_transition(time, self.eph)
+        moved = change.matrix[:3] @ states + change.parameters[:3] @ pushes
+        return np.asarray(np.linalg.svd(moved)[2][0])
 
     def encounters(self, z: Array, start: Time, stop: Time, within: float) -> QTable:
         """Encounters of the orbits of z, shape (m, n)."""

@@ -1,8 +1,13 @@
-"""What the deviations of orbits become until their encounters: one integration for each direction of phase space."""
+"""Errors of orbits at their encounters, by state transition matrices, or by sigma points where these do not suffice.
+
+The variational equations (:mod:`flybystab.orbit.search.variational`) give the covariance at every later time in one
+integration. The linear theory holds while the displacements are small compared with the distances over which the forces
+change. Where they are not, the sigma points of the covariance are integrated instead.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import astropy.units as u
@@ -23,12 +28,15 @@ from flybystab.orbit.planets import planet
 from flybystab.orbit.predictability import Deviations, predictability, undisturbed_error
 from flybystab.orbit.search.acceleration import Field, borrowed_field, first_rate
 from flybystab.orbit.search.dop853 import Room, advance, borrowed_room, empty_room
+from flybystab.orbit.search.variational import carry_with_deviations
 from flybystab.typing import Array
 
-#: Matrices that find the passages: differences (m), their tolerance, and the longest interval, s.
+#: Differences (m) of two-body motion, tolerance of the search for the passage in an interval, longest interval, s.
 _STEP, _LOOSE, _INTERVAL = 1e4, 1e-10, 0.25 * YEAR
-#: Differences (m) and tolerance of the growth since a passage.
-_FINE_STEP, _FINE = 1e3, 1e-12
+#: Tolerance of state transition matrices: they are no differences of orbits.
+_FINE = 1e-12
+#: Largest displacement for the linear theory, over the distance from the nearest body on the way.
+_LINEAR = 0.02
 #: Factor beyond two-body motion by which errors grow in an interval with a passage.
 AMPLIFIED = 2.0
 
@@ -57,35 +65,6 @@ def carry(
             k[0] = k[12]
         out[n] = y
     return times.size
-
-
-@kernel
-def transitions(
-    field: Field,
-    law: Array,
-    times: Array,
-    states: Array,
-    steps: Array,
-    tolerance: float,
-    room: Room,
-    out: Array,
-) -> None:
-    """State transition matrices of the intervals between ``times`` (s) into ``out[n - 1, 6, 6]``.
-
-    ``states`` (m, m/s) is the orbit at the times, ``steps`` (n, 6) the differences; both sides of a matrix count in
-    those of the beginning of its interval.
-    """
-    moved = np.empty((1, 6))
-    end = np.empty(1)
-    y = np.empty(6)
-    for n in range(times.size - 1):
-        end[0] = times[n + 1]
-        for j in range(6):
-            y[:] = states[n]
-            y[j] += steps[n, j]
-            if carry(field, law, times[n], y, end, tolerance, room, moved) == 1:
-                for i in range(6):
-                    out[n, i, j] = (moved[0, i] - states[n + 1, i]) / steps[n, i]
 
 
 @kernel
@@ -133,10 +112,11 @@ class Spread:
 def spread(
     beside: Deviations, field: Field, law: Array, window: Window, times: Array, tolerance: float
 ) -> Spread:
-    """Follow the sigma points of an orbit to `times` (s from the epoch of the window) with all forces of `field`.
+    """Errors of an orbit at `times` (s from the epoch of the window) with all forces of `field`.
 
-    The displacement is the square root of the largest eigenvalue of the second moment of the points about the orbit: in
-    the linear regime that of the covariance of the position. The error of the model before each
+    The displacement is the square root of the largest eigenvalue of the covariance of the position, by the state
+    transition matrix. From where it exceeds 2 % of the distance from the nearest body, it is
+    that of the second moment of the sigma points about the orbit. The error of the model before each
     passage on the way grows as the mean of displacements along the axes of phase space.
 
     Parameters
@@ -150,42 +130,104 @@ def spread(
         Of a step.
     """
     start = seconds(beside.orbit.epoch, window.epoch)
-    state = beside.orbit.barycentric(window)
     law = law.copy()
     if not law.any():  # no non-gravitational acceleration, but its parameters can have errors
         law[:] = beside.orbit.nongrav.row
-    points = beside.states.reshape(-1, 6), beside.pushes.reshape(-1, len(PUSHES))
-
-    def follow(deviation: Array, more: Array, at: Array) -> Array:
-        out = np.full((at.size, 6), np.nan)
-        its = law.copy()
-        its[:3] += more[:3]
-        its[8] += more[3]
-        its[9] += RADIATION_PRESSURE * more[4]
-        carry(field, its, start, state + deviation, at, tolerance, empty_room(), out)
-        return out
-
+    states, pushes = beside.states.reshape(-1, 6), beside.pushes.reshape(-1, len(PUSHES))
+    # Half of the difference of a pair: a column of the root of the covariance, or the shift itself.
+    ways = 0.5 * (beside.states[0] - beside.states[1])
+    more = 0.5 * (beside.pushes[0] - beside.pushes[1])
+    active = np.flatnonzero(np.abs(more).max(axis=0))
     displacement = np.full(times.size, np.inf)
     model_error = np.full(times.size, np.inf)
     for side in (times >= start, times < start):
         rows = np.flatnonzero(side)
         if not rows.size:
             continue
-        far = times[rows[np.argmax(np.abs(times[rows] - start))]]
-        # Times that do not depend on the farthest one, so that neither does the error of the model.
-        regular = start + np.sign(far - start) * np.arange(0.0, abs(far - start), _INTERVAL)
-        grid = np.unique(np.concatenate([[start], regular, times[rows]]))
-        grid = grid if far >= start else grid[::-1]
-        at = np.searchsorted(np.abs(grid - start), np.abs(times[rows] - start))
-        base = follow(np.zeros(6), np.zeros(len(PUSHES)), grid)
-        gaps = np.array([follow(*point, grid[at])[:, :3] for point in zip(*points, strict=True)])
-        displacement[rows] = _largest(gaps - base[at, :3])
-        helio = base - window.states(SUN, grid)
-        model_error[rows] = _grown_error(field, law, window, grid, base, helio, at)
+        grid, at = _grid(start, times[rows])
+        base = np.full((grid.size, 6), np.nan)
+        change = np.full((grid.size, 6, 6 + active.size), np.nan)
+        units = np.eye(len(PUSHES))[active]
+        state = beside.orbit.barycentric(window)
+        carry_with_deviations(field, law, start, state, grid, _FINE, empty_room(), units, base, change)
+        sigma = _along(ways.T, more[:, active].T, change)
+        passages = _passages(field, law, window, grid, base, change)
+        linear = _sizes(sigma)
+        displacement[rows] = linear[at]
+        wide = [*np.flatnonzero(linear > _LINEAR * _clearance(window, grid, base))]
+        wide += [p.interval + 1 for p in passages if linear[p.interval] > _LINEAR * p.distance]
+        bent = at >= min(wide, default=grid.size)
+        if beside.scale == 1.0 and bent.any():  # a shift scaled to a metre is always linear
+            displacement[rows[bent]] = _by_points(
+                field, law, window, start, state, states, pushes, grid[at[bent]], tolerance
+            )
+        model_error[rows] = _grown_error(field, law, grid, change, passages, at)
     displacement *= beside.scale
-    shift = beside.scale * float(_largest(points[0][:, None, :3])[0])
+    shift = beside.scale * float(np.linalg.norm(ways[:, :3], 2))
     passed = model_error > undisturbed_error(times - start)
     return Spread(displacement, displacement / max(shift, 1.0), model_error, passed)
+
+
+def _grid(start: float, times: Array) -> tuple[Array, NDArray[np.intp]]:
+    """Times of matrices in order away from `start`, on one side of it, and where `times` are among them."""
+    far = times[np.argmax(np.abs(times - start))]
+    # Times that do not depend on the farthest one, so that neither does the error of the model.
+    regular = start + np.sign(far - start) * np.arange(0.0, abs(far - start), _INTERVAL)
+    grid = np.unique(np.concatenate([[start], regular, times]))
+    grid = grid if far >= start else grid[::-1]
+    return grid, np.searchsorted(np.abs(grid - start), np.abs(times - start))
+
+
+def _along(states: Array, pushes: Array, change: Array) -> Array:
+    """Deviations, shape (n, 6, m), at the times of matrices.
+
+    Parameters
+    ----------
+    states, pushes : ndarray, shapes (6, m) and (q, m)
+        Deviations at the start: state, and the parameters that have a column in `change`.
+    change : ndarray, shape (n, 6, 6 + q)
+        What unit deviations at each time have become at the next.
+    """
+    out = np.empty((len(change), *states.shape))
+    now = states
+    for n, matrix in enumerate(change):
+        now = matrix[:, :6] @ now + matrix[:, 6:] @ pushes
+        out[n] = now
+    return out
+
+
+def _sizes(deviations: Array) -> Array:
+    """Largest principal displacement, m, shape (n,), of deviations of shape (n, 6, m); inf where they were lost."""
+    out = np.full(len(deviations), np.inf)
+    known = np.isfinite(deviations).all(axis=(1, 2))
+    out[known] = np.linalg.norm(deviations[known, :3], 2, axis=(1, 2))
+    return out
+
+
+def _by_points(
+    field: Field,
+    law: Array,
+    window: Window,
+    start: float,
+    state: Array,
+    states: Array,
+    pushes: Array,
+    times: Array,
+    tolerance: float,
+) -> Array:
+    """Largest principal displacement of sigma points at `times`, m, shape (n,)."""
+
+    def follow(deviation: Array, more: Array) -> Array:
+        out = np.full((times.size, 6), np.nan)
+        its = law.copy()
+        its[:3] += more[:3]
+        its[8] += more[3]
+        its[9] += RADIATION_PRESSURE * more[4]
+        carry(field, its, start, state + deviation, times, tolerance, empty_room(), out)
+        return out[:, :3]
+
+    base = follow(np.zeros(6), np.zeros(len(PUSHES)))
+    return _largest(np.array([follow(*point) for point in zip(states, pushes, strict=True)]) - base)
 
 
 def _largest(gaps: Array) -> Array:
@@ -198,59 +240,84 @@ def _largest(gaps: Array) -> Array:
     return out
 
 
+def _clearance(window: Window, t: Array, states: Array) -> Array:
+    """Distance from the nearest body of the ephemeris, m, shape (n,)."""
+    places = np.array([window.states(body, t)[:, :3] for body in range(len(window.gm))])
+    return np.asarray(np.linalg.norm(states[:, :3] - places, axis=2).min(axis=0))
+
+
+@dataclass(frozen=True)
+class _Passage:
+    """A passage on the way: its interval of the grid, and time, state and distance (s, m, m/s) just before it."""
+
+    interval: int
+    t: float
+    state: Array
+    distance: float
+
+
+def _passages(
+    field: Field, law: Array, window: Window, grid: Array, base: Array, change: Array
+) -> list[_Passage]:
+    """Intervals of the grid whose state transition matrix exceeds that of two-body motion by :data:`AMPLIFIED`."""
+    helio = base - window.states(SUN, grid)
+    out = []
+    for i in range(grid.size - 1):
+        per = np.linalg.norm(helio[i, 3:]) / np.linalg.norm(helio[i, :3])
+        unit = np.array([1.0, 1.0, 1.0, per, per, per])
+        matrix = change[i + 1, :, :6] * unit / unit[:, None]
+        if np.linalg.norm(matrix) >= AMPLIFIED * quiet_growth(helio[i], grid[i + 1] - grid[i]):
+            out.append(_Passage(i, *_before_passage(field, law, window, grid[i], grid[i + 1], base[i])))
+    return out
+
+
 def _grown_error(
     field: Field,
     law: Array,
-    window: Window,
     grid: Array,
-    base: Array,
-    helio: Array,
+    change: Array,
+    passages: Sequence[_Passage],
     at: NDArray[np.intp],
 ) -> Array:
-    """Error of the force model, m, at ``grid[at]``: the largest of what it was before a passage, grown since.
-
-    A passage is an interval of the grid whose state transition matrix is larger than that of two-body motion by a
-    factor of :data:`AMPLIFIED`. `base` holds the barycentric states of the orbit, `helio` the heliocentric ones.
-    """
+    """Error of the force model, m, at ``grid[at]``: the largest of what it was before a passage, grown since."""
     out = undisturbed_error(grid[at] - grid[0])
-    per = np.linalg.norm(helio[:, 3:], axis=1) / np.linalg.norm(helio[:, :3], axis=1)
-    units = np.concatenate([np.ones((len(per), 3)), np.repeat(per[:, None], 3, axis=1)], axis=1)
-    change = np.full((grid.size - 1, 6, 6), np.nan)
-    transitions(field, law, grid, base, _STEP * units, _LOOSE, empty_room(), change)
-    for i, matrix in enumerate(change):
-        quiet = quiet_growth(helio[i], grid[i + 1] - grid[i])
-        if np.linalg.norm(matrix) < AMPLIFIED * quiet:
-            continue
-        # From just before the passage directly: the product of many matrices would multiply their errors.
-        t, state = _before_passage(field, law, window, grid[i], grid[i + 1], base[i])
-        sun = state - window.states(SUN, np.array([t]))[0]
-        per_here = np.linalg.norm(sun[3:]) / np.linalg.norm(sun[:3])
-        later = at > i
-        gaps = np.full((7, int(later.sum()), 6), np.nan)
-        steps = np.diag(_FINE_STEP * np.array([1.0, 1.0, 1.0, per_here, per_here, per_here]))
-        for j, step in enumerate([np.zeros(6), *steps]):
-            carry(field, law, t, state + step, grid[at[later]], _FINE, empty_room(), gaps[j])
+    for passage in passages:
+        end = passage.interval + 1
+        rest = np.full((1, 6, 6), np.nan)
+        there = np.empty((1, 6))
+        nothing = np.zeros((0, len(PUSHES)))
+        when = grid[end : end + 1]
+        carry_with_deviations(
+            field, law, passage.t, passage.state, when, _FINE, empty_room(), nothing, there, rest
+        )
+        unit = np.ones(6)
+        unit[3:] = np.linalg.norm(passage.state[3:]) / np.linalg.norm(passage.state[:3])
+        since = _along(np.diag(unit), np.zeros((0, 6)), np.concatenate([rest, change[end + 1 :, :, :6]]))
         # In the mean over directions in phase space.
-        growth = np.linalg.norm((gaps[1:] - gaps[0])[:, :, :3], axis=(0, 2)) / _FINE_STEP / np.sqrt(6.0)
+        growth = np.linalg.norm(since[:, :3], axis=(1, 2)) / np.sqrt(6.0)
         growth[~np.isfinite(growth)] = np.inf
-        out[later] = np.maximum(out[later], undisturbed_error(t - grid[0]) * growth)
+        later = at > passage.interval
+        grown = undisturbed_error(passage.t - grid[0]) * growth[at[later] - end]
+        out[later] = np.maximum(out[later], grown)
     return out
 
 
 def _before_passage(
     field: Field, law: Array, window: Window, begin: float, end: float, state: Array
-) -> tuple[float, Array]:
-    """Time (s) and state in an interval with a passage, before it: where the pull of a planet is largest."""
+) -> tuple[float, Array, float]:
+    """Time (s) and state before the largest attraction by a planet in an interval, and the distance there (m)."""
     times = np.linspace(begin, end, 65)
     states = np.full((times.size, 6), np.nan)
     carry(field, law, begin, state, times, _LOOSE, empty_room(), states)
-    pull = np.zeros(times.size)
+    pull, distance = np.zeros(times.size), np.full(times.size, np.inf)
     for body, gm in enumerate(window.gm):
         if body != SUN:
-            away = states[:, :3] - window.states(body, times)[:, :3]
-            pull = np.maximum(pull, gm / np.sum(away**2, axis=1))
-    before = max(int(np.nanargmax(pull)) - 1, 0)
-    return float(times[before]), states[before]
+            away = np.linalg.norm(states[:, :3] - window.states(body, times)[:, :3], axis=1)
+            distance = np.where(gm / away**2 > pull, away, distance)
+            pull = np.maximum(pull, gm / away**2)
+    nearest = int(np.nanargmax(pull))
+    before = max(nearest - 1, 0)
+    return float(times[before]), states[before], float(distance[nearest])
 
 
 def add_growth(
