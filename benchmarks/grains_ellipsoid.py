@@ -22,7 +22,8 @@ import flybystab as fs
 from flybystab.bench.grains import body, earth
 from flybystab.body.pile import make_pile
 from flybystab.errors import FlybystabError
-from flybystab.flybys.grains_flyby import GrainsRun, one_pile
+from flybystab.flybys.grains_outcome import GrainsRun
+from flybystab.flybys.grains_run import one_pile
 from flybystab.orbit.planets import PLANETS
 
 #: Change of the long axis above which a body has moved; share of the largest clump below which it is lost.

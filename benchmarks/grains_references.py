@@ -21,7 +21,8 @@ import flybystab as fs
 from flybystab.bench.grains import REFERENCE, body, earth
 from flybystab.body.grain_calibration import Friction, contact_friction
 from flybystab.body.pile import make_pile
-from flybystab.flybys.grains_flyby import GrainsRun, one_pile
+from flybystab.flybys.grains_outcome import GrainsRun
+from flybystab.flybys.grains_run import one_pile
 from flybystab.flybys.verdict import classed
 from flybystab.orbit.planets import PLANETS
 

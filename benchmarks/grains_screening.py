@@ -17,7 +17,7 @@ from astropy.time import Time
 
 from flybystab.catalogues.catalogue import Asteroid
 from flybystab.encounter.encounter import Encounter
-from flybystab.flybys.grains_flyby import HANDED_ON
+from flybystab.flybys.escalation import HANDED_ON
 from flybystab.screening.encounters import Passage
 from flybystab.screening.screening import Screening
 from flybystab.screening.settings import settings

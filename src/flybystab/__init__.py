@@ -33,9 +33,9 @@ _HOME = {
     "FlybyMargin": "flybys.margin",
     "FlybyResult": "flybys.result",
     "FlybystabError": "errors",
-    "GrainsCourse": "flybys.grains_flyby",
-    "GrainsOutcome": "flybys.grains_flyby",
-    "GrainsRun": "flybys.grains_flyby",
+    "GrainsCourse": "flybys.grains_outcome",
+    "GrainsOutcome": "flybys.grains_outcome",
+    "GrainsRun": "flybys.grains_outcome",
     "History": "flybys.history",
     "LinearPlane": "encounter.linear_target_plane",
     "Material": "body.body",
@@ -142,7 +142,7 @@ if TYPE_CHECKING:
     from flybystab.flybys.elastic_change import elastic_change
     from flybystab.flybys.flyby import flyby
     from flybystab.flybys.flyby_many import flyby_many
-    from flybystab.flybys.grains_flyby import GrainsCourse, GrainsOutcome, GrainsRun
+    from flybystab.flybys.grains_outcome import GrainsCourse, GrainsOutcome, GrainsRun
     from flybystab.flybys.history import FlybyError, History
     from flybystab.flybys.margin import FlybyMargin, flyby_margin
     from flybystab.flybys.outcome_map import OutcomeMap, outcome_map, target_map

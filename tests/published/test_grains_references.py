@@ -13,7 +13,7 @@ from scenes import earth
 from flybystab.body.body import Body
 from flybystab.body.grain_calibration import Friction
 from flybystab.body.pile import make_pile
-from flybystab.flybys.grains_flyby import one_pile
+from flybystab.flybys.grains_run import one_pile
 
 #: Periapsis (R_E), period (h; 0: none), range of the largest clump, range of the stretch of its long axis or None.
 FLYBYS = (

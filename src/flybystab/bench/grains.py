@@ -27,7 +27,9 @@ from flybystab.core.grains.tree import opening, tree_sum
 from flybystab.core.numerics.threads import in_order
 from flybystab.encounter.encounter import Encounter
 from flybystab.flybys.flyby import flyby
-from flybystab.flybys.grains_flyby import GrainsRun, grains_flyby, one_pile
+from flybystab.flybys.grains_flyby import grains_flyby
+from flybystab.flybys.grains_outcome import GrainsRun
+from flybystab.flybys.grains_run import one_pile
 from flybystab.units import R_earth
 
 #: Flybys of an independent soft-sphere code (Earth; piles of about 570 grains with a friction angle of 35 deg).

@@ -21,13 +21,13 @@ if TYPE_CHECKING:
 
 #: Yield surfaces, in the order of their integer codes in :mod:`flybystab.core.material.yield_surface`.
 YIELD_SURFACES = NAMES
-#: States of a body: one whole body at rest, and those in which an encounter may leave it.
+#: States of a body: one whole body at rest, and the possible states after an encounter.
 STATES = ("rigid", "flowing", "dispersed", "fluid", "partly unbound", "on the ground")
-#: The default yield surface: of the four the one that simulations of grains confirm best. The cone through triaxial
-#: compression overestimates the strength of a stretched body.
+#: The default yield surface: of the four the one in best agreement with simulations of grains. The cone through
+#: triaxial compression overestimates the strength of a stretched body.
 DEFAULT_SURFACE = DEFAULT
-#: Bulk densities of an asteroid, kg/m3: below the lightest comets, above the heaviest metal. What lies beyond is a
-#: slip, mostly of the unit.
+#: Bulk densities of an asteroid, kg/m3: below the lightest comets, above the heaviest metal. Values beyond are
+#: mistakes, mostly of the unit.
 DENSITY_RANGE = (50.0, 25_000.0)
 
 
@@ -42,8 +42,8 @@ class Material:
     cohesion : Quantity
         Mohr-Coulomb cohesion ``Y`` (shear strength at zero pressure), Pa.
     dilatancy : float
-        Below 1 the flow goes along the stress deviator with ``tr D = beta |D'|``, ``beta`` this share of the least
-        slope ``k`` of the yield surface; 0 preserves volume. 1 is associative: ``D`` along the true normal.
+        Below 1 the rate of strain is along the stress deviator with ``tr D = beta |D'|``, ``beta`` this share of the
+        least slope ``k`` of the yield surface; 0 preserves volume. 1 is associative: ``D`` along the true normal.
     yield_surface : str
         One of :data:`YIELD_SURFACES`, Mohr-Coulomb by default. ``"drucker-prager"`` is the cone through triaxial
         compression.
@@ -52,8 +52,8 @@ class Material:
     bulk_modulus : Quantity or None
         Plastic bulk modulus ``kappa`` of the energy criterion, Pa; None leaves it out.
     tensile_strength : Quantity or float, optional
-        Tension cut-off ``T``: the yield surface is closed at ``sigma_1 <= T``. Pa, or a number for a share of the
-        cohesion. It counts in equilibrium, spin limits, admissibility and onset of yield; flow with a cut-off is not
+        Tension cut-off ``T``: the yield surface is closed at ``sigma_1 <= T``. Pa, or a number for a fraction of the
+        cohesion. It is used for equilibrium, spin limits, admissibility and onset of yield; flow with a cut-off is not
         modelled (:class:`~flybystab.errors.NotModelled`).
 
     Raises
@@ -136,7 +136,7 @@ def refuse_cut_off(material: Material, what: str) -> None:
 
 
 def check_settled(body: Any) -> None:
-    """Raise InvalidInput for anything but a body, UnsettledBody for one that its last encounter left unsettled."""
+    """Raise InvalidInput for anything but a body, UnsettledBody for a body that is not at rest."""
     check_body(body)
     if body.state != "rigid":
         raise UnsettledBody("body", body, f"one whole body at rest; this one is {body.state}")
@@ -159,7 +159,7 @@ class Body:
     material : Material, optional
         35 degrees of friction and no cohesion by default.
     dispersed : bool, optional
-        Whether an encounter has drawn the body apart: its density may then be below that of any asteroid.
+        Whether an encounter has dispersed the body: its density may then be below that of any asteroid.
     state : str, optional
         ``"rigid"``: one whole body at rest in its shape. After an encounter also ``"flowing"``, ``"dispersed"``,
         ``"partly unbound"`` or ``"on the ground"``: no flyby accepts such a body.
@@ -235,7 +235,7 @@ class Body:
         spin: Quantity | None = None,
         material: Material | None = None,
     ) -> Body:
-        """The ellipsoid that stands for a polyhedral shape: its dynamically equivalent one of equal volume.
+        """The dynamically equivalent ellipsoid of a polyhedral shape, of equal volume.
 
         Parameters
         ----------
@@ -273,7 +273,7 @@ class Body:
         return float(1.0 / np.sqrt(np.pi * G * self.rho))
 
     def with_(self, **changes: Any) -> Body:
-        """A copy with some parameters changed; `spin` replaces `spin_period` and the reverse."""
+        """A copy with some parameters changed; `spin` replaces `spin_period` and vice versa."""
         if "spin" in changes and "spin_period" not in changes:
             changes["spin_period"] = None
         elif "spin_period" in changes and "spin" not in changes:

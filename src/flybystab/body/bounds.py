@@ -1,4 +1,4 @@
-"""Inverse questions: what a shape and a spin say about density, friction and cohesion."""
+"""Constraints on density, friction and cohesion from shape and spin."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Requirements(Tabular):
     cohesion : Quantity, shape (samples,)
         Least cohesion at the body's friction angle, Pa.
     least_density, greatest_density : Quantity, shape (samples,)
-        Densities between which friction alone (no cohesion) bears the body at its friction angle, kg/m3;
+        Densities between which friction alone (no cohesion) supports the body at its friction angle, kg/m3;
         nan where no density does, inf where there is no upper end.
     in_tension : Quantity, shape (samples,)
         Mean tension of the body, Pa (zero where it is in compression).
@@ -49,7 +49,7 @@ class Requirements(Tabular):
         return np.quantile(values.value, levels, method="inverted_cdf") * values.unit
 
     def probability_of_tension(self) -> float:
-        """Share of the samples that are in mean tension, which no friction can bear."""
+        """Fraction of the samples in mean tension, which friction cannot support."""
         return float(np.mean(self.in_tension.value > 0.0))
 
     def __repr__(self) -> str:
@@ -68,8 +68,8 @@ def density_intervals(body: Body, tide: Quantity | None = None) -> Quantity:
     -------
     Quantity, shape (n, 2)
         Intervals inside :data:`flybystab.body.body.DENSITY_RANGE`, kg/m3. Without cohesion there is at most
-        one: too light a body flies apart, too heavy a long one collapses. With cohesion a light body holds together
-        again.
+        one: below it the body flies apart, above it an elongated body collapses. With cohesion there may be a second
+        interval at low densities.
 
     Notes
     -----
@@ -102,7 +102,7 @@ def requirements(
     samples: int = 4000,
     seed: int = 0,
 ) -> Requirements:
-    """Carry the uncertainty of shape, spin and density through to friction, cohesion and density bounds.
+    """Propagate the uncertainty of shape, spin and density to bounds on friction, cohesion and density.
 
     Parameters
     ----------
@@ -113,7 +113,7 @@ def requirements(
     density_sigma, spin_period_sigma : Quantity, optional
         One-sigma errors.
     samples, seed : int
-        Size of the sample and seed of its generator: the same seed gives the same answer.
+        Size of the sample and seed of its generator: the same seed gives the same sample.
 
     Returns
     -------

@@ -6,10 +6,9 @@ linearly elastic ellipsoid with a free surface the displacement is then exactly 
 equilibrium ``div sigma + rho g = 0`` in the volume and ``sigma n = 0`` on the surface. The stress depends on Poisson's
 ratio but not on Young's modulus.
 
-The volume average of the stress is that of the rigid body, whatever Poisson's ratio. The elastic stress assumes that
-the body became a solid free of stress before it got its gravity and spin: a rubble pile has another, unknown initial
-stress, so that the local stress is an estimate. Changes of it in an encounter do not depend on that assumption as long
-as nothing yields.
+The volume average of the stress is that of the rigid body for any Poisson's ratio. The elastic stress refers to a
+solid that was free of stress before gravity and spin acted: a rubble pile has another, unknown initial stress, so that
+the local stress is an estimate. Its changes in an encounter do not depend on that assumption as long as nothing yields.
 """
 
 from __future__ import annotations
@@ -58,7 +57,8 @@ class YieldRegion(Record):
     share : float
         Share of the volume.
     point : Quantity, shape (3,)
-        Where yield starts if the cohesion falls: the place of :attr:`required_cohesion`, principal axes, m.
+        Point at which yield starts if the cohesion decreases, where :attr:`required_cohesion` is needed; principal
+        axes, m.
     depth : float
         Depth of that point: 0 at the surface, 1 at the centre.
     required_cohesion : Quantity

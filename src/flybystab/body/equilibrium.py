@@ -1,11 +1,11 @@
-"""Equilibrium of a rubble pile: the stress that its shape and spin ask for, and what bears it.
+"""Equilibrium of a rubble pile: the stress required by its shape and spin, and the strength required to bear it.
 
-A homogeneous ellipsoid that turns rigidly needs the volume-averaged stress of theory.md, section 4; for
+A rigidly rotating homogeneous ellipsoid requires the volume-averaged stress of theory.md, section 4; for
 steady spin about ``a3``, ``sigma_i = (rho a_i^2/5)(omega_i^2 - 2 pi G rho A_i)`` with
 ``omega_1 = omega_2 = omega`` and ``omega_3 = 0``. The body can exist if that stress is inside the yield
 surface of its material. A static tide ``K`` adds ``(rho/5) K_ij 2 S_i S_j/(S_i + S_j)`` (the static limit of
-Holsapple & Michel 2006, 2008). The test is on the volume average: necessary, not sufficient, everywhere
-inside the body.
+Holsapple & Michel 2006, 2008). The test uses the volume average: it is necessary, but not sufficient,
+for equilibrium everywhere inside the body.
 """
 
 from __future__ import annotations
@@ -36,7 +36,7 @@ from flybystab.units import brief, to_si
 
 @dataclass(frozen=True)
 class Equilibrium(Record):
-    """The state of stress of a rigidly turning body and what it demands of the material.
+    """The stress of a rigidly rotating body and the strength that it requires.
 
     Attributes
     ----------
@@ -48,11 +48,11 @@ class Equilibrium(Record):
         ``-tr(stress)/3``, Pa; negative in mean tension.
     required_friction_angle : Quantity
         Mobilised friction angle, deg: the least angle that bears the stress with the body's own cohesion.
-        Infinite where no angle below 90 deg does (a cohesionless body in mean tension, say).
-        So it is where the stress passes the tension cut-off.
+        Infinite where no angle below 90 deg does (a cohesionless body in mean tension, for example), and where the
+        stress exceeds the tension cut-off.
     required_cohesion : Quantity
         Least cohesion at the body's friction angle, Pa; zero where friction alone suffices. With a tensile strength
-        that is a share of the cohesion, the one that bears the tension too; infinite where a fixed one is passed.
+        given as a fraction of the cohesion, it also bears the tension; infinite where a fixed one is exceeded.
     largest_tension : Quantity
         Largest principal stress, Pa: the least tensile strength; negative in compression.
     lode_angle : Quantity
@@ -221,7 +221,7 @@ def cohesion_for(material: Material, tension: float) -> float:
 
 
 def spin_limits(body: Body, friction_angle: Quantity | None = None) -> Quantity:
-    """Slowest and fastest steady spin about ``a3`` that the material bears.
+    """Slowest and fastest steady spin about ``a3`` that the material can bear.
 
     Parameters
     ----------
@@ -233,8 +233,8 @@ def spin_limits(body: Body, friction_angle: Quantity | None = None) -> Quantity:
     Returns
     -------
     Quantity, shape (..., 2)
-        Angular rates, rad/s; nan where no spin is borne. A lower limit above zero belongs to a shape too
-        long to stand still.
+        Angular rates, rad/s; nan where no spin is borne. A lower limit above zero means that the shape is
+        too elongated to exist without spin.
     """
     base, load = _spin_line(body)
     limits = _loads(body, friction_angle, base, load)

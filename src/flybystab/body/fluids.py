@@ -1,4 +1,4 @@
-"""The fluid end of the theory: ellipsoids whose stress is a pressure only (Maclaurin, Jacobi, Roche).
+"""The fluid limit: ellipsoids whose stress is a pressure only (Maclaurin, Jacobi, Roche).
 
 Equal principal stresses ``a_i^2 (mu_i + omega_i^2 - 2 A_i)``, in units of ``pi G rho``, are two conditions on
 two axis ratios and one load (Chandrasekhar 1969, chapters 5 and 8). They are the limit ``phi = 0`` of
@@ -79,7 +79,7 @@ def roche_limit() -> FluidEllipsoid:
 
     ``d = R_p (4 rho_p/(3 load rho))^(1/3)``, 2.455 R_p at equal densities.
     """
-    # The maximum is flat: two digits of the argument beyond sqrt(eps) come from the derivative's root.
+    # The maximum is flat: the root of the derivative gives two more digits of the argument than sqrt(eps).
     top = minimize_scalar(
         lambda x: -roche(x).load, bounds=(0.3, 0.8), method="bounded", options={"xatol": 1e-6}
     )

@@ -25,7 +25,7 @@ PATCH = 0.01
 
 @dataclass(frozen=True)
 class Friction:
-    """Contact friction with the friction angle of a pile of such grains."""
+    """Contact friction, and the friction angle of a pile of such grains."""
 
     mu_s: float
     beta: float

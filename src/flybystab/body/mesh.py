@@ -70,7 +70,7 @@ def edges_of(facets: Integers) -> tuple[Integers, Integers]:
     same = directed[first, 0] == directed[second, 0]
     if np.any(same):
         raise _bad_facets(
-            owner[first[same]], "facets oriented alike: these are turned over beside a neighbour"
+            owner[first[same]], "facets oriented alike: these are oriented opposite to a neighbour"
         )
     return directed[first], np.column_stack([owner[first], owner[second]])
 

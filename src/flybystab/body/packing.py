@@ -1,8 +1,8 @@
 """Settled piles of grains in scaled units (:mod:`flybystab.core.grains.state`).
 
-Recipe: spheres fall together with little friction in a central field whose level surfaces are similar to the ellipsoid;
-the wanted number is carved out of the heap; friction is switched on, and the pile settles under its own gravity, at
-first with a drag.
+Spheres with little friction collapse in a central field whose level surfaces are similar to the ellipsoid; the required
+number is cut out of the aggregate; friction is switched on, and the pile settles under its own gravity, at first with a
+drag.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from flybystab.typing import Array
 
 #: Sum of the grains' volumes over that of the ellipsoid, of the first guess.
 _PACKING = 0.6
-#: Grains in the cloud, over those wanted.
+#: Number of grains in the initial cloud, over that of the pile.
 _SURPLUS = 1.35
 #: Size of the cloud, over that of the ellipsoid.
 _CLOUD = 1.75
@@ -47,7 +47,7 @@ def settled_pile(
         Contact friction.
     sizes : GrainSizes, optional
     shape : Shape, optional
-        Carved out of the heap instead of the ellipsoid; `axes` are those of its equivalent ellipsoid.
+        Cut out of the aggregate instead of the ellipsoid; `axes` are those of its equivalent ellipsoid.
     """
     generator = np.random.default_rng(np.random.SeedSequence([seed, grains]))
     reach = 1.0 if shape is None else _protrusion(shape, axes)
@@ -78,7 +78,7 @@ def settled_pile(
     sim.centre()
     m, _, _, inertia, momentum = moments(g, everything)
     sim.add_spin(-spin_of(inertia, momentum))
-    if shape is None:  # a shape was carved in its principal axes, and its sides must not be exchanged
+    if shape is None:  # a shape was cut out in its principal axes, and its sides must not be exchanged
         _, turn = semi_axes(m, inertia)
         sim.rotate(turn.T)
     return sim
@@ -103,7 +103,7 @@ def _scattered(axes: Array, radius: Array, generator: np.random.Generator) -> Ar
 
 
 def _carved(g: Grains, axes: Array, count: int) -> NDArray[np.int64]:
-    """The `count` grains inside an ellipsoid, its axes such that those of the grains' inertia have the right ratios."""
+    """The `count` grains inside an ellipsoid whose axes give the inertia of the grains the required ratios."""
     ratios = axes
     axes = axes.copy()
     chosen = np.arange(count)
@@ -136,7 +136,7 @@ def _inside(shape: Shape, x: Array) -> NDArray[np.bool_]:
 
 
 def _cut(g: Grains, shape: Shape, count: int) -> NDArray[np.int64]:
-    """The `count` grains with centres in a shape, its size such that it holds as many."""
+    """The `count` grains with centres in a shape, scaled so that it contains that many."""
     unit = shape.mean_radius.value
     low, high = 0.3, 2.0  # sizes of the shape over its own
     held: NDArray[np.bool_] = np.zeros(len(g.mass), np.bool_)
@@ -172,7 +172,8 @@ def simulation_of(
         From :func:`flybystab.body.pile_cache.stored_pile`.
     mu_s, beta : float
     overlap : float
-        Mean overlap that sets the stiffness. With another one than the pile was made with, springs keep their forces.
+        Mean overlap that sets the stiffness. If it differs from that with which the pile was made, the forces of the
+        springs are kept.
     cohesion : float
         Attraction per area of a contact, scaled.
     strength : float

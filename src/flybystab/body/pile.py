@@ -1,8 +1,8 @@
 """Rubble piles of grains with the shape, density, spin, friction angle and cohesion of a body.
 
-A pile is made in scaled units (:mod:`flybystab.body.packing`), where one without cohesion has neither size nor density,
-and kept on disk by its inputs. Cohesion is switched on in the settled pile; a spinning one is spun up rigidly and
-relaxes.
+A pile is made in scaled units (:mod:`flybystab.body.packing`), in which a pile without cohesion has neither size nor
+density, and is stored on disk under its inputs. Cohesion is switched on in the settled pile; a spinning one is spun up
+rigidly and relaxes.
 """
 
 from __future__ import annotations
@@ -31,13 +31,13 @@ from flybystab.errors import InvalidInput
 from flybystab.typing import Array
 from flybystab.units import whole
 
-#: Fewer grains than this resolve no shape, more than this need hours.
+#: Least and largest number of grains: fewer do not resolve a shape, more take hours.
 LEAST, MOST = 20, 200_000
 #: Memory of a pile, bytes a grain.
 _BYTES = 4000
 #: Time in which a cohesive pile comes to rest before it is spun up (scaled), and the drag in it.
 _COHERED, _DRAG = 1.0, 3.0
-#: Spheres that measure a friction angle.
+#: Number of spheres from which a friction angle is measured.
 _SPHERES = 3
 
 
@@ -90,15 +90,15 @@ def make_pile(
     grains : int
         Number of grains.
     seed : int
-        Piles of different seeds differ in the places and sizes of all grains.
+        Piles with different seeds differ in the positions and sizes of all grains.
     friction : Friction, optional
         Contact friction instead of that calibrated for the body's friction angle.
     shape : Shape, optional
-        Carved out instead of the ellipsoid; the body is the one that stands for it.
+        Shape of the pile instead of the ellipsoid; the body is its equivalent ellipsoid.
     sizes : GrainSizes, optional
         Of the grains.
     keep : bool
-        Whether to use the cache.
+        Whether to read the pile from the cache, and to store it there (:mod:`flybystab.body.pile_cache`).
     **options
         Of :class:`flybystab.core.grains.simulation.Simulation`, for tests of the numerics; and `overlap`, the mean
         overlap that sets the stiffness. Not for piles from the cache.
@@ -151,7 +151,7 @@ def _central_pressure(body: Body) -> float:
 
 
 def checked_number(grains: int) -> int:
-    """Refuse a number of grains of which no pile is made."""
+    """Raise InvalidInput for a number of grains out of range."""
     if not isinstance(grains, int | np.integer) or isinstance(grains, bool) or not grains >= LEAST:
         raise InvalidInput("grains", grains, f"a whole number of grains, {LEAST} or more")
     most = min(MOST, int(_memory() / _BYTES))
@@ -163,7 +163,7 @@ def checked_number(grains: int) -> int:
 
 
 def check_grains(body: Body, grains: int) -> None:
-    """Refuse a number of grains, or a body, of which no pile is made."""
+    """Raise InvalidInput for a number of grains, or a body, that cannot be modelled by grains."""
     checked_number(grains)
     refuse_cut_off(body.material, "a pile of grains")
     friction = contact_friction(body.material.phi)
@@ -219,7 +219,7 @@ class Pile:
     grains : int
         Number of grains.
     seed : int
-        Piles of different seeds differ in the places and sizes of all grains.
+        Piles with different seeds differ in the positions and sizes of all grains.
     size_distribution : str
         ``"uniform"`` in the radius, or ``"power law"``: the number of grains larger than ``r`` goes as ``r^-index``.
     index : float, optional
@@ -235,7 +235,7 @@ class Pile:
 
     Notes
     -----
-    The pile is made when a property is first asked for, or read from the cache. ``flyby(pile, encounter)`` carries it
+    The pile is made, or read from the cache, when a property is first accessed. ``flyby(pile, encounter)`` carries it
     through an encounter.
     """
 
@@ -314,7 +314,7 @@ class Pile:
 
     @property
     def porosity(self) -> float:
-        """Share of the body's volume that the grains do not fill."""
+        """Porosity: fraction of the volume of the body that is not filled by grains."""
         return 1.0 - float((4.0 / 3.0 * np.pi * (self.radii**3).sum() / self.body.volume).to_value(u.one))
 
     @cached_property
@@ -337,7 +337,7 @@ class Pile:
         """Friction angle of piles of such grains, deg, measured as the largest that spheres mobilise in a spin-up.
 
         The spheres have the number, sizes and contact friction of the grains of this pile, and its seed and the next
-        two. The first access takes about as long as thirty encounters.
+        two. The first access takes as long as about thirty encounters.
         """
         return self._measured[0] * u.deg
 

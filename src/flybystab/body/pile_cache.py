@@ -1,4 +1,4 @@
-"""Settled piles on disk, by their inputs."""
+"""Cache of settled piles on disk, named by a digest of their inputs."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from flybystab.core.grains.simulation import Simulation
 from flybystab.files import replace_file
 from flybystab.typing import Array
 
-#: Changes with the recipe, so that piles made by an older one are not taken for new ones.
+#: Version of the method by which piles are made: piles of other versions are not read.
 RECIPE = 1
 _STORED = ("x", "v", "w", "radius", "mass", "first", "other", "spring", "touching")
 
@@ -31,14 +31,14 @@ def cache_folder() -> Path:
 
 
 def stored_pile(inputs: dict[str, Any], make: Callable[[], Simulation]) -> dict[str, Array]:
-    """The arrays of a settled pile, read from disk if they are there and whole.
+    """The arrays of a settled pile, read from disk if they are stored there and intact.
 
     Parameters
     ----------
     inputs : dict
-        What determines the pile: numbers, arrays of numbers or texts; `grains`, their number, among them.
+        Quantities that determine the pile: numbers, arrays of numbers or strings; among them `grains`, their number.
     make : callable
-        Makes the pile where it is not there.
+        Makes the pile if it is not stored.
     """
     plain = {
         k: v if isinstance(v, str) else [round(float(x), 9) for x in np.atleast_1d(v)]

@@ -1,7 +1,7 @@
-"""Strength of a pile: the friction angle that it mobilises in a spin-up, the cohesion when it is pulled or sheared.
+"""Strength of a pile of grains: friction angle from a spin-up, cohesion from loads in tension and shear.
 
-Stresses are averages over the volume of the ellipsoid with the pile's inertia, as in the continuum model, at which the
-pile would turn rigidly (:func:`flybystab.core.ellipsoid.rigid_stress.rigid_stress`).
+Stresses are those of rigid rotation, averaged over the volume of the ellipsoid with the inertia of the pile, as in the
+continuum model (:func:`flybystab.core.ellipsoid.rigid_stress.rigid_stress`).
 """
 
 from __future__ import annotations
@@ -15,20 +15,20 @@ from flybystab.core.grains.simulation import Simulation
 from flybystab.core.material.surfaces import code_of
 from flybystab.typing import Array
 
-#: Increment of ``omega^2/(pi G rho)`` in a spin-up and the time that the pile gets for it (scaled).
+#: Increment of ``omega^2/(pi G rho)`` in a spin-up, and its duration (scaled).
 INCREMENT, REST = 0.03, 4.0
 #: First ``omega^2/(pi G rho)``: a sphere then mobilises 5 deg.
 FIRST = 0.24
-#: Change of c/a, over its value at the start, that ends a spin-up: the pile flows.
+#: Relative change of c/a at which a pile counts as flowing, which ends a spin-up.
 FLATTENED = 0.2
-#: Strain at which a pile that is pulled or sheared has failed.
+#: Strain at which a pile in tension or shear counts as failed.
 FAILED = 0.02
-#: Time of a loading, in units of ``R sqrt(rho/Y)``, and the largest load, in the expected cohesion.
+#: Duration of a loading, in units of ``R sqrt(rho/Y)``, and the largest load, in units of the expected cohesion.
 _LOADING, _LARGEST = 120.0, 4.0
 
 
 def mobilised(sim: Simulation, surface: str = "mohr-coulomb") -> tuple[float, float, Array]:
-    """Friction angle (deg) that rigidity demands of the ellipsoid with the pile's inertia and spin.
+    """Friction angle (deg) required for rigid rotation of the ellipsoid with the inertia and spin of a pile.
 
     Also ``omega^2/(pi G rho)`` and the semi-axes, scaled units. A pile in flow need not be in equilibrium.
     """
@@ -55,8 +55,8 @@ def spin_up(sim: Simulation, first: float = FIRST, sense: int = 1, surface: str 
     sense : int
         1 or -1.
     surface : str
-        Yield surface that gives the angle; for a sphere, which is compressed along its spin, all four agree but
-        for the one through extension.
+        Yield surface that gives the angle; for a sphere, which is compressed along its spin, all agree except
+        the cone through triaxial extension.
 
     Returns
     -------
@@ -80,7 +80,7 @@ def spin_up(sim: Simulation, first: float = FIRST, sense: int = 1, surface: str 
 
 
 def loaded(sim: Simulation, load: Array, expected: float, slow: float = 1.0) -> tuple[Array, Array]:
-    """Load a pile without gravity by a growing tide until it fails.
+    """Load a pile without gravity by an increasing tide until it fails.
 
     Parameters
     ----------
@@ -127,5 +127,5 @@ def loaded(sim: Simulation, load: Array, expected: float, slow: float = 1.0) -> 
 
 
 def required_cohesion(stress: Array, angle: float) -> float:
-    """Cohesion that Mohr-Coulomb needs for a stress at a friction angle (rad), in the unit of the stress."""
+    """Cohesion required by Mohr-Coulomb for a stress at a friction angle (rad), in the unit of the stress."""
     return float(demand(code_of("mohr-coulomb"), angle, 0.0, stress)[1])

@@ -152,7 +152,7 @@ class RecoveryLimit(Record):
         Sampling error: largest over least energy of the independent searches, less one; inf where only some of them
         found a direction without recovery. Bisection adds `precision`.
     direction : ndarray, shape (3, 3)
-        Rate of strain in body axes, ``|D'| = 1``, that has it; nan where there is none.
+        Rate of strain in body axes, ``|D'| = 1``, with that energy; nan where there is none.
     searches : Quantity, shape (n,)
         Least energy of each independent search, J.
     precision : float
@@ -227,8 +227,8 @@ def recovery(
 
     Notes
     -----
-    A direction is bisected only where the body is lost at the least energy known by then less the precision: most
-    cost one run. The result is the least over the directions tried, an upper bound of the least over all.
+    A direction is bisected only if the body is lost at the least energy known so far less the precision: most
+    directions cost one run. The result is the least over the directions tried, an upper bound of the least over all.
     """
     beta = _dilatancy(body, dilatancy)
     if not equilibrium(body).admissible:
@@ -287,7 +287,7 @@ class _Search:
     def threshold(self, direction: Array, lost: float) -> float:
         """Least energy of a loss in a direction, given one, by bisection of its logarithm."""
         low = lost
-        while low > self.low:  # down by factors first: the threshold is mostly near
+        while low > self.low:  # decrease by factors first: the threshold is usually close
             low = max(self.low, low / 3.0)
             if self.recovers(direction, low):
                 break

@@ -1,4 +1,4 @@
-"""Roche lobe of a rotating polyhedron in a tide: from which facets loose material could leave.
+"""Roche lobe of a rotating polyhedron in a tide: the facets from which loose material could escape.
 
 In the frame that rotates with the body the effective potential is ``V(x) = -U(x) - x.F x/2`` with ``F`` the symmetric
 part of ``K_t - Omega^2``. Its saddle points lie beyond the body on both sides of the directions in which ``F``

@@ -1,4 +1,4 @@
-"""The shape of an asteroid as a polyhedron, as radar, lightcurves and spacecraft give it."""
+"""The shape of an asteroid as a polyhedron, from radar, lightcurves or spacecraft images."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ class Shape:
 
     The vertices are kept relative to the centre of mass and along the principal axes of inertia: ``x`` along the axis
     of least inertia (the longest extent), ``z`` along that of greatest inertia. :attr:`rotation` and :attr:`origin`
-    lead back to the frame of the file.
+    give the transformation to the frame of the file.
 
     Parameters
     ----------
     vertices : Quantity, shape (v, 3)
     facets : array_like of int, shape (f, 3)
-        Corners of each triangle, numbered from 0, counter-clockwise seen from outside. A surface that is turned inside
-        out as a whole is turned back.
+        Corners of each triangle, numbered from 0, counter-clockwise seen from outside. If all facets are
+        oriented inwards, the orientation is reversed.
 
     Attributes
     ----------
@@ -120,8 +120,8 @@ class Shape:
         Parameters
         ----------
         path : path
-            OBJ, PLY, STL, a PDS vertex-facet or ICQ table, or a DAMIT ``shape.txt``; the content decides. See
-            :mod:`flybystab.body.shape_files`.
+            OBJ, PLY, STL, a PDS vertex-facet or ICQ table, or a DAMIT ``shape.txt``; the format is detected from the
+            content. See :mod:`flybystab.body.shape_files`.
         unit : Unit
             Of the coordinates in the file: no format states it.
 
@@ -249,7 +249,7 @@ class Shape:
         return scale * axes * u.m
 
     def scaled(self, *, diameter: Quantity | None = None, volume: Quantity | None = None) -> Shape:
-        """The same shape in another size.
+        """The same shape scaled to another size.
 
         Parameters
         ----------

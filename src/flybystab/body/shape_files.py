@@ -1,4 +1,4 @@
-"""Triangle meshes from files: each format is one function in `FORMATS`, and the content decides.
+"""Triangle meshes from files: each format is one function in `FORMATS`; the format is detected from the content.
 
 ======  =============================================================================================
 format  content

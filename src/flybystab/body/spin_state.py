@@ -1,9 +1,10 @@
-"""State of rotation of a free rigid body: which axis it spins about, and whether that motion is stable.
+"""State of rotation of a free rigid body: the axis of its spin, and the stability of that motion.
 
 Steady spin about the axis of the intermediate moment of inertia is an equilibrium of the stress and an unstable
 motion (Euler's equations; Landau & Lifshitz, Mechanics, section 37): a small tilt grows as ``exp(rate t)`` with
-``rate = omega sqrt((J2 - J1)(J3 - J2)/(J1 J3))``. A body that spins about no principal axis tumbles: its angular
-velocity runs along a polhode, and the stress with it, so that an equilibrium is one instant of a cycle.
+``rate = omega sqrt((J2 - J1)(J3 - J2)/(J1 J3))``. A body that does not spin about a principal axis
+tumbles: its angular velocity moves along a polhode and its stress changes with it, so that an equilibrium holds at one
+instant of a cycle only.
 """
 
 from __future__ import annotations

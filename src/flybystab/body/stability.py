@@ -1,15 +1,15 @@
 """Structural stability of a rubble pile: the energy criterion of theory.md, section 5.
 
-Three levels, weakest first: admissible (the stress is inside the yield surface); stable to infinitesimal
-perturbations; stable to finite ones. A perturbation is a rate of strain held for a while, seen from the frame in
-which the body has no relative angular momentum, at fixed angular momentum. Its kinetic energy is
-``K(0) + t P1 + t^2/2 P2 + t^3/6 P3 + ...``: friction takes ``-P1``, and the deformation grows once what gravity and
-spin give (``P2``) exceeds it. The pressure in flow is the one that the flow rule needs, not that of the equilibrium.
-The critical energy and strain are the least over all directions of strain, at second order, third order and from the
-barrier along paths of constant direction, up to the axis ratio of 6:1 at which the homogeneous model ends. The second
-order is a certified minimum for associative flow on a circular cone and the result of a search otherwise.
+Three levels, weakest first: admissible (the stress is inside the yield surface); stable to infinitesimal perturbations;
+stable to finite ones. A perturbation is a rate of strain that is held for some time, in the frame in which the body has
+no relative angular momentum, at fixed angular momentum. Its kinetic energy is ``K(0) + t P1 + t^2/2 P2 + t^3/6 P3 +
+...``: friction dissipates ``-P1``, and the deformation grows once the energy from gravity and spin (``P2``) exceeds it.
+The pressure in flow is that required by the flow rule, not that of the equilibrium. The critical energy and strain are
+the least over all directions of strain, at second order, third order and from the barrier along paths of constant
+direction, up to the axis ratio of 6:1 at which the homogeneous model ends. The second order is a certified minimum for
+associative flow on a circular cone and the result of a search otherwise.
 
-What the criterion is, and is not. Holding the direction of strain is a constraint, so that the barrier over such
+Limits of the criterion: holding the direction of strain is a constraint, so that the barrier over such
 paths is an upper bound of the least barrier over all of them: a body need not recover from less. For flow that is
 not associative no potential exists and the number is an estimate. The differences between the three orders show
 its quality; :func:`flybystab.recovery` integrates the full dynamics of perturbed bodies and is the reference: over
@@ -70,7 +70,7 @@ LEVELS = (
 
 
 class Orders(NamedTuple):
-    """A result at second order, third order and from the barrier."""
+    """Values at second order, at third order and from the barrier."""
 
     second: Any
     third: Any
@@ -148,11 +148,11 @@ class Stability(Record):
     spin_limits : Quantity, shape (2,)
         Slowest and fastest spin about ``a3``, rad/s, that the shape and material bear.
     critical_momentum : Quantity, shape (2,)
-        Angular momentum about ``a3``, kg m2/s, to be taken away or added until one of them is met; nan for
+        Angular momentum about ``a3``, kg m2/s, to be removed or added until one of them is reached; nan for
         bodies that do not spin about ``a3``. For perturbations that add angular momentum this is the limit, not the
         critical energy.
     steady : bool
-        Whether the spin is about a principal axis; of a tumbling body the criterion takes the present instant.
+        Whether the spin is about a principal axis; for a tumbling body the criterion holds at the present instant.
     spin_state : SpinState
         State of rotation. Spin about the middle axis is an unstable motion, at the growth rate given there, whatever
         the levels say: they hold the angular velocity for the short time of a deformation.
@@ -335,7 +335,7 @@ class Push(Record):
 
 
 def push(body: Body, direction: Any, strain: Any, *, dilatancy: float = 1.0) -> Push:
-    """Kinetic energy that a push in a given direction loses, against strain.
+    """Kinetic energy lost by a perturbation in a given direction, against strain.
 
     Parameters
     ----------
@@ -345,7 +345,7 @@ def push(body: Body, direction: Any, strain: Any, *, dilatancy: float = 1.0) -> 
         Symmetric rate of strain in body axes; only its deviator counts, scaled to one. The trace follows from
         `dilatancy`.
     strain : array_like
-        Strains at which the loss is wanted.
+        Strains at which to compute the loss.
 
     Returns
     -------
@@ -399,7 +399,7 @@ def _kind(scene: Any, x: Array, row: Array) -> str:
 
 
 def _loss(scene: Any, x: Array, t: float) -> float:
-    """Energy that the push has lost at strain `t`, in the units of the kernels."""
+    """Energy that the perturbation has lost at strain `t`, in the units of the kernels."""
     return float(loss_at(scene, x, t, WITH_INERTIA))
 
 

@@ -1,8 +1,8 @@
 """Surface slopes of a body, and how an encounter changes them.
 
 The slope is the angle between the outward normal and the reversed effective acceleration (self-gravity,
-centrifugal, Euler, tide). Where it passes the angle of repose, loose material slides: the quantities that
-studies of Apophis publish. The body here is a smooth ellipsoid: a real surface adds its own relief.
+centrifugal, Euler, tide). Where it exceeds the angle of repose, loose material slides. Studies of Apophis
+publish these quantities. The body here is a smooth ellipsoid: a real surface has relief in addition.
 """
 
 from __future__ import annotations

@@ -34,29 +34,29 @@ CATALOGUE_DATE = "2026-07"
 
 @lru_cache(maxsize=64)
 def _day(jd: float) -> Time:
-    """A Julian date, TDB; most rows of a catalogue share theirs."""
+    """A Time (TDB) from a Julian date; cached, since most rows of a catalogue have the same epoch."""
     whole = np.floor(jd)
     return Time(whole, jd - whole, format="jd", scale="tdb")
 
 
 @dataclass(frozen=True, eq=False, init=False)
 class Asteroid(Record):
-    """One asteroid: a row of a catalogue, or an orbit and a body of the user.
+    """An asteroid with its orbit and body, from a row of a catalogue or from values of the user.
 
     Parameters
     ----------
     row : mapping of str to str, optional
         A row of a catalogue.
     material : Material, optional
-        Of the body: a choice, not catalogue data. By default that of `body`, else 35 degrees of friction.
+        Material of the body, which catalogues do not give. By default that of `body`, otherwise 35 degrees of friction.
     file : str
-        Where the row comes from.
+        File from which the row was read.
     covariance : Covariance, optional
-        Of the orbit, where a file gives one; else see :attr:`orbit`.
+        Covariance of the orbit, if a file gives one; otherwise see :attr:`orbit`.
     orbit : Orbit, optional
-        Instead of the elements of the row; with its own covariance.
+        Replaces the elements of the row; with its own covariance.
     body : Body, optional
-        Semi-axes, density, period and material instead of those of the row. It spins about its short axis.
+        Replaces semi-axes, density, period and material of the row. It must spin about its short axis.
     pole : Quantity (2,), optional
         Ecliptic longitude and latitude (J2000) of the spin pole.
     sigmas : mapping, optional
@@ -69,7 +69,7 @@ class Asteroid(Record):
     Raises
     ------
     InvalidInput, UnitMismatch, UnknownName
-        For anything that is not such a value.
+        For an invalid value.
 
     Examples
     --------
@@ -138,9 +138,9 @@ class Asteroid(Record):
         Parameters
         ----------
         name : str or int
-            "Apophis", 99942, "2004 MN4", "2004mn4", "(99942) Apophis": case and spaces do not count.
+            "Apophis", 99942, "2004 MN4", "2004mn4", "(99942) Apophis"; case and spaces are ignored.
         material : Material, optional
-            What it is made of.
+            Material of the body.
 
         Raises
         ------
@@ -159,20 +159,20 @@ class Asteroid(Record):
         return find(catalogue(path), name, str(path)).with_material(material)
 
     def with_material(self, material: Material | None) -> Asteroid:
-        """The same asteroid of another material (None: unchanged)."""
+        """The same asteroid with another material (None: unchanged)."""
         return self if material is None else replace(self, material=material)
 
     def with_shape(self, shape: Shape) -> Asteroid:
         """The same asteroid with the equivalent ellipsoid of a polyhedral shape (:meth:`Body.from_shape`).
 
-        The semi-axes count as measured. Their relative uncertainties stay those of the row: a shape model does not
-        state its own. A catalogued pole and spin state are those about the principal axes of the shape.
+        The semi-axes are treated as measured. Their relative uncertainties are those of the row, since a shape model
+        does not give its own. A catalogued pole and spin state refer to the principal axes of the shape.
 
         Raises
         ------
         InvalidInput
-            For anything but a Shape. A tumbling solution whose periods the inertia of the shape does not allow raises
-            it when the body is built.
+            For anything but a Shape. A tumbling solution whose periods are not possible for the inertia of the shape
+            raises it when the body is built.
         """
         if not isinstance(shape, Shape):
             raise InvalidInput("shape", shape, "a flybystab.Shape")
@@ -220,7 +220,7 @@ class Asteroid(Record):
         *,
         inertia: tuple[float, float] | None = None,
     ) -> Asteroid:
-        """The same asteroid with another tumbling solution, for rival solutions of its lightcurves.
+        """The same asteroid with another tumbling solution, for alternative solutions of its lightcurves.
 
         Parameters
         ----------
@@ -248,18 +248,18 @@ class Asteroid(Record):
         return replace(self, row=row)
 
     def __reduce__(self) -> tuple[Any, ...]:
-        # Without what was built from the row: it is rebuilt where it is needed.
+        # Without the cached orbit and body, which are rebuilt from the new row.
         return Asteroid, (dict(self.row), self.material, self.file, self.covariance, self.own_orbit)
 
     def __repr__(self) -> str:
         return f"<Asteroid {self.label}>"
 
     def completed(self, other: Asteroid) -> Asteroid:
-        """The same asteroid; what its row does not know of its body and names is taken from another row."""
+        """The same asteroid with unknown physical values and names completed from another row."""
         row = dict(self.row)
         if other.row.get("name") and row.get("name", "") in ("", row.get("designation"), row.get("number")):
             row["name"] = other.row["name"]
-        # A size or a period from elsewhere would not fit the shape and the spin state that go with it.
+        # A size or a period from another row would be inconsistent with the shape and the spin state of this one.
         for c, v in other.row.items():
             if c not in ORBITAL and (not row.get(c) or c in BODILY):
                 row[c] = v
@@ -276,9 +276,9 @@ class Asteroid(Record):
 
         The elements are a, e, i, node, peri, M, or q and the time of perihelion in place of a and M.
 
-        Its covariance is the asteroid's own; else the one embedded for it; else the diagonal of the row's
-        1-sigmas, marked as uncorrelated; else what digits and U say (:mod:`flybystab.catalogues.orbit_errors`);
-        else None.
+        Its covariance is, in this order: that given for the asteroid; the one in the package; the diagonal of the
+        1-sigmas of the row, marked as uncorrelated; an estimate from digits and U
+        (:mod:`flybystab.catalogues.orbit_errors`); otherwise None.
         """
         from flybystab.orbit.forces import NonGravitational, au_per_day2
         from flybystab.orbit.orbit import Orbit
@@ -354,9 +354,10 @@ class Asteroid(Record):
         Parameters
         ----------
         material : Material, optional
-            Instead of the asteroid's own.
+            Replaces that of the asteroid.
         phase : float
-            For a tumbler: fraction of its rotation period, which fixes where the spin vector is in the body.
+            For a tumbler: fraction of its rotation period, which determines the direction of the spin vector in the
+            body.
 
         Returns
         -------
@@ -386,7 +387,7 @@ class Asteroid(Record):
     def angular_velocities(self, phase: Array) -> Array:
         """Angular velocities along the body axes, rad/s, shape (n, 3), at phases of the rotation, shape (n,).
 
-        Those of a body that does not tumble are all the same.
+        They are all equal for a body that does not tumble.
         """
         if self.tumbles:
             moments, momentum, j = self._tumbling
@@ -417,7 +418,7 @@ class Asteroid(Record):
         Parameters
         ----------
         angle : Quantity
-            Turn about the pole. No catalogue says at what angle an asteroid is at a date decades away.
+            Rotation angle about the pole. It cannot be predicted for a date decades away.
         phase : float
             For a tumbler: the phase given to `body_with`.
         pole : ndarray (3,), optional
@@ -467,5 +468,5 @@ class Asteroid(Record):
 
 
 def identity(asteroid: Asteroid) -> str:
-    """The number, designation or name that stands for an asteroid in the random streams and in a journal."""
+    """The number, designation or name that identifies an asteroid in random streams and in a journal."""
     return str(asteroid.number) if asteroid.number is not None else asteroid.designation or asteroid.name

@@ -1,4 +1,4 @@
-"""The embedded catalogue of near-Earth asteroids, and files of the same or other known forms."""
+"""The embedded catalogue of near-Earth asteroids, and files in its format or another known one."""
 
 from __future__ import annotations
 
@@ -45,9 +45,9 @@ def find(asteroids: Sequence[Asteroid], name: str | int, where: str) -> Asteroid
 
 
 def _read(text: str, file: str, name: str) -> tuple[Asteroid, ...]:
-    """Asteroids of a text, by the reader of its format."""
+    """Asteroids of a text, read by the reader of its format."""
     found = reader_of(text)
-    material = Material()  # one for all: checking it costs more than reading a row
+    material = Material()  # checked once, which takes longer than reading a row
     if found is None:
         return tuple(Asteroid(row, material, file) for row, _ in read_native(text, file))
     source = {"frame": FRAME, "orbit_source": f"{found.name} ({name})"}
@@ -68,7 +68,7 @@ def catalogue(path: Any = None) -> tuple[Asteroid, ...]:
 
     The format is found from the content of the file (:mod:`flybystab.catalogues.readers`), which may be
     gzipped: the catalogue's own columns, or those of an agency or program (``docs/inputs.md``). Objects of astroquery
-    and sbpy are taken too (:mod:`flybystab.catalogues.objects`).
+    and sbpy are accepted as well (:mod:`flybystab.catalogues.objects`).
 
     The catalogue's own format needs only the columns that are used: a name,
     ``epoch_jd_tdb, a_au, e, i_deg, node_deg, peri_deg, M_deg`` for orbits,
@@ -94,7 +94,7 @@ def catalogue_table(path: str | Path | None = None) -> QTable:
     Returns
     -------
     QTable
-        One row per asteroid and the columns of the file; ``meta`` says what it is.
+        One row per asteroid and the columns of the file; its provenance in ``meta``.
     """
     asteroids = catalogue(path)
     table = QTable()

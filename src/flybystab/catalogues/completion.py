@@ -12,7 +12,7 @@ if TYPE_CHECKING:
 
 
 def with_physical_data(asteroids: Sequence[Asteroid]) -> tuple[Asteroid, ...]:
-    """Asteroids whose empty physical columns are filled from the embedded tables where these have the body.
+    """Asteroids whose empty physical columns are filled from the embedded tables.
 
     First from the embedded catalogue; then spin period and amplitude from the LCDB.
     """
@@ -41,7 +41,7 @@ def with_physical_data(asteroids: Sequence[Asteroid]) -> tuple[Asteroid, ...]:
 
 
 def foreign(asteroid: Asteroid) -> bool:
-    """Whether an orbit comes from a file of another publisher: its body is then completed from the embedded tables.
+    """Whether an orbit comes from a file of another publisher, so that its body is completed from the embedded tables.
 
     Sources of such orbits end with the name of the file (:func:`flybystab.catalogues.catalogue.catalogue`).
     """

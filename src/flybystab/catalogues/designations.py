@@ -29,7 +29,7 @@ _LETTERS = "ABCDEFGHJKLMNOPQRSTUVWXYZ"
 
 
 def unpacked(text: str) -> str:
-    """Number or designation from its packed form; other texts as they are.
+    """Number or designation from its packed form; other texts are returned unchanged.
 
     ``K04M04N`` is 2004 MN4, ``a0001`` 360001, ``~0K8Q`` 697402 (620000 and a number in base 62), ``_QC0000``
     2026 CA620, ``PLS2040`` 2040 P-L, ``CK20F030`` C/2020 F3, ``0001P`` 1P
@@ -82,7 +82,7 @@ def is_comet(designation: str) -> bool:
 def name_columns(text: str) -> dict[str, str]:
     """Number, name and designation of a full name: ``99942 Apophis (2004 MN4)``, ``(433) Eros``, ``1P/Halley``.
 
-    Packed forms are unpacked. The number of a comet stays in its designation, its name is the full one.
+    Packed forms are unpacked. The number of a comet is part of its designation; its name is the full name.
     """
     full = " ".join(text.split())
     plain = unpacked(full)
@@ -129,7 +129,7 @@ def unpacked_date(text: str) -> float:
     Raises
     ------
     InvalidInput
-        It is no date.
+        The text is not a packed date.
     """
     try:
         year = 100 * _DIGITS.index(text[0]) + int(text[1:3])

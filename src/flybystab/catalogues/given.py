@@ -1,4 +1,4 @@
-"""Rows of a catalogue from values that a user gives: an orbit, a body, its pole, with errors and sources."""
+"""Catalogue rows from values of the user: orbit, body and pole, with errors and sources."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from flybystab.errors import InvalidInput, UnknownName
 from flybystab.orbit.orbit import Orbit, heliocentric
 from flybystab.units import to_si
 
-#: What can have an error or a source: unit, and the stem of the columns.
+#: Quantities that can have an error or a source: unit, and stem of the column names.
 QUANTITIES: Mapping[str, tuple[u.UnitBase, str]] = {
     "axes": (u.m, "semi_axes"),
     "diameter": (u.m, "diameter"),
@@ -25,12 +25,12 @@ QUANTITIES: Mapping[str, tuple[u.UnitBase, str]] = {
     "pole": (u.deg, "pole"),
     "orbit": (u.dimensionless_unscaled, "orbit"),
 }
-#: Errors that have a column.
+#: Quantities whose error has a column.
 _ERRORS = ("axes", "density", "period")
 
 
 def checked_orbit(orbit: Any) -> Orbit:
-    """The orbit, or InvalidInput for anything else."""
+    """The orbit; raises InvalidInput for anything else."""
     if not isinstance(orbit, Orbit):
         raise InvalidInput("orbit", orbit, "an Orbit: Orbit.from_elements or Orbit.from_state")
     return orbit

@@ -11,7 +11,7 @@ import numpy as np
 
 from flybystab.typing import Array
 
-#: Bodies of like size among which a period is drawn.
+#: Number of bodies of similar size among which a period is drawn.
 NEIGHBOURS = 200
 
 
@@ -24,7 +24,7 @@ def lightcurves() -> dict[str, dict[str, str]]:
 
 @lru_cache(maxsize=1)
 def _by_size() -> tuple[Array, Array]:
-    """Absolute magnitudes in rising order and the periods (h) that go with them, tumblers left out."""
+    """Absolute magnitudes in ascending order and the corresponding periods (h), without tumblers."""
     rows = [r for r in lightcurves().values() if r["H_mag"] and not r["tumbles"]]
     pairs = np.array(sorted((float(r["H_mag"]), float(r["spin_period_h"])) for r in rows))
     return pairs[:, 0], pairs[:, 1]
@@ -32,9 +32,10 @@ def _by_size() -> tuple[Array, Array]:
 
 @lru_cache(maxsize=4096)
 def periods_like(magnitude: float | None) -> Array:
-    """Periods, h, of the bodies nearest in absolute magnitude, rising; of all without one.
+    """Periods, h, in ascending order, of the bodies nearest in absolute magnitude; of all bodies for None.
 
-    Small bodies turn faster, so the size matters; that fast rotators are easier to measure stays in the sample.
+    Small bodies rotate faster, hence the selection by size. The bias towards fast rotators, whose periods are easier to
+    measure, is not corrected.
     """
     size, period = _by_size()
     if magnitude is None:

@@ -5,7 +5,7 @@
 - ``astroquery.mpc.MPC.query_object(...)``: a list of mappings;
 - tables with the columns of a JPL query; ``sbpy.data.Orbit``, with ``sbpy.data.Phys`` for the body.
 
-Mappings and lists take the way of the agencies' own JSON, so that the same rules hold.
+Mappings and lists are read like the JSON of the agencies, by the same rules.
 """
 
 from __future__ import annotations
@@ -39,7 +39,7 @@ def asteroids_of(orbit: Any, phys: Any = None) -> tuple[Asteroid, ...]:
     Raises
     ------
     InvalidInput
-        The object is none of these, or has what its file would be refused for.
+        The object is none of these, or is invalid for the same reasons as a file.
     """
     from flybystab.catalogues.asteroid import Asteroid
 
@@ -125,7 +125,7 @@ def _printed(value: Any) -> str:
 
 
 def _answer(given: Mapping[str, Any]) -> dict[str, Any]:
-    """An answer of SBDB as the API gives it, from the mapping that astroquery makes of it."""
+    """An answer of SBDB in the form of the API, from the mapping made by astroquery."""
     orbit = dict(given["orbit"])
     if isinstance(orbit.get("elements"), list):
         return dict(given)

@@ -22,24 +22,24 @@ from flybystab.orbit.elements import GM_SUN, state_from_elements
 from flybystab.orbit.kepler import two_body
 from flybystab.typing import Array
 
-#: Half a unit in the last decimal of MPCORB: a (by way of the mean motion, deg/d), e, i, node, peri, M (deg).
+#: Half a unit in the last decimal of MPCORB: a (from the mean motion, deg/d), e, i, node, peri, M (deg).
 _HALF_UNITS = {"n": 5e-9, "e": 5e-8, "angle": 5e-6}
 _STEP = np.log(648000.0) / 9.0
 
 
 def runoff(u: int) -> float:
-    """In-orbit runoff in longitude, rad/s, in the middle (by its logarithm) of a class of U, 0 to 9."""
+    """In-orbit runoff in longitude, rad/s, at the centre (of its logarithm) of a class of U, 0 to 9."""
     return float(np.radians(np.exp((u - 0.5) * _STEP) / 3600.0) / (10.0 * YEAR))
 
 
 def error_of(row: Mapping[str, str], epoch: Time) -> Covariance | None:
-    """A covariance from what a catalogue row says of its orbit otherwise; None if it says nothing.
+    """A covariance from the uncertainty parameter and the printed digits of a catalogue row; None without either.
 
     Parameters
     ----------
     row : mapping
-        A catalogue row. ``condition_code`` is U; ``observed_jd`` the middle of the observed arc (else the epoch);
-        digits count where the row comes from the MPC or the SBDB.
+        A catalogue row. ``condition_code`` is U; ``observed_jd`` the middle of the observed arc (the epoch if
+        unknown); digits are used where the row comes from the MPC or the SBDB.
     epoch : Time
         Of its elements.
     """
@@ -78,7 +78,7 @@ def error_of(row: Mapping[str, str], epoch: Time) -> Covariance | None:
 def printed_half_units(row: Mapping[str, str]) -> Array:
     """Half a unit in the last printed digit of a, e, i, node, peri, M (m, rad), shape (6,).
 
-    Angles count the most decimals of the four, since tables leave out trailing zeros.
+    All angles are assigned the largest number of decimals of the four, since tables leave out trailing zeros.
     """
     a, e, *angles = (_decimals(row[c]) for c in ("a_au", "e", "i_deg", "node_deg", "peri_deg", "M_deg"))
     angle = np.radians(0.5 * 10.0 ** -max(angles))
@@ -97,7 +97,7 @@ def _state(elements: Array) -> Array:
 
 
 def _kicked(state: Array, axis: float, ago: float, slower: float) -> Array:
-    """The state if the asteroid had been, ``ago`` s before, where it was, but with a mean motion slower by a share."""
+    """The state for the same position ``ago`` s before, with a mean motion that is smaller by a given fraction."""
     then = np.array(two_body(GM_SUN, state, -ago))
     v = np.linalg.norm(then[3:])
     then[3:] *= 1.0 + slower * GM_SUN / (3.0 * axis * v * v)

@@ -1,6 +1,6 @@
-"""The record of an asteroid: what a row of a catalogue says, each value with its unit and its source.
+"""The record of an asteroid: the values of a row of a catalogue with their units and sources.
 
-A value that nobody measured is flagged as assumed. The columns are explained in ``data/README.md``.
+A value that was not measured is flagged as assumed. The columns are explained in ``data/README.md``.
 """
 
 from __future__ import annotations
@@ -68,9 +68,9 @@ TEXTS = (
 #: Epoch and elements, and the factors of the elements to SI.
 ORBIT = ("epoch_jd_tdb", "a_au", "e", "i_deg", "node_deg", "peri_deg", "M_deg")
 ORBIT_SI = np.array([UNITS[c].si.scale for c in ORBIT[1:]])
-#: Perihelion distance and time, which take the place of a and M in rows without them (parabolas).
+#: Perihelion distance and time, which replace a and M in rows without them (parabolas).
 PERIHELION = ("q_au", "tp_jd_tdb")
-#: Columns of an orbit: kept as they are when a row is completed from another.
+#: Columns of an orbit, which are not changed when a row is completed from another.
 ORBITAL = frozenset(
     {
         *ORBIT,
@@ -88,7 +88,7 @@ ORBITAL = frozenset(
     | {"sigma_" + c for c in ORBIT[1:]}
     | {"orbit_solution", "orbit_source", "condition_code", "condition_code_source"}
 )
-#: Columns that belong together: taken from the completing row as a whole.
+#: Groups of columns that are copied together from the completing row.
 BODILY = frozenset(
     c for c in (*UNITS, *TEXTS) if c.startswith(("semi_axis", "semi_axes", "diameter", "spin_"))
 )
@@ -96,7 +96,7 @@ BODILY = frozenset(
 SHAPE = ("semi_axis_a_m", "semi_axis_b_m", "semi_axis_c_m")
 
 
-#: Smallest and largest value that a cell may have: what is beyond is a slip, mostly of the unit.
+#: Smallest and largest value of each column: values beyond are mistakes, mostly of the unit.
 LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType(
     dict.fromkeys(_LENGTH, (0.05, 5e6))
     | dict.fromkeys(_HOURS, (1e-4, 1e5))
@@ -113,19 +113,19 @@ LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType(
 
 
 def key_of(name: object) -> str:
-    """A name as it is compared: no case, no spaces, no brackets."""
+    """A name for comparisons: without case, spaces and brackets."""
     return "".join(c for c in str(name).casefold() if not c.isspace() and c not in "()_")
 
 
 class Record:
-    """A row of a catalogue; text in the file, numbers with units here.
+    """A row of a catalogue: text in the file, numbers with units here.
 
     Attributes
     ----------
     row : mapping of str to str
-        The row as it stands in the file.
+        The unchanged row of the file.
     file : str
-        Where the row comes from.
+        File from which the row was read.
     """
 
     row: Mapping[str, str]
@@ -154,7 +154,7 @@ class Record:
 
     @cached_property
     def names(self) -> tuple[str, ...]:
-        """Everything it can be found by."""
+        """All names by which the asteroid can be found."""
         row = self.row
         found = [row.get("name", ""), row.get("number", ""), row.get("designation", "")]
         found += row.get("aliases", "").split(";")
@@ -165,7 +165,7 @@ class Record:
 
     @cached_property
     def assumed(self) -> tuple[str, ...]:
-        """Columns whose values nobody measured."""
+        """Columns with assumed, not measured, values."""
         return tuple(c for c in self.row.get("assumed", "").split(";") if c)
 
     @cached_property

@@ -1,4 +1,4 @@
-"""Spin states and attitudes of free rigid bodies: what a catalogue says, as initial conditions.
+"""Spin states and attitudes of free rigid bodies: initial conditions from catalogue values.
 
 A free body keeps its angular momentum ``L`` and its energy ``E``; moments of inertia ``J1 <= J2 <= J3``
 belong to the long, middle and short axis. With ``J = L^2/(2E)`` the motion of the angular velocity in the
@@ -29,7 +29,7 @@ def free_spin(moments: Array, momentum: float, j: float, phase: Array) -> tuple[
     Parameters
     ----------
     moments : ndarray (3,)
-        ``J1 < J2 < J3``, any unit of inertia.
+        ``J1 < J2 < J3``, in any unit.
     momentum : float
         ``L``, that unit per second.
     j : float
@@ -82,7 +82,7 @@ def tumbling_state(
     Parameters
     ----------
     moments : ndarray (3,)
-        ``J1 < J2 < J3``, any unit of inertia.
+        ``J1 < J2 < J3``, in any unit.
     precession, rotation : float
         ``P_phi`` and ``P_psi``, s.
     mode : str

@@ -24,7 +24,7 @@ def measured(text: str, unit: str, name: str) -> Measured:
     Raises
     ------
     InvalidInput
-        It is not such a value, or not of this dimension.
+        The text is not a number with an error, or has a unit of another dimension.
     """
     import astropy.units as u
 
@@ -84,7 +84,7 @@ def body_arguments(sub: argparse.ArgumentParser) -> None:
 
 
 def check_body_options(options: argparse.Namespace) -> None:
-    """Check the values of the options; InvalidInput for those that cannot be read."""
+    """Check the values of the options; raises InvalidInput for invalid ones."""
     _given(options)
 
 
@@ -111,7 +111,7 @@ def _axes(text: str) -> tuple[list[float], list[float]]:
 
 
 def _given(options: argparse.Namespace) -> tuple[dict[str, str], list[str]]:
-    """Columns of the options, and the names of those that were given."""
+    """Catalogue columns of the given options, and the names of these options."""
     import astropy.units as u
 
     from flybystab.catalogues.given import error_columns, pole_columns
@@ -170,7 +170,7 @@ def _given(options: argparse.Namespace) -> tuple[dict[str, str], list[str]]:
 
 
 def with_body_options(asteroid: Any, options: argparse.Namespace) -> Any:
-    """The asteroid with the values of the options in place of its own."""
+    """The asteroid with the values of the options."""
     from dataclasses import replace
 
     if getattr(options, "phys", None):

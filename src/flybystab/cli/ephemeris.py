@@ -1,4 +1,4 @@
-"""``flybystab ephemeris NAME``: where an asteroid is seen from a place on the Earth."""
+"""``flybystab ephemeris NAME``: positions of an asteroid in the sky from a place on the Earth."""
 
 from __future__ import annotations
 

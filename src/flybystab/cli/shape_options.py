@@ -68,7 +68,7 @@ def check_map(options: argparse.Namespace) -> None:
 
 
 def surface_of(options: argparse.Namespace, result: Any) -> Any:
-    """Surface of the shape through a flyby that has been computed; None without a shape."""
+    """Surface of the shape through a computed flyby; None without a shape."""
     if options.shape is None:
         return None
     from flybystab.flybys.surface_history import history_of

@@ -19,7 +19,7 @@ ORTHOGONAL = 1e-8
 def periapsis_axes(encounter: Encounter) -> Array:
     """Rotation matrix, frame of the encounter -> periapsis frame (x periapsis, z angular momentum).
 
-    An attitude ``A`` (body axes -> ICRF) of a real encounter is ``periapsis_axes(encounter) @ A`` to `flyby`.
+    For an attitude ``A`` (body axes -> ICRF) pass ``periapsis_axes(encounter) @ A`` to `flyby`.
     """
     return encounter.periapsis_axes
 
@@ -79,7 +79,7 @@ def attitude_matrix(attitude: Any) -> Array:
 
 
 def attitude_matrices(attitudes: Sequence[Any] | None, n: int) -> tuple[Array, NDArray[np.object_]]:
-    """Rotation matrices (n, 3, 3) of attitudes, and why each invalid one is invalid (empty if it is valid)."""
+    """Rotation matrices (n, 3, 3) of attitudes, and for each the reason why it is invalid (empty if it is valid)."""
     out = np.broadcast_to(np.eye(3), (n, 3, 3)).copy()
     failures = np.full(n, "", dtype=object)
     if attitudes is None:

@@ -1,4 +1,4 @@
-"""Attitudes given for the moment of closest approach, carried back to the start of the encounter by free rotation."""
+"""Attitudes given at closest approach, propagated back to the start of the encounter by free rotation."""
 
 from __future__ import annotations
 
@@ -33,9 +33,9 @@ def attitude_at_start(body: Body, encounter: Encounter, at_periapsis: Any) -> Ar
 
     Notes
     -----
-    The free body turns by ``Q(t)`` from the start, ``dQ/dt = Q [omega]``, with Euler's equations for ``omega``;
-    the attitude at the start is ``A Q(t)^T``. The tide changes the rotation on the way, so that the true attitude at
-    closest approach differs somewhat.
+    The free body turns by ``Q(t)`` from the start, ``dQ/dt = Q [omega]``, with Euler's equations for ``omega``; the
+    attitude at the start is ``A Q(t)^T``. The tide changes the rotation during the encounter, so that the true attitude
+    at closest approach differs slightly.
     """
     from scipy.integrate import solve_ivp
     from scipy.spatial.transform import Rotation

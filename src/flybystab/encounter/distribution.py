@@ -1,8 +1,8 @@
 """An uncertain orbit at an encounter: distances, target-plane points and impacts of its clones.
 
-Two routes that share nothing but the integrator: clones, which need no assumption beyond the normal law at the
-epoch and carry a sampling error; and the linear map of the covariance to the target plane, where the law stays
-normal as long as the map is linear, which is measured.
+Two methods that have only the integrator in common: clones, which assume only a normal distribution at the epoch and
+have a sampling error; and the linear map of the covariance to the target plane, where the distribution remains normal
+as long as the map is linear, which is measured.
 """
 
 from __future__ import annotations
@@ -46,10 +46,10 @@ class EncounterDistribution(Tabular):
         The row of :func:`flybystab.find_encounters` for the nominal orbit.
     clones : tuple of Orbit, length n
     found : ndarray of bool, shape (n,)
-        Clones that have a closest approach near this time; the others passed at another time or not at all;
-        and their values below are nan.
+        Clones that have a closest approach near this time. The values below are nan for the others, which pass at
+        another time or not at all.
     time_offset : Quantity, shape (n,)
-        Closest approach after that of the nominal orbit.
+        Time of closest approach less that of the nominal orbit.
     distance, v_inf : Quantity, shape (n,)
         Distance between the centres (impacts: of the two-body orbit without a surface), hyperbolic excess speed.
     b : Quantity, shape (n, 2)
@@ -59,9 +59,9 @@ class EncounterDistribution(Tabular):
     impact : ndarray of bool, shape (n,)
         Surface or atmosphere reached.
     linear : LinearPlane or None
-        The linear map; None where a point at one sigma has no encounter, or is bound to the planet.
+        The linear map; None where an orbit displaced by one sigma has no encounter, or is bound to the planet.
     source : str
-        The covariance.
+        Source of the covariance.
     correlated : bool
         Whether the covariance had correlations.
     """
@@ -89,11 +89,11 @@ class EncounterDistribution(Tabular):
 
     @property
     def impact_probability(self) -> float:
-        """Share of the clones that reach atmosphere or surface."""
+        """Fraction of the clones that reach the atmosphere or the surface."""
         return float(np.mean(self.impact))
 
     def impact_interval(self, level: float = 0.95) -> tuple[float, float]:
-        """Clopper-Pearson interval of the impact probability: the error of sampling alone."""
+        """Clopper-Pearson interval of the impact probability, from sampling alone."""
         test = binomtest(int(self.impact.sum()), len(self))
         interval = test.proportion_ci(confidence_level=level, method="exact")
         return float(interval.low), float(interval.high)
@@ -149,7 +149,7 @@ def encounter_distribution(
     Parameters
     ----------
     orbit : Orbit
-        Or anything with an attribute ``orbit``; it must have a covariance.
+        An orbit with a covariance, or an object with one as its attribute ``orbit``.
     planet : str or Planet
         The body encountered.
     time : Time or str
@@ -237,7 +237,7 @@ def distributions(
     Returns
     -------
     list of EncounterDistribution
-        One for each row. A clone that hits a planet is missing from the later ones.
+        One for each row. A clone that hits a planet is missing in the later encounters.
     """
     path = _path(orbit)
     reach = to_si(search, u.s, "search", low=0.0, open_low=True)
@@ -279,8 +279,8 @@ def clone_passages(
 ) -> tuple[Array, Array, Array]:
     """The encounters of some clones that correspond to that of the nominal orbit at `time`.
 
-    Other arguments as of :func:`encounter_distribution`, of which this is a part: the answer for a clone does not
-    depend on the others.
+    Other arguments as for :func:`encounter_distribution`, which calls this function. The result for a clone does not
+    depend on the other clones.
 
     Returns
     -------
@@ -360,12 +360,12 @@ def _path(orbit: Any) -> Orbit:
 
 
 def add_clones(table: QTable, found: Sequence[EncounterDistribution | None]) -> None:
-    """Add what clones say to a table of encounters, one distribution a row; None where there is no covariance.
+    """Add statistics of clones to a table of encounters, from one distribution per row (None without a covariance).
 
     Columns: ``clones`` (number), ``clones_found`` (with an encounter near this time), ``distance_sigma``,
-    ``distance_low``, ``distance_high`` (99.73 % of those found; km), ``time_sigma`` (s), ``b_major``,
-    ``b_minor`` (km) and ``b_angle`` (deg from +T to +R) of the one-sigma ellipse, ``p_impact`` with its 95 %
-    interval ``p_impact_low``, ``p_impact_high``, and ``p_impact_linear``. nan where fewer than two were found.
+    ``distance_low``, ``distance_high`` (99.73 % of those found; km), ``time_sigma`` (s), ``b_major``, ``b_minor`` (km)
+    and ``b_angle`` (deg from +T to +R) of the one-sigma ellipse, ``p_impact`` with its 95 % interval ``p_impact_low``,
+    ``p_impact_high``, and ``p_impact_linear``. nan where fewer than two clones have the encounter.
     """
 
     def column(value: Callable[[EncounterDistribution], Any], least: int = 2) -> Array:

@@ -1,4 +1,4 @@
-"""A close encounter of an asteroid with a planet, scripted or real: its path and its tide."""
+"""A close encounter of an asteroid with a planet: the path and the tide along it."""
 
 from __future__ import annotations
 
@@ -41,10 +41,9 @@ class Track(Protocol):
 class Encounter:
     """A close encounter with one planet.
 
-    Made by :meth:`hyperbolic` (scripted, frame ``"periapsis"``), from a real orbit (:meth:`from_orbit`, frame
-    ``"ICRF"``) or from samples (:meth:`from_trajectory`,
-    :meth:`from_spk`, :meth:`from_oem`).
-    Times are counted from closest approach.
+    An encounter is built on a two-body hyperbola (:meth:`hyperbolic`: a scripted encounter, frame ``"periapsis"``),
+    from a heliocentric orbit (:meth:`from_orbit`, frame ``"ICRF"``) or from a sampled trajectory
+    (:meth:`from_trajectory`, :meth:`from_spk`, :meth:`from_oem`). Times are counted from closest approach.
 
     Attributes
     ----------
@@ -53,9 +52,9 @@ class Encounter:
     time : Time or None
         Closest approach, TDB; None for a scripted encounter.
     distance : Quantity
-        Distance between the centres at closest approach; of the unhindered orbit if it hits the planet.
+        Distance between the centres at closest approach; on an impact, that of the orbit without the planet's surface.
     v_inf : Quantity
-        Speed far from the planet, of the two-body orbit at closest approach; 0 for a bound one.
+        Hyperbolic excess speed of the two-body orbit at closest approach; 0 for a bound orbit.
     v_periapsis : Quantity
         Relative speed at closest approach.
     start_distance : Quantity
@@ -70,10 +69,10 @@ class Encounter:
         ``"periapsis"``: x from the planet's centre toward periapsis, z along the orbital angular momentum;
         ``"ICRF"``; or ``"trajectory"``: that of a given trajectory. The planet is the origin of all.
     forces : tuple of str
-        What moves the asteroid and what makes its tide.
+        Forces on the path of the asteroid and sources of the tide.
     left_out : tuple of (str, float)
-        What was left out, each with its estimated largest share. Names that begin with "orbit:" concern the
-        path: share of the acceleration (scripted) or displacement over distance (real); the others the tide.
+        Effects left out, each with its estimated largest relative size. Names that begin with "orbit:" concern the
+        path: fraction of the acceleration (scripted) or displacement over distance (real orbit); the others the tide.
     tide_error : float
         Largest difference between the stored tide and the exact one at points between the nodes, over the
         peak of the tide.
@@ -83,24 +82,24 @@ class Encounter:
         Zero.
     tide : TidePanels
         Tidal tensor in `frame` against s from closest approach, from `t_start` to 100 h after `t_stop`.
-        On an impact both it and the track end there, and `t_stop` is the time of it.
+        On an impact the tide and the track end at the impact, whose time is `t_stop`.
     distance_error, time_error : Quantity or None
-        For a real orbit: change of distance and time of closest approach when the integration is made 100
-        times tighter plus the change when every known force is on; infinite if the encounter vanishes then.
-        Beyond an earlier encounter also the error of the force model
-        (:attr:`flybystab.orbit.search.neighbours.Spread.model_error`). The orbit's own uncertainty is not in it.
+        For a real orbit: change of distance and time of closest approach with a tolerance of the integration 100
+        times smaller, plus their change with all known forces; infinite if there is then no encounter.
+        After an earlier encounter the error of the force model is included
+        (:attr:`flybystab.orbit.search.neighbours.Spread.model_error`). The uncertainty of the orbit is not.
     ephemeris : str or None
-        Where the planets of a real orbit are from; None for a scripted encounter.
+        Ephemeris of the planets for a real orbit; None for a scripted encounter.
     displacement : Quantity or None
-        For a real orbit: displacement at closest approach (at the entry of an impact) by one sigma of the covariance
-        in the direction least known by then, or by 1 m at the epoch where there is no covariance.
+        For a real orbit: displacement at closest approach (at the entry of an impact) for one sigma of the covariance
+        in the least certain direction, or for 1 m at the epoch where there is no covariance.
     growth : float or None
-        That over the displacement at the epoch.
+        `displacement` over the displacement at the epoch.
     neighbour : str
         Description of the displacement.
     predictability : Predictability or None
-        What displacement and errors say of the encounter: ``determined``, ``uncertain``, ``one of many`` or
-        ``unknown`` (:mod:`flybystab.orbit.predictability`).
+        How well the encounter is predicted, from displacement and errors: ``determined``, ``uncertain``, ``one of
+        many`` or ``unknown`` (:mod:`flybystab.orbit.predictability`).
     """
 
     planet: Planet
@@ -198,7 +197,7 @@ class Encounter:
 
     @cached_property
     def ground(self) -> Ground:
-        """The ground along the way: top of the atmosphere, or the surface if there is none."""
+        """Position of the planet's ground along the path: top of the atmosphere, or the surface if there is none."""
         tide = self.tide
         end = tide.tau * float(np.sinh(tide.start + tide.width * len(tide.coefficients)))
         stop = self.t_stop if self.impact else end
@@ -216,7 +215,7 @@ class Encounter:
     @cached_property
     def periapsis_axes(self) -> Array:
         """Rotation matrix, `frame` -> periapsis frame: x to the asteroid, z along the angular momentum."""
-        # A track that ends on the planet has no periapsis: that of the two-body orbit it ends on.
+        # A track that ends on the planet has no periapsis: use that of the two-body orbit at its end.
         ended = self.impact and self.t_stop < 0.0
         state = self.track.states(np.array([self.t_stop if ended else 0.0]))[0]
         r, v = state[:3], state[3:]
@@ -266,7 +265,7 @@ class Encounter:
             Hyperbolic excess speed, zero or more. Periapsis and `v_inf` may be arrays, which broadcast: the result is
             then an array of encounters.
         start_distance : Quantity, optional
-            Where the encounter starts; 10 planet radii by default, or 10 periapsis distances if larger.
+            Distance at which the encounter starts; 10 planet radii by default, or 10 periapsis distances if larger.
         settle : Quantity
             Time added after the orbit is back at `start_distance`.
         j2 : bool
@@ -311,25 +310,25 @@ class Encounter:
         j2: bool = False,
         pole: tuple[float, float, float] = (0.0, 0.0, 1.0),
     ) -> Encounter:
-        """Encounter along a trajectory from elsewhere.
+        """Encounter along a given trajectory.
 
         Between the samples the motion is a two-body orbit about the planet plus a cubic spline of the difference from
-        it: exact for two-body motion, else of fourth order in the distance of the samples. The tide is that of the
+        it: exact for two-body motion, otherwise of fourth order in the spacing of the samples. The tide is that of the
         planet alone.
 
         Parameters
         ----------
         times : Time or Quantity, shape (n,)
-            Increasing. With an astropy Time the frame is taken for ICRF (``frame == "ICRF"``); with a duration it is
-            any frame that does not rotate (``frame == "trajectory"``).
+            Increasing. With an astropy Time the frame is assumed to be ICRF (``frame == "ICRF"``); with a duration it
+            is any frame that does not rotate (``frame == "trajectory"``).
         positions, velocities : Quantity, shape (n, 3)
-            Of the asteroid relative to the centre of the planet. They must include a closest approach; of several
-            the nearest counts.
+            Of the asteroid relative to the centre of the planet. They must include a closest approach; with
+            several, the nearest is used.
         planet : str or Planet
             The body encountered.
         start_distance : Quantity, optional
-            Where the encounter starts; as in :meth:`from_orbit`, but never before the first sample. After the last
-            one the two-body orbit goes on.
+            Distance at which the encounter starts; as in :meth:`from_orbit`, but never before the first sample. After
+            the last sample the two-body orbit is continued.
         settle, j2, pole
             As in :meth:`hyperbolic`; `pole` in the frame of the positions.
 
@@ -468,27 +467,27 @@ class Encounter:
         ephemeris: str | Ephemeris | None = None,
         forces: tuple[str, ...] | None = None,
     ) -> Encounter:
-        """Encounter on a real orbit: rebound among the bodies of an ephemeris, with the tide along the way.
+        """Encounter on a real orbit, integrated by rebound with the bodies of an ephemeris.
 
         Parameters
         ----------
         orbit : Orbit
-            Or anything with an attribute ``orbit``.
+            An orbit, or an object with one as its attribute ``orbit``.
         planet : str or Planet
             The body encountered.
         time : Time or str
             Near closest approach (text: TDB); the minimum of distance nearest to it counts.
         error : Quantity
-            Displacement asked for: forces whose estimated share is larger are modelled, the rest is listed.
-            Sources of tide are modelled down to a tenth of the relative error that this means for the tide.
+            Allowed displacement: forces whose estimated displacement is larger are modelled, the others are listed.
+            Sources of tide are modelled down to a tenth of the corresponding relative error of the tide.
         start_distance : Quantity, optional
-            Where the encounter starts; by default 10 planet radii or, if larger, 10 times the distance
+            Distance at which the encounter starts; by default 10 planet radii or, if larger, 10 times the distance,
             but no more than the planet's Hill radius (and at least 1.5 times the closest distance). An orbit
-            that comes from less far (a temporary capture) starts at its apoapsis.
+            that does not reach so far (a temporary capture) starts at its apoapsis.
         settle : Quantity
             Time added after the orbit is back at `start_distance`.
         search : Quantity
-            How far from `time` to look for the closest approach.
+            Largest difference between `time` and the closest approach.
         within : Quantity, optional
             Largest distance that counts as an encounter; by default 20 Hill radii, at most 1 au.
         ephemeris : str or Ephemeris, optional
@@ -501,7 +500,7 @@ class Encounter:
         NoEncounter
             No minimum of distance below `within` near `time`.
         OutOfSpan
-            The ephemeris does not cover the way.
+            The ephemeris does not cover the path.
         UnitMismatch, InvalidInput, UnknownName
         """
         path = getattr(orbit, "orbit", orbit)
@@ -533,7 +532,7 @@ class Encounter:
 def _each(
     cls: type[Encounter], planet: str | Planet, periapsis: Quantity, v_inf: Quantity, *options: Any
 ) -> Any:
-    """Encounters of arrays of periapsis and speed, in an array of the broadcast shape."""
+    """Array of encounters, of the shape to which the arrays of periapsis and speed broadcast."""
     q = to_si(periapsis, u.m, "periapsis", shape=None, low=1.0)
     v = to_si(v_inf, u.m / u.s, "v_inf", shape=None, low=0.0)
     try:

@@ -1,4 +1,4 @@
-"""An encounter on a real orbit: its closest approach, found and followed by rebound, and how well it is known."""
+"""An encounter on a real orbit: closest approach and path by rebound, with their errors."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ from flybystab.typing import Array
 
 #: Crossings of the surface within this time of a closest approach belong to it, s.
 _OWN = 2.0 * HOUR
-#: Tolerance of the orbits beside the nominal one.
+#: Tolerance of the displaced orbits.
 _TOLERANCE = 1e-14
 
 
@@ -67,7 +67,7 @@ def _passage(
 ) -> _Passage | None:
     """The minimum of distance within ``reach`` s of the epoch of the window and nearest to it, or None."""
     start = seconds(orbit.epoch, window.epoch)
-    # Both directions start from the epoch of the orbit, so that a long search does not add the error of a way back.
+    # Both directions start at the epoch of the orbit, which avoids the error of an integration forth and back.
     parts: list[Array] = []
     for direction in (-1.0, 1.0):
         if (direction * reach - start) * direction <= 0.0:
@@ -226,7 +226,7 @@ class _Growth:
 def _horizon(
     orbit: Orbit, beside: Deviations, window: Window, forces: tuple[str, ...], largest: float
 ) -> str:
-    """Addition to "no encounter" where the orbit cannot be integrated that far; empty otherwise."""
+    """Addition to the message "no encounter" where the orbit is not predictable that far; empty otherwise."""
     found = _spread(orbit, beside, window, forces, 0.0)
     gap = max(float(found.displacement[0]), float(found.model_error[0]))
     if predictability(largest, gap) is Predictability.DETERMINED:

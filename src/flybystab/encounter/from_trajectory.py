@@ -29,8 +29,8 @@ from flybystab.units import to_si
 class SampledTrack:
     """Motion through samples: a two-body orbit plus the cubic Hermite spline of the difference from it.
 
-    The orbit is that of the sample nearest to the planet, so that two-body motion is exact however far apart the
-    samples are. After the last sample its two-body orbit goes on.
+    The orbit is that of the sample nearest to the planet, so that two-body motion is exact for any spacing of the
+    samples. After the last sample its two-body orbit is continued.
 
     Attributes
     ----------
@@ -75,7 +75,7 @@ def _two_body_states(gm: float, state: Array, t: Array) -> Array:
 
 
 def samples(times: Any, positions: Quantity, velocities: Quantity) -> tuple[Array, Array, Time | None]:
-    """Checked samples: times (s, from the first), states (n, 6) in SI, and the epoch of the first if it is known."""
+    """Checked samples: times (s, from the first), states (n, 6) in SI, and the epoch of the first, if known."""
     epoch = None
     if isinstance(times, Time):
         if times.ndim != 1 or not len(times):

@@ -1,12 +1,13 @@
 """Palermo and Torino scales of a possible impact.
 
-Palermo (Chesley et al. 2002): ``log10(P / (f dt))``, the impact probability relative to the background of impacts of
-at least the same energy until then, ``f = 0.03 E^-0.8`` per year with E in megatons of TNT.
+Palermo (Chesley et al. 2002): ``log10(P / (f dt))``, the impact probability relative to that of background impacts
+of at least the same energy until then, ``f = 0.03 E^-0.8`` per year with E in megatons of TNT.
 
 Torino (Binzel 2000): integers from 0 to 10 by energy and probability. With ``e = log10(E/Mt)``, ``p = log10(P)``, the
-diagram of that paper has the parallel lines ``(e - c)/3 + (p + 2)/2 = 0``, c = -1, 2 and 5. Below the first, or below
-1 Mt, lies 0. For P below 1 % the lines separate 1, 2 and 6. From 1 % to 99 % 3 lies below 100 Mt, the last line
-separates 4 and 5, and 7 lies above 100,000 Mt. Above 99 % 8, 9 and 10 are separated at 100 and 100,000 Mt.
+diagram of that paper has the parallel lines ``(e - c)/3 + (p + 2)/2 = 0``, c = -1, 2 and 5. The value is 0 below
+the first line and below 1 Mt. For P below 1 % the lines separate 1, 2 and 6. From 1 % to 99 % the value is 3 below
+100 Mt and 7 above 100,000 Mt, and the last line separates 4 and 5. Above 99 % the values 8, 9 and 10 are separated at
+100 and 100,000 Mt.
 """
 
 from __future__ import annotations

@@ -88,7 +88,7 @@ def scripted(
 
 
 def left_out(body: Planet, q: float, j2: bool) -> tuple[tuple[str, float], ...]:
-    """Tides that a two-body encounter neglects, each with its share at periapsis.
+    """Tides that a two-body encounter neglects, each with its relative size at periapsis.
 
     J2: at most 6 J2 (a/q)^2 of the tide (over the pole) and 3 J2 (a/q)^2 of the acceleration. A source GM'
     at distance d: (GM'/GM) (q/d)^3 of both.

@@ -33,7 +33,7 @@ class LinearPlane(Record):
         Probability inside the capture radius of the nominal ``v_inf``.
     nonlinearity : float
         Largest deviation of the middle of a pair of one-sigma points from the nominal, over the longer
-        semi-axis of the ellipse: the map, and the probability, hold while it is far below one.
+        semi-axis of the ellipse: the map and the probability are valid if it is far below one.
     """
 
     centre: Quantity
@@ -56,9 +56,9 @@ def ellipse(covariance: Quantity) -> tuple[Quantity, Quantity, Quantity]:
 
 
 def disc_probability(centre: Array, covariance: Array, radius: float) -> float:
-    """Share of a normal law in the plane inside a disc around the origin.
+    """Probability of a normal distribution in the plane inside a disc around the origin.
 
-    Along the shorter axis of the ellipse the integral is done numerically, along the other in closed form.
+    The integral is numerical along the shorter axis of the ellipse and in closed form along the other.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def disc_probability(centre: Array, covariance: Array, radius: float) -> float:
     def slice_(x: float) -> float:
         half = np.sqrt(max(radius * radius - x * x, 0.0))
         inside = norm.sf((-half - y0) / long) - norm.sf((half - y0) / long)
-        if y0 < 0.0:  # the tail on the side where no digit is lost
+        if y0 < 0.0:  # the tail on the side without cancellation
             inside = norm.cdf((half - y0) / long) - norm.cdf((-half - y0) / long)
         return float(norm.pdf((x - x0) / short) / short * inside)
 

@@ -5,14 +5,14 @@ from __future__ import annotations
 from flybystab.constants import AU, HOUR
 from flybystab.orbit.planets import PLANETS, Planet
 
-#: Time after the end of the encounter that the tide still covers, s: a body that flows can be followed.
+#: Time after the end of the encounter that is covered by the tide, s, so that a flowing body can be followed.
 TAIL = 100.0 * HOUR
-#: Time to settle after an encounter, unless another is asked for, s.
+#: Default time to settle after an encounter, s.
 SETTLE = 4.0 * HOUR
 
 
 def far_enough(body: Planet) -> float:
-    """Distance that still counts as an encounter, m."""
+    """Largest distance of an encounter, m."""
     return min(20.0 * hill_radius(body), AU)
 
 

@@ -1,4 +1,4 @@
-"""The bodies around an asteroid in an encounter: where they are, which of them make tide, and that tide."""
+"""The bodies around an asteroid in an encounter: their positions, the relevant sources of the tide, and the tide."""
 
 from __future__ import annotations
 
@@ -38,7 +38,8 @@ def _places(track: PanelTrack, window: Window, index: int, zero: float, t: Array
     centre = window.states(index, time)[:, :3]
     out = np.empty((t.size, len(BODIES), 3))
     for b in range(len(BODIES)):
-        # The encountered planet itself without the detour through the barycentre: no digit is lost.
+        # The encountered planet relative to the asteroid directly, which avoids the rounding of barycentric
+        # coordinates.
         out[:, b] = -near if b == index else (window.states(b, time)[:, :3] - centre) - near
     return out
 
@@ -76,7 +77,7 @@ def chosen_sources(
     stop: float,
     threshold: float,
 ) -> tuple[tuple[Array, bool], list[str], list[tuple[str, float]]]:
-    """Which bodies make tide above `threshold` of the peak: switches, names; those left out with shares."""
+    """Sources of the tide above `threshold` of the peak: switches and names; the others with their relative size."""
     t = np.unique(np.concatenate([np.linspace(t_in - zero, stop - zero, 33), [min(0.0, stop - zero)]]))
     places = _places(track, window, index, zero, t)
     size = 2.0 * window.gm / np.sum(places**2, axis=2) ** 1.5

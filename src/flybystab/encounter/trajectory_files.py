@@ -1,7 +1,7 @@
 """Encounters along trajectories in files: SPK kernels of small bodies, and orbit ephemeris messages (CCSDS OEM).
 
 A trajectory relative to the Sun or to the barycentre of the solar system is combined with the planet of an ephemeris of
-this package: small-body kernels of Horizons hold the body alone.
+this package: small-body kernels of Horizons contain only the body.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ from flybystab.orbit.orbit import _ephemeris
 from flybystab.orbit.planets import Planet
 from flybystab.typing import Array
 
-#: Identifiers of NAIF of the centres that are understood, and their names here.
+#: NAIF identifiers of the supported centres, and their names in this package.
 _CENTRES = {0: "ssb", 10: "sun", 199: "mercury", 299: "venus", 399: "earth", 301: "moon"}
 #: Error of the spline between samples, m, and the largest number of samples.
 _SPLINE_ERROR, _LARGEST = 1.0, 20001
@@ -111,7 +111,8 @@ def spk_samples(
 ) -> Samples:
     """Samples of a kernel around its closest approach to a planet nearest to `time`.
 
-    They are so dense that the interpolation is good to 1 m. Parameters as checked by :meth:`Encounter.from_spk`, SI.
+    Their spacing keeps the error of the interpolation below 1 m. Parameters as checked by :meth:`Encounter.from_spk`,
+    SI.
 
     Raises
     ------
@@ -236,7 +237,7 @@ def oem_samples(path: str | Path, planet: Planet, ephemeris: str | Ephemeris | N
     """Samples of an orbit ephemeris message relative to a planet.
 
     Keywords: CCSDS 502.0-B-3, section 5 (key-value notation). Accelerations and covariances of the message
-    are not used. Of several segments all samples of the same centre, frame and time system count.
+    are not used. Of several segments all samples with the same centre, frame and time system are used.
 
     Raises
     ------
@@ -311,7 +312,7 @@ def _oem_rows(text: str, path: str | Path) -> tuple[dict[str, str], list[tuple[s
 
 
 def _halving_error(planet: Planet, t: Array, states: Array) -> float:
-    """Error of the closest distance, m: the change that leaving out every second sample makes; nan if it cannot be."""
+    """Error of the closest distance, m: its change without every second sample; nan if it cannot be computed."""
     try:
         (full, _), (half, _) = _track(planet, t, states), _track(planet, t[::2], states[::2])
     except (NoEncounter, ValueError):

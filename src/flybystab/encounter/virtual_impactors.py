@@ -4,8 +4,8 @@ Orbits at equal distances along the direction of largest uncertainty (Milani et 
 Encounters of consecutive orbits at nearly the same time belong together, and each minimum of the distance along the
 line is refined. Around it the target-plane coordinates b are linear in the standard normal variables z of the
 covariance, ``b = b0 + M (z - z0)``, so that b is normal with mean ``b0 - M z0`` and covariance ``M M^T``. The impact
-probability is that of the disc from which the planet is hit. Probabilities far below one over the number of orbits are
-within reach.
+probability is that of the disc from which the planet is hit. Probabilities far below one over the number of orbits can
+be found.
 """
 
 from __future__ import annotations
@@ -181,7 +181,7 @@ def virtual_impactors(
 def _minima(table: QTable, count: int) -> list[tuple[int, Time]]:
     """Orbits (number, time) at a local minimum of distance among the encounters that belong together.
 
-    Minima from which the distance rises so slowly that zero is out of reach between two orbits are left out.
+    Minima from which the distance rises so slowly that it cannot reach zero between two orbits are left out.
     """
     if not len(table):
         return []

@@ -45,7 +45,7 @@ def verdict_rows(
         full(rows, bodies, encounters, limits, required, output)
 
 
-#: Step tolerance by default: 1e-8 in the shape of the reference cases (``flybystab bench flyby``).
+#: Default step tolerance: an error of 1e-8 in the shape of the reference cases (``flybystab bench flyby``).
 TOLERANCE = 1e-8
 
 #: Largest tolerance, and the factor between the tolerances of the two runs whose difference measures the error.
@@ -114,7 +114,8 @@ def flyby_run(
 ) -> FlybyRun:
     """Follow a body through an encounter and classify the outcome.
 
-    `rotation` takes body axes to the frame of the encounter; `inputs` is `one_row` of the three, if it is at hand.
+    `rotation` takes body axes to the frame of the encounter; `inputs` is `one_row` of the three, if it has been
+    computed already.
     """
     output = output_buffers(1, keep)
     if inputs is None:
@@ -233,7 +234,7 @@ def _joined(series: Sequence[Array]) -> tuple[NDArray[np.int64], Array]:
 
 
 def ground_near(encounter: Encounter, longest: float) -> Ground:
-    """The ground along an encounter that bodies of a long semi-axis (m) may touch; none where it is far below."""
+    """The ground along an encounter, for bodies with a long semi-axis (m); none where they stay well above it."""
     return encounter.ground if encounter.height <= NEAR_GROUND * longest else no_ground()
 
 

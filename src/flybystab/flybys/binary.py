@@ -49,7 +49,7 @@ class BinarySample(Tabular):
     plane_change : Quantity (n,)
         Angle between the orbital angular momenta before and after.
     closest : Quantity (n,)
-        Least distance of the two during the encounter.
+        Smallest separation during the encounter.
     fate : ndarray of str (n,)
         ``bound``, ``escape`` or ``collision``.
     spin_ratio : ndarray (n,)
@@ -61,7 +61,7 @@ class BinarySample(Tabular):
     obliquity : Quantity (n,)
         Angle between the angular momenta of the companion and of the mutual orbit afterwards; nan as `spin_ratio`.
     tide_at_start : float
-        Tide at the start of the encounter over ``G (m1 + m2)/a^3``: what is left out of the time before.
+        Tide at the start of the encounter over ``G (m1 + m2)/a^3``: the size of the neglected tide before the start.
     seed : int
     """
 
@@ -110,7 +110,7 @@ def binary_flyby(
         Its mass, and its mean radius for contact.
     encounter : Encounter
         One whose path clears the planet. For wide binaries choose a large ``start_distance``:
-        :attr:`BinarySample.tide_at_start` says what the time before would add.
+        :attr:`BinarySample.tide_at_start` is the size of the tide neglected before the start.
     semi_major_axis, eccentricity
         Of the mutual orbit before the encounter.
     mass_ratio : float
@@ -269,9 +269,9 @@ def _states(e: float, mean_anomaly: Array, frames: Array) -> Array:
 def _carried(
     state: Array, encounter: Encounter, unit: float, contact: float, figures: Figures | None = None
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Integrate all members together; returns states at the end, least distances, and which of them touched.
+    """Integrate all members together; returns final states, smallest separations, and which of them touched.
 
-    A member that touches stays where it is: the others go on from there.
+    A member that touches keeps its state from then on, while the others are integrated further.
     """
     n, width = state.shape
     moving = np.ones(n, dtype=bool)

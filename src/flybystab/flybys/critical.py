@@ -1,4 +1,4 @@
-"""Critical values: least friction angle, cohesion, density or periapsis for an outcome that is not worse than asked."""
+"""Critical values: least friction angle, cohesion, density or periapsis at which an outcome is still acceptable."""
 
 from __future__ import annotations
 
@@ -53,7 +53,8 @@ def _periapsis(body: Body, encounter: Encounter, radii: float) -> tuple[Body, En
     )
 
 
-#: Parameters by name: unit, range of the search, scale, and how a value is applied. A new one is one new entry.
+#: Parameters by name: unit, range of the search, scale, and how a value is applied. A further parameter is one more
+#: entry.
 PARAMETERS = {
     "friction_angle": Parameter(u.deg, 0.1, 89.0, False, _material("friction_angle", u.deg)),
     "cohesion": Parameter(u.Pa, 1e-3, 1e6, True, _material("cohesion", u.Pa)),
@@ -75,8 +76,8 @@ class CriticalValues(Tabular):
     Attributes
     ----------
     phase : Quantity (n,)
-        Angle of the long axis from the direction to the planet at closest approach, about the spin axis, of a body that
-        turned freely.
+        Angle of the long axis from the direction to the planet at closest approach, about the spin axis, for a freely
+        rotating body.
     value : Quantity (n,)
         Least value for which the outcome is no worse than `outcome`; infinite if no value of the range is
         enough, and the lower end of the range where every value is. A periapsis is in radii of the planet.
@@ -99,12 +100,12 @@ class CriticalValues(Tabular):
 
     @property
     def least(self) -> Quantity:
-        """The value that is enough at the most favourable phase."""
+        """Critical value at the most favourable phase."""
         return self.value.min()
 
     @property
     def largest(self) -> Quantity:
-        """The value that is enough at every phase."""
+        """Critical value at the least favourable phase: it is sufficient at every phase."""
         return self.value.max()
 
     def __repr__(self) -> str:
@@ -126,7 +127,7 @@ def critical(
     workers: int | None = None,
     progress: Progressing = None,
 ) -> CriticalValues:
-    """Least value of a quantity for which an encounter does no worse than an outcome, over the phases of the spin.
+    """Least value of a quantity for which the outcome of an encounter is no worse than a given one, over spin phases.
 
     Parameters
     ----------
@@ -185,7 +186,7 @@ def critical(
     grid = space(ends[0], ends[1], SCAN)
 
     def fails(values: Array, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Whether the outcome is worse than accepted, for one value for each of the given phases."""
+        """Whether the outcome is worse than accepted, for one value per phase."""
         scenes = [parameter.apply(body, encounter, float(x)) for x in values]
         turns = [
             attitude_at_start(b, e, np.asarray(base) @ about_z(float(a)))

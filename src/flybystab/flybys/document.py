@@ -1,7 +1,7 @@
 """Results as JSON documents: units in the keys, numbers or null.
 
-A value that is infinite or undefined is null, and a key with the suffix ``_reason`` beside it says why; no text stands
-in place of a number. Each kind of document has a JSON schema, named under ``schema``.
+A value that is infinite or undefined is null, with its reason in a further key with the suffix ``_reason``; a number is
+never replaced by text. Each kind of document has a JSON schema, named under ``schema``.
 """
 
 from __future__ import annotations
@@ -143,7 +143,7 @@ def flyby_document(result: FlybyResult, sample: SpinSample | None = None, **abou
 
 
 def margins_document(margins: VerdictMargins) -> dict[str, Any]:
-    """Distances of a verdict from its edges, and what is known of a body that has left the model."""
+    """Margins of a verdict, and the known properties of a body that has left the range of the model."""
     edge, distance = margins.nearest
     return {
         "axis_ratio": margins.axis_ratio,

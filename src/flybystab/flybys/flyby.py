@@ -54,7 +54,7 @@ def flyby(
     Parameters
     ----------
     body : Body or Pile
-        A pile of grains is run as such, whatever its ellipsoid says.
+        A pile of grains is always simulated as grains.
     encounter : Encounter
         From :meth:`Encounter.hyperbolic` or :meth:`Encounter.from_orbit`.
     attitude : array_like (3, 3) or scipy Rotation, optional
@@ -67,19 +67,19 @@ def flyby(
     history : bool
         Keep the history.
     surfaces : str or sequence of str
-        Other yield surfaces to run; the verdict is robust if they all agree. Without any the result has the verdicts
-        on all four for a body that stays rigid, which cost next to nothing.
+        Further yield surfaces; the verdict is robust if they all agree. By default the result has the verdicts on all
+        four for a body that stays rigid, at negligible cost.
     max_axis_ratio : float
         Axis ratio beyond which the homogeneous model is left.
     robustness : bool or int
-        Number of spin phases (True: 8) at which the encounter is repeated; also with 3 deg more and less of friction
-        and on all yield surfaces: ``result.robustness``.
+        Number of spin phases (True: 8) at which the encounter is repeated; it is also repeated with a friction angle 3
+        deg larger and smaller and on all yield surfaces: ``result.robustness``.
     grains : int or "always", optional
-        Number of grains of the piles that answer where the ellipsoid ends (beyond `max_axis_ratio`, with loss of
-        mass, out of contact); ``"always"`` runs 500 grains whatever the ellipsoid says.
+        Number of grains of the piles that are simulated where the ellipsoid is not applicable (beyond `max_axis_ratio`,
+        with loss of mass, out of contact); ``"always"`` runs 500 grains in any case.
     seeds : int or sequence of int
-        How many piles, or which; their outcomes are the distribution ``result.grains``. 8 for a body; of a pile that
-        one alone, or as many from its seed on.
+        Number of piles, or their seeds; their outcomes are the distribution ``result.grains``. 8 by default for a body.
+        For a pile, its own seed by default, or that many seeds starting with its own.
     model : str, optional
         ``"grains"`` forces grains, ``"ellipsoid"`` excludes them.
     attitude_at : str
@@ -101,7 +101,7 @@ def flyby(
     NotModelled
         For a body with a tension cut-off that yields.
     NotConverged
-        If the integrator cannot go on; the message says where.
+        If the integration fails; the message gives the time.
     """
     pile = body if isinstance(body, Pile) else None
     body = body.body if isinstance(body, Pile) else body

@@ -51,7 +51,7 @@ def flyby_many(
 
     Parameters
     ----------
-    bodies, encounters : sequences of equal length n, or one of which the other has n
+    bodies, encounters : sequences of equal length n; either may be a single one
         An array of encounters (:meth:`Encounter.hyperbolic` of arrays) is taken row by row.
     attitudes : sequence of n rotations, or one, optional
         As in :func:`flyby`; identity by default.
@@ -69,8 +69,8 @@ def flyby_many(
     Raises
     ------
     InvalidInput
-        If the lengths differ, for anything but bodies and encounters, a tolerance outside [1e-13, 1e-3], or
-        `workers` that is not a positive whole number. An invalid attitude or an unsettled body only fails its own row.
+        If the lengths differ, an argument is not a body or an encounter, the tolerance is outside [1e-13, 1e-3], or
+        `workers` is not a positive whole number. An invalid attitude or an unsettled body only fails its own row.
     """
     bodies, encounters, attitudes = _broadcast(bodies, encounters, attitudes)
     n = len(bodies)
@@ -136,7 +136,7 @@ def _outcomes(
     threads: int,
     progress: Progressing,
 ) -> NDArray[Any]:
-    """Outcomes (OUTCOME) of the bodies in `rows`, as not computed for the others."""
+    """Outcomes (OUTCOME) of the bodies in `rows`; the others are marked as not computed."""
     out = np.empty(len(bodies), OUTCOME)
     _fail(out)
     limits = Limits(tolerance, max_axis_ratio, MAX_STEPS)

@@ -6,7 +6,7 @@ from typing import Any
 
 import astropy.units as u
 
-from flybystab.flybys.grains_flyby import GrainsOutcome
+from flybystab.flybys.grains_outcome import GrainsOutcome
 
 
 def grains_document(outcome: GrainsOutcome | None) -> dict[str, Any] | None:

@@ -40,7 +40,7 @@ class History(Tabular):
     spin : Quantity (n, 3)
         Angular velocity in the frame of the encounter.
     required_friction_angle : Quantity (n,)
-        Friction angle that the stress mobilises, with the body's cohesion; inf where none would do.
+        Friction angle that the stress mobilises, with the body's cohesion; inf where no angle suffices.
     pressure : Quantity (n,)
         Volume-averaged pressure, compression positive.
     shape, velocity_gradient : Quantity (n, 3, 3)
@@ -81,7 +81,7 @@ class FlybyError(Record):
     Attributes
     ----------
     semi_axes, spin, bound_fraction : float
-        Largest relative difference of the semi-axes and of the spin vector; absolute one of the bound fraction.
+        Largest relative difference of the semi-axes and of the spin vector; absolute difference of the bound fraction.
     required_friction_angle, event_times : Quantity
         Absolute differences; nan if the two runs have different events.
     verdict_agrees : bool

@@ -32,7 +32,7 @@ class FlybyInputs(NamedTuple):
         required : bool
             Whether to follow a body that yields once more as a rigid one, for the friction angle that it requires.
         row : RowInputs, optional
-            ``one_row(body, encounter, rotation)``, if it is at hand.
+            ``one_row(body, encounter, rotation)``, if it has been computed already.
 
         Raises
         ------

@@ -2,8 +2,8 @@
 
 An estimate from the rigid course: where the stress that rigidity needs passes the yield surface, the body
 deforms along one direction of strain (:mod:`flybystab.core.energy.newmark`), and tide and torque do work on it. A
-body whose barrier is above that work comes to rest inside the model; ``python benchmarks/margin.py`` counts how often
-this is wrong, and on which side.
+body whose barrier is above that work comes to rest inside the model; ``python benchmarks/margin.py`` counts how
+often this prediction is wrong, and in which direction.
 """
 
 from __future__ import annotations
@@ -40,30 +40,30 @@ class FlybyMargin(Record):
     Attributes
     ----------
     expected : str
-        "holds": it never yields; "recovers": it yields, and comes to rest inside the model and whole; "runs away": it
-        passes the barrier, to an axis ratio beyond 6:1 or to the loss of mass.
+        "holds": the body never yields; "recovers": it yields, and comes to rest inside the model without loss of mass;
+        "runs away": it passes the barrier, to an axis ratio beyond 6:1 or to the loss of mass.
     margin : float
-        ``1 - energy/barrier``: 1 where nothing is given, 0 at the barrier, negative beyond; minus infinity for a body
-        that cannot stand its spin after the encounter.
+        ``1 - energy/barrier``: 1 without an energy input, 0 at the barrier, negative beyond; minus infinity for a body
+        that is not in equilibrium at its spin after the encounter.
     energy : Quantity
         Work of the tide and the changed spin on the deformation, J; zero for a body that does not yield.
     kinetic_energy : Quantity
         Largest kinetic energy of deformation, J.
     strain : float
-        Strain of the slide (``|D'|`` over time); it ends at 3.
+        Accumulated strain of the deformation (integral of ``|D'|``); it ends at 3.
     duration : Quantity
-        How long the body slides, s.
+        Duration of the deformation, s.
     direction : ndarray (3, 3)
         Rate of strain in body axes, ``|D'| = 1``, at the largest overload; nan for a body that does not yield.
     barrier : Quantity
-        The lesser of the two below, J.
+        The smaller of `barrier_before` and `barrier_after`, J.
     barrier_before, barrier_after : Quantity
         Barrier of the energy criterion (:func:`flybystab.body.stability.stability`), J, at the spin before the
-        encounter and at the one that a rigid body has after it. Zero for a body that does not stand.
+        encounter and at that of a rigid body after it. Zero for a body that is not in equilibrium.
     momentum, momentum_change : Quantity (3,)
         Angular momentum before, and what the encounter adds to it, kg m2/s, frame of the encounter.
     stands_after : bool
-        Whether the body in its old shape would stand its new spin.
+        Whether the body in its initial shape is in equilibrium at its spin after the encounter.
     required_friction_angle : Quantity
         Largest mobilised friction angle on the rigid course, deg.
     course : Course

@@ -37,7 +37,7 @@ class OutcomeMap(Tabular):
     verdict : ndarray of str (n, m, k)
         For each of the k phases.
     axis_growth : ndarray (n, m, k)
-        Long axis afterwards over before.
+        Long axis after the encounter over that before it.
     """
 
     body: Body
@@ -176,7 +176,7 @@ class TargetMap(Tabular):
 
     @property
     def capture_radius(self) -> Quantity:
-        """Impact parameter of a path that grazes the atmosphere (surface, without one)."""
+        """Impact parameter of a path that grazes the atmosphere, or the surface of a planet without one."""
         v = self.v_inf.to_value(u.m / u.s)
         return (capture_radius(self.planet.gm, self.planet.impact_distance, v) * u.m).to(u.km)
 

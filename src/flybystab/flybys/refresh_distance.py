@@ -1,4 +1,4 @@
-"""Distance from a planet within which an encounter refreshes a stated share of the surface of a shape."""
+"""Distance from a planet within which an encounter refreshes a given fraction of the surface of a shape."""
 
 from __future__ import annotations
 
@@ -36,12 +36,12 @@ class RefreshDistance(Record):
     ----------
     planet : Planet
     distance : Quantity
-        Largest periapsis distance with at least the share asked for, km; nan where no encounter outside the planet has
-        it.
+        Largest periapsis distance at which at least that fraction is refreshed, km; nan where no encounter outside the
+        planet refreshes so much.
     area : float
-        Share of the area asked for, as the mean over the attitudes.
+        Given fraction of the area, as the mean over the attitudes.
     low, high : Quantity
-        Distances for the attitude that refreshes least and for that which refreshes most, km.
+        Distances for the attitudes that refresh the smallest and the largest area, km.
     attitudes : int
     """
 
@@ -103,8 +103,8 @@ def refresh_distance(
 
     Notes
     -----
-    The body is followed as a rigid one at every distance. Where it yields as a whole its surface is refreshed anyway.
-    What rise of the slope sets regolith in motion is not known: the distance is a function of that choice.
+    The body is treated as rigid at every distance. Where it yields as a whole, its surface is refreshed in any case.
+    The rise of the slope that sets regolith in motion is not known: the distance depends on that choice.
     """
     check_settled(body)
     check_shape(shape, body)
@@ -128,7 +128,7 @@ def refresh_distance(
     found: dict[float, Array] = {}
 
     def root(statistic: str) -> float:
-        """Largest distance, in radii, at which a statistic of the shares reaches the share asked for."""
+        """Largest distance, in radii, at which a statistic of the fractions reaches the given fraction."""
         low, high = LEAST * home.impact_distance / home.radius, MOST
         for step in range(BISECTIONS + 1):
             radii = low if step == 0 else float(np.sqrt(low * high))

@@ -15,9 +15,9 @@ from flybystab.typing import Array
 def final_attitude(shape: Array, spin: Array, along: float) -> Array:
     """Right-handed principal axes of a shape tensor as columns, longest first.
 
-    An ellipsoid is the same body after half a turn about any of its axes, which leaves four such frames. Of these
-    the one is taken in which the spin along ``a3`` has the sign of `along` (positive for zero) and ``a1`` does not
-    point to negative x.
+    Half a turn about any of its axes maps an ellipsoid onto itself, so that four such frames exist. The frame returned
+    is the one in which the spin along ``a3`` has the sign of `along` (positive for zero) and ``a1`` has no negative x
+    component.
 
     Parameters
     ----------

@@ -32,9 +32,9 @@ from flybystab.units import brief
 if TYPE_CHECKING:
     from astropy.table import QTable
 
-    from flybystab.flybys.grains_flyby import GrainsOutcome
+    from flybystab.flybys.grains_outcome import GrainsOutcome
 
-#: Columns of a result as a table of one row; those that are None are left out.
+#: Columns of a result as a table of one row; columns whose value is None are left out.
 _COLUMNS = (
     "verdict",
     "verdict_class",
@@ -56,7 +56,7 @@ _COLUMNS = (
     "contact",
     "robust",
 )
-#: Kept, because composing the unit takes ten times as long.
+#: Stored here, because composing the unit takes ten times as long.
 RAD_S = u.rad / u.s
 
 
@@ -76,9 +76,9 @@ class FlybyResult(Record):
     inputs : FlybyInputs
         Body, encounter and settings of the run.
     rung : str
-        Model that gave the verdict: "rigid body", "ellipsoid" or "grains". Of grains, `semi_axes`, spin, `body`,
-        `attitude` and `bound_fraction` are those of the pile with the median bound mass fraction; onset, margins and
-        history stay those of the ellipsoid.
+        Model that gave the verdict: "rigid body", "ellipsoid" or "grains". With grains, `semi_axes`, spin, `body`,
+        `attitude` and `bound_fraction` are those of the pile with the median bound mass fraction, while onset, margins
+        and history are those of the ellipsoid.
     grains : GrainsOutcome or None
         Distribution over piles of grains.
     """
@@ -150,22 +150,21 @@ class FlybyResult(Record):
         """Rotation matrix at the end, body axes of `body` -> frame of the encounter (ICRF for a real one), (3, 3).
 
         Right-handed principal axes, longest first. The spin has the same sign along ``a3`` as at the start (positive
-        if it had none there), so that a prograde body stays one. The next encounter takes ``result.body`` with
+        if it had none there), so that a prograde body remains prograde. The next encounter takes ``result.body`` with
         ``periapsis_axes(next) @ result.attitude`` if both are in ICRF, after the free rotation in between.
         """
         return final_attitude(self._run.shape, self._run.spin, float(self.inputs.body.omega[2]))
 
     @cached_property
     def body(self) -> Body:
-        """The body afterwards, along its own axes. Its ``state`` says whether it is one whole body at rest."""
+        """The body after the encounter, along its own axes; ``state`` tells whether it is one whole body at rest."""
         return body_after(self.inputs.body, self._run, self.attitude, self._onset is not None)
 
     @cached_property
     def energy(self) -> Quantity:
         """Kinetic energy in the frame of the centre of mass and energy of self-gravity at the end, J.
 
-        A body without dissipation whose energy is negative cannot grow without limit; one whose energy is positive
-        does.
+        Without dissipation, a body of negative energy cannot expand without limit; one of positive energy does.
         """
         run, mass = self._run, float(self.inputs.body.mass.to_value(u.kg))
         flow = run.velocity_gradient @ run.shape @ run.velocity_gradient.T
@@ -177,7 +176,7 @@ class FlybyResult(Record):
         """Whether the body is at rest, disperses for good or has left the model when the run ends.
 
         Otherwise it still flows or is out of contact, with too little energy to disperse: a body without friction
-        pulsates for ever. Its verdict and bound mass fraction are those of one instant of that motion.
+        oscillates without end. Its verdict and bound mass fraction are then those of one instant of that motion.
         """
         return settled(self._run.verdict, self._run.regime, self.energy.value)
 
@@ -194,7 +193,7 @@ class FlybyResult(Record):
 
     @cached_property
     def end_time(self) -> Quantity:
-        """End of the run since the start of the encounter, s; of an IMPACT the first contact."""
+        """End of the run since the start of the encounter, s; for an IMPACT the first contact."""
         return self._since_start(self._run.time)
 
     @cached_property
@@ -204,7 +203,7 @@ class FlybyResult(Record):
 
     @cached_property
     def max_required_friction_time(self) -> Quantity:
-        """When it does, since the start of the encounter, s."""
+        """Time of the largest mobilised friction angle since the start of the encounter, s."""
         return self._since_start(self._run.friction_time)
 
     @cached_property
@@ -234,7 +233,7 @@ class FlybyResult(Record):
 
     @cached_property
     def events(self) -> tuple[tuple[str, Quantity], ...]:
-        """Every change of regime: its name and the time since the start of the encounter, s."""
+        """Name and time (s, since the start of the encounter) of every change of regime."""
         return tuple((name, self._since_start(t)) for name, t, _ in self._run.events)
 
     @cached_property
@@ -246,7 +245,7 @@ class FlybyResult(Record):
 
     @cached_property
     def verdict_by_surface(self) -> dict[str, Verdict]:
-        """Verdict on each yield surface: of a rigid body all four, of one that yields its own and those asked for."""
+        """Verdict by yield surface: all four for a body that stays rigid, otherwise its own and those requested."""
         return self._by_surface or surface_verdicts(self.inputs, self._run)
 
     @property
@@ -257,12 +256,12 @@ class FlybyResult(Record):
 
     @cached_property
     def robustness(self) -> Robustness | None:
-        """Verdicts over the spin phase and the friction angle; None unless asked for."""
+        """Verdicts over the spin phase and the friction angle; None without ``robustness=``."""
         return None
 
     @cached_property
     def margins(self) -> VerdictMargins:
-        """Distances of the verdict from its edges: friction, axis ratio, bound mass fraction; and the strain."""
+        """Margins of the verdict in friction, axis ratio and bound mass fraction, and the strain."""
         return verdict_margins(self.inputs, self._run)
 
     @cached_property
@@ -282,7 +281,7 @@ class FlybyResult(Record):
 
     @property
     def left_out(self) -> tuple[tuple[str, float], ...]:
-        """Effects that are neglected, each with its estimated share."""
+        """Neglected effects, each with its estimated relative size."""
         return self.inputs.encounter.left_out
 
     @property
@@ -292,12 +291,12 @@ class FlybyResult(Record):
 
     @property
     def largest_fraction(self) -> float:
-        """Mass of the largest remnant over that of the body: of grains the median of the largest clump, else bound."""
+        """Mass of the largest remnant over that of the body: the median largest clump of grains, or the bound mass."""
         return self.bound_fraction if self.grains is None else self.grains.largest_fraction
 
     @property
     def contact(self) -> str | None:
-        """Part that reaches the ground on an IMPACT: the path or the body; None otherwise.
+        """Whether the path or only the extent of the body reaches the ground on an IMPACT; None otherwise.
 
         ``"path"``: the closest approach lies below the top of the atmosphere (the surface, if there is none);
         ``"body"``: the centre would pass above it, but the body is large enough there, towards the planet, to touch it.

@@ -1,6 +1,6 @@
-"""The rigid course of a body through an encounter: its attitude, spin and tide at every instant.
+"""Motion of a rigid body through an encounter: its attitude, spin and tide at every instant.
 
-Surface slopes and the stability margin of a flyby follow from it.
+Surface slopes and the stability margin of a flyby are computed from it.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ ROWS = 20_000
 
 @dataclass(frozen=True, eq=False)
 class Course:
-    """A body that stays rigid whatever the stress; every array has the same first dimension.
+    """Motion of a body that stays rigid at any stress; every array has the same first dimension.
 
     Attributes
     ----------
@@ -50,7 +50,7 @@ class Course:
     tide : Quantity (n, 6)
         Tidal tensor along the body axes, ``xx, yy, zz, xy, xz, yz``.
     max_required_friction_angle : Quantity
-        Largest friction angle that the body mobilises, deg; inf if none would do.
+        Largest friction angle that the body mobilises, deg; inf if no angle suffices.
     """
 
     body: Body

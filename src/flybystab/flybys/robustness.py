@@ -20,7 +20,7 @@ from flybystab.tabular import Record
 from flybystab.typing import Array
 from flybystab.units import whole
 
-#: Spin phases unless a number is given.
+#: Default number of spin phases.
 PHASES = 8
 #: Change of the friction angle, rad.
 FRICTION = np.deg2rad(3.0)

@@ -1,9 +1,9 @@
 """Rotation of a rigid polyhedron through an encounter: true inertia, quadrupole and octupole of the tide.
 
 Euler's equations are integrated with the torque of the second moments of the shape in the tidal tensor of the
-encounter and, where its share is above the error asked for, that of the third moments in the gradient of the planet's
-tide (:mod:`flybystab.core.polyhedron.moments`). An ellipsoid has no third moments: the share is the error that the
-equivalent ellipsoid makes. It is of the order of the radius over the distance.
+encounter and, where its relative size exceeds the allowed error, that of the third moments in the gradient of the
+planet's tide (:mod:`flybystab.core.polyhedron.moments`). An ellipsoid has no third moments: that relative size is the
+error of the equivalent ellipsoid. It is of the order of the radius over the distance.
 """
 
 from __future__ import annotations
@@ -120,7 +120,7 @@ def shape_spin(
         The true shape, of which `body` is the equivalent ellipsoid.
     error : float
         Relative error allowed for the torque, 1e-10 to 1e-2: the octupole is included where its share is larger, and
-        the integration is a hundred times tighter.
+        the tolerance of the integration is a hundred times smaller.
 
     Returns
     -------

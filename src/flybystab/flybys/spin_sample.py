@@ -53,7 +53,7 @@ class SpinSample(Tabular):
     attitude : ndarray (n, 3, 3)
         Rotations at the start, body axes -> periapsis frame (:func:`flybystab.periapsis_axes`).
     pole_known : bool
-        Whether the pole was the catalogue's; else poles are isotropic.
+        Whether the catalogued pole was used; otherwise poles are isotropic.
     seed : int
     """
 
@@ -88,9 +88,9 @@ def spin_sample(
 ) -> SpinSample:
     """The same encounter at `n` attitudes.
 
-    The pole is the catalogue's where known and the encounter is real (frame ICRF), isotropic otherwise.
-    The turn about the pole and, for a tumbler, the phase of its rotation are uniform: the share of time a
-    free body spends there. They cannot be predicted decades ahead, so that the sample is the prediction.
+    The pole is the catalogued one where it is known and the encounter is real (frame ICRF), isotropic otherwise.
+    The rotation angle about the pole and, for a tumbler, the phase of its rotation are uniform in time. They cannot be
+    predicted decades ahead, so that the distribution over the sample is the prediction.
 
     Parameters
     ----------
@@ -99,7 +99,7 @@ def spin_sample(
     n, seed : int
         Size of the sample and seed of its random numbers.
     material : Material, optional
-        Instead of the asteroid's own.
+        Replaces that of the asteroid.
     tolerance : float
         As in :func:`flybystab.flybys.flyby.flyby`.
     workers : int, optional
@@ -182,7 +182,7 @@ def spin_states(
     asteroid, n, seed, material
         As in :func:`spin_sample`.
     use_pole : bool
-        Whether the catalogue's pole counts.
+        Whether to use the catalogued pole.
     """
     n, seed = whole(n, "n", 1), whole(seed, "seed", 0)
     if not isinstance(asteroid, Body) and not hasattr(asteroid, "body_with"):

@@ -22,7 +22,7 @@ from flybystab.tabular import Record
 from flybystab.typing import Array
 from flybystab.units import whole
 
-#: Instants by default: the greatest slopes are then missed by 0.002 deg at the distance of Apophis, and by
+#: Default number of instants: the error of the greatest slopes is then 0.002 deg at the distance of Apophis, and
 #: 0.03 deg at 2.5 Earth radii.
 INSTANTS = 200
 

@@ -31,7 +31,7 @@ SURVIVES = (Verdict.INTACT, Verdict.RESHAPED)
 
 @dataclass(frozen=True, eq=False)
 class Survival(Tabular):
-    """Verdicts over the clones of an orbit, each with an attitude of its own.
+    """Verdicts over the clones of an orbit, each with its own attitude.
 
     Attributes
     ----------
@@ -43,9 +43,9 @@ class Survival(Tabular):
         Friction angle of the material less the one mobilised, a lower limit to it where `bounded`; nan for clones that
         do not come near and for impacts.
     failure : ndarray of str, shape (n,)
-        Why a body could not be followed; its verdict is ``FAILED``.
+        Reason why a clone could not be computed; its verdict is ``FAILED``.
     bounded : ndarray of bool, shape (n,)
-        Clones whose tide is too small, whatever the attitude, to make the body yield: ``INTACT`` without the dynamics.
+        Clones whose tide is too small to make the body yield at any attitude: ``INTACT`` without an integration.
     """
 
     verdict: NDArray[np.str_]
@@ -61,7 +61,7 @@ class Survival(Tabular):
         """Fraction of these verdicts (by default INTACT and RESHAPED) and its Clopper-Pearson interval.
 
         Clones and attitudes are drawn together, so that the samples are independent and the interval is that
-        of a binomial law. Samples that failed count against it at the lower end and for it at the upper.
+        of a binomial distribution. Failed samples count as losses for the lower end and as survivals for the upper end.
         """
         from scipy.stats import binomtest
 
@@ -99,13 +99,13 @@ def survival(
     """Probabilities of the verdicts on a body whose orbit is uncertain.
 
     Each clone meets the planet on its own two-body path through closest approach (which has the tide of the
-    real one to about 1e-4 of its peak near the planet), with the body at an attitude of its own. Where a bound on the
-    stress (:mod:`flybystab.core.ellipsoid.yield_bound`) proves that the body cannot yield there, that decides.
+    real one to about 1e-4 of its peak near the planet), with its own attitude of the body. Where a bound on the
+    stress (:mod:`flybystab.core.ellipsoid.yield_bound`) proves that the body cannot yield, nothing is integrated.
 
     Parameters
     ----------
     body : Body or Asteroid
-        An asteroid's pole counts where it is known.
+        The pole of an asteroid is used where it is known.
     distribution : EncounterDistribution
         From :func:`flybystab.encounter_distribution`.
     seed : int
@@ -117,7 +117,7 @@ def survival(
     tolerance, workers, progress
         As in :func:`flybystab.flyby_many`.
     quick : bool
-        Whether the bound may decide. The verdicts are the same without it, and every margin is exact.
+        Whether to use the bound. Without it the verdicts are the same, and every margin is exact.
     """
     if not isinstance(distribution, EncounterDistribution):
         raise InvalidInput("distribution", distribution, "what fs.encounter_distribution gives")

@@ -23,9 +23,9 @@ class Verdict(StrEnum):
     MASS_LOSS = "MASS LOSS"
     #: Lost half of its mass or more: class S.
     DISRUPTED = "DISRUPTED"
-    #: Reached the surface or the atmosphere with any part of it.
+    #: Some part of the body reached the surface or the atmosphere.
     IMPACT = "IMPACT"
-    #: Passed the axis ratio beyond which a homogeneous ellipsoid says nothing.
+    #: Passed the largest axis ratio of the homogeneous ellipsoid.
     BEYOND_MODEL = "BEYOND MODEL"
     #: The given body cannot exist with the given material, even far from any planet.
     NOT_IN_EQUILIBRIUM = "NOT IN EQUILIBRIUM"
@@ -52,8 +52,8 @@ class MassClass(NamedTuple):
     least: float  #: bound mass fraction above which a body belongs to this class or a lighter one
 
 
-#: Classes of bodies that have flowed, the lightest loss first. Edges belong to the heavier class. One entry is all that
-#: a further class takes: these are the only thresholds of verdicts.
+#: Classes of bodies that have flowed, in the order of the mass lost. Edges belong to the heavier class. A further class
+#: is one more entry: these are the only thresholds of verdicts.
 CLASSES = [
     MassClass(
         Verdict.RESHAPED, None, 1.0 - 1e-6
@@ -83,12 +83,12 @@ def class_of(bound: float) -> MassClass:
 
 
 def bound_fraction(shape: Array, velocity_gradient: Array, density: float) -> float:
-    """Mass fraction bound to what stays bound, for a homogeneous ellipsoid with velocity ``L x``.
+    """Mass fraction that stays bound, for a homogeneous ellipsoid with velocity ``L x``.
 
-    Material that is unbound in the potential of the whole is removed, the potential computed for the remainder, and so
-    on until nothing more leaves. The remainder of each pass counts as the homogeneous ellipsoid with its mass and its
-    second moments. Against sums over 32,768 points the fraction is right to 0.005 (rms of 40 random states), except
-    for states in which the remainder barely holds together: 0.078 where this gives 0.
+    Material that is unbound in the potential of the whole is removed, the potential is computed for the remainder, and
+    so on until nothing more is unbound. The remainder of each pass is replaced by the homogeneous ellipsoid with its
+    mass and its second moments. Compared with sums over 32,768 points the fraction has an error of 0.005 (rms of 40
+    random states), except for states whose remainder is barely bound: 0.078 where this gives 0.
 
     Parameters
     ----------

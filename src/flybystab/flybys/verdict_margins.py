@@ -1,4 +1,4 @@
-"""How far a verdict is from its edges."""
+"""Margins of a verdict: the distances from the thresholds at which it would change."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from flybystab.flybys.inputs import FlybyInputs
 from flybystab.flybys.verdict import CLASSES, Verdict, bound_fraction_upper
 from flybystab.tabular import Record
 
-#: A run that passes the largest axis ratio is followed to this multiple of it, to see how far beyond it gets.
+#: A run that passes the largest axis ratio is followed to this multiple of it, to find the largest ratio it reaches.
 FOLLOWED = 5.0
 #: Rows of history of the run that is followed further.
 ROWS = 20_000
@@ -28,23 +28,23 @@ class VerdictMargins(Record):
     Attributes
     ----------
     friction_angle : Quantity
-        Friction angle less the largest required one, deg: the edge of INTACT.
+        Friction angle less the largest required one, deg: the threshold of INTACT.
     axis_ratio : float
-        Largest ``a1/a3`` on the way. A body that passes `limit` is followed beyond it, to five times the limit, with
-        the homogeneous model continued outside its range: whether it turns back is the margin. Infinite if the run
-        cannot be followed.
+        Largest ``a1/a3`` during the encounter. A body that passes `limit` is followed beyond it, to five times the
+        limit, with the homogeneous model continued outside its range, to find whether the elongation stops. Infinite if
+        the run cannot be followed.
     limit : float
         Axis ratio beyond which the verdict is BEYOND MODEL.
     strain : float
         Largest ``|ln(a_i/a_i(0))|`` of the three axes until the run ends (at `limit` at the latest).
     bound_fraction : float
-        Bound mass fraction of the verdict, in the potential of what stays.
+        Bound mass fraction of the verdict, in the potential of the bound material.
     bound_fraction_upper : float
         The same in the potential of the whole body.
     relative : dict of str to float
         Distance from each edge that the verdict has, relative: ``"friction"`` (over the friction angle),
         ``"axis ratio"`` (``1 - axis_ratio/limit``), ``"bound fraction"`` (to the nearest edge of a class).
-        Negative on the far side.
+        Negative beyond the edge.
     """
 
     friction_angle: Quantity

@@ -53,7 +53,7 @@ COLOURS = {
     Verdict.BEYOND_MODEL: "#CC79A7",
     Verdict.NOT_IN_EQUILIBRIUM: "#999999",
 }
-#: File by which a folder is known to hold an atlas, which may be replaced.
+#: File that identifies a folder as an atlas, which may be replaced.
 MARK = "encounters.json"
 _FILES = ("atlas.css", "atlas.js")
 
@@ -135,7 +135,7 @@ def atlas(
 
 
 def check_folder(place: Path, overwrite: bool) -> None:
-    """Refuse a folder that cannot take an atlas: before anything is computed.
+    """Raise InvalidInput, before anything is computed, for a folder in which no atlas can be written.
 
     Raises
     ------
@@ -212,7 +212,7 @@ def _plain_text(value: Any) -> str:
 
 
 def _entry(row: Any, position: int) -> dict[str, Any]:
-    """Everything that the pages show of one encounter."""
+    """All values of one encounter that the pages show."""
     name, verdict = str(row["asteroid"]), str(row["verdict"])
     when = str(row["time_tdb"])[:16].replace("T", " ")
     planet = str(row["planet"]).capitalize()

@@ -1,7 +1,7 @@
 """A pile of grains through an encounter: stills, the largest clump against time, an animation.
 
-Grains are drawn to scale in the plane of the orbit, seen from the side of its angular momentum, in the colour of the
-clump that they belong to at the end; grey ones are loose.
+Grains are drawn to scale in the plane of the orbit, seen from the side of its angular momentum, coloured by the
+clump to which they belong at the end; loose grains are grey.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from matplotlib.collections import EllipseCollection
 from flybystab.encounter.attitude import periapsis_axes
 from flybystab.errors import InvalidInput
 from flybystab.flybys.batch import span_of
-from flybystab.flybys.grains_flyby import GrainsOutcome, GrainsRun
+from flybystab.flybys.grains_outcome import GrainsOutcome, GrainsRun
 from flybystab.flybys.result import FlybyResult
 from flybystab.plots.flyby import BLACK
 from flybystab.plots.style import new_figure, save, styled
@@ -191,5 +191,5 @@ def grains_animation(
 
 def _outcome(result: FlybyResult) -> GrainsOutcome:
     if result.grains is None:
-        raise InvalidInput("result", result.rung, "the result of flyby(..., grains=) that grains have given")
+        raise InvalidInput("result", result.rung, "the result of flyby(..., grains=) computed with grains")
     return result.grains

@@ -13,12 +13,12 @@ import numpy as np
 
 from flybystab.typing import Array
 
-#: Directions of a name from its point, in order of preference, and how far it is tried, in points.
+#: Directions of a label from its point, in order of preference, and the distances that are tried, in points.
 _SIDES = ((1, 0.3), (1, -0.3), (-1, 0.3), (-1, -0.3), (0.5, 1), (0.5, -1), (-0.5, 1), (-0.5, -1))
 _DISTANCES = (5.0, 10.0, 18.0, 28.0, 42.0)
 #: Radius of a mark, in points.
 _MARK = 3.0
-#: From this one on a line leads to the point.
+#: Distance from which on a line connects label and point.
 _LINE = 10.0
 
 
@@ -33,7 +33,7 @@ def label_points(
     points : sequence of (x, y, name)
         In data coordinates, most important first.
     others : array_like, shape (n, 2), optional
-        Other points that a name should not cover if it can be helped.
+        Other points that labels should not cover if possible.
     **text
         Of the text, e.g. ``fontsize``.
 

@@ -15,7 +15,7 @@ from flybystab.plots.style import new_figure, styled
 from flybystab.population.rates import EncounterRates
 from flybystab.population.verdict_rates import CHANGED, DisruptionRates
 
-#: Colours (Okabe & Ito) and line styles of the planets: told apart in grey, too.
+#: Colours (Okabe & Ito) and line styles of the planets, distinguishable in greyscale.
 PLANETS = {
     "mercury": ("#000000", ":"),
     "venus": ("#E69F00", "--"),
@@ -112,7 +112,7 @@ def probability_plot(axes: Any, result: DisruptionRates, planet_name: str = "ear
 
 
 def size_plot(axes: Any, result: DisruptionRates) -> Any:
-    """Plot the cumulative rate of changes against diameter; one size needs no such plot and gets a vertical line."""
+    """Plot the cumulative rate of changes against diameter; a single size is shown as a vertical line."""
     sizes = result.samples["diameter"].to_value(u.km)
     if len(sizes) == 0:
         return axes

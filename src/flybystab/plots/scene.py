@@ -1,7 +1,7 @@
 """Path and body in three dimensions: figure and animation.
 
-The planet and the path are to scale with each other; so are the bodies with each other. Beside the planet a body
-of a kilometre would be a dot, so it is magnified, by a factor that stands in the picture.
+The planet and the path have a common scale, and so do the bodies. A body of a kilometre would be a dot at the scale of
+the planet: it is magnified by a factor that is given in the picture.
 """
 
 from __future__ import annotations
@@ -90,7 +90,7 @@ def scene_plot(
     # The axes fill the figure: further lines go into them.
     axes.set_title(title, pad=6.0 - 12.0 * title.count("\n"))
     limits = np.array([getattr(axes, f"get_{n}lim")() for n in "xyz"])
-    # The scene is wide, the square that matplotlib draws it in is as high as the figure: it may reach out to the sides.
+    # The scene is wide, while matplotlib draws it in a square as high as the figure: let it extend to the sides.
     room, (width, height) = axes.get_position(original=True), axes.figure.get_size_inches()
     axes.set_box_aspect(np.ptp(limits, axis=1), zoom=0.85 * room.width * width / (room.height * height))
     axes.set_in_layout(False)
@@ -170,7 +170,7 @@ def animation(
     encounter = result.encounter
     turn = periapsis_axes(encounter)
     t = history.time_from_periapsis.to_value(u.s)
-    # Even steps of asinh(t v/q): slow far out, fast where things happen.
+    # Even steps of asinh(t v/q): long ones far from the planet, short ones near it.
     scale = encounter.distance.to_value(u.m) / encounter.v_periapsis.to_value(u.m / u.s)
     moments = scale * np.sinh(np.linspace(np.arcsinh(t[0] / scale), np.arcsinh(t[-1] / scale), frames))
     rows = np.searchsorted(t, moments).clip(0, len(t) - 1)
@@ -185,7 +185,7 @@ def animation(
     left.plot(places[:, 0], places[:, 1], color="0.6", lw=0.8)
     (dot,) = left.plot([], [], "o", color=BLACK, ms=5)
     left.set(aspect="equal", xlabel="x, towards periapsis (km)", ylabel="y (km)")
-    # The motion far from the planet, while the body settles, is in the other panel.
+    # The motion far from the planet, while the body settles, is outside this panel.
     far = encounter.start_distance.to_value(u.km)
     near = np.linalg.norm(places, axis=1) <= far
     left.set_ylim(1.1 * places[near, 1].min(), 1.1 * places[near, 1].max())

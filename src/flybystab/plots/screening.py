@@ -48,7 +48,7 @@ def inference_figure(table: QTable, path: str | Path) -> Path:
     names = list(PANELS) if table.meta.get("passages") else list(PANELS)[:1]
     figure = new_figure(1.2 + 3.6 * len(names), 3.8)
     panels: Any = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
-    # Zero cohesion has a place below the least of the others.
+    # On the logarithmic axis zero cohesion is placed below the smallest other value.
     height = np.arange(len(cohesion))
     known = table.meta.get("catalogue_density_kg_m3") or []
     filled = None
@@ -85,7 +85,7 @@ def inference_figure(table: QTable, path: str | Path) -> Path:
 def results_figure(results: QTable | str | Path, path: str | Path, names: int = 4) -> Path:
     """Plot a result table: effect of each encounter on the mobilised friction angle, and the margin.
 
-    Named are the passages that add most (left) and those nearest to failure (right).
+    The encounters with the largest increase (left) and those nearest to failure (right) are labelled.
 
     Returns
     -------

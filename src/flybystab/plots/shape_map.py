@@ -82,7 +82,7 @@ def slope_change_figure(shape: Shape, change: SlopeChange, repose: Quantity = 35
     change : SlopeChange
         Of :func:`flybystab.surface_change` with this shape.
     repose : Quantity
-        Angle of repose; the title says which share of the area passes it.
+        Angle of repose; the title gives the fraction of the area that exceeds it.
 
     Returns
     -------
@@ -111,7 +111,7 @@ def slope_change_figure(shape: Shape, change: SlopeChange, repose: Quantity = 35
 def surface_history_figure(
     history: SurfaceHistory, repose: Quantity = 35 * u.deg, *, figure: Any = None
 ) -> Any:
-    """Slopes before closest approach, at it and after it in three views each, and their course in time.
+    """Slopes before closest approach, at it and after it in three views each, and as a function of time.
 
     Parameters
     ----------

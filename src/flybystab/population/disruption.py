@@ -78,9 +78,9 @@ def disruption_rates(
         Number of grains of the pile that replaces the ellipsoid where it ends (BEYOND MODEL, MASS LOSS, DISRUPTED): a
         few seconds for each. Without it such bodies keep the verdict of the ellipsoid.
     workers : int, optional
-        Threads; no result depends on it.
+        Number of threads; results do not depend on it.
     executor : concurrent.futures.Executor, optional
-        Computes the strata, such as processes or a dask client's executor; no result depends on it.
+        Computes the strata, such as processes or the executor of a dask client; results do not depend on it.
     journal : str or Path, optional
         File in which finished strata are kept: the same call resumes an interrupted run. Removed at the end.
     progress : bool or function, optional

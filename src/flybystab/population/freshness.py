@@ -2,8 +2,8 @@
 
 Near-Earth asteroids with unweathered surfaces are those that could come close to a planet recently (Binzel et al. 2010,
 Nature 463, 331; Nesvorny et al. 2010, Icarus 209, 510; DeMeo et al. 2014, Icarus 227, 112): refreshing distances of 5
-to 16 Earth radii and weathering within 1 Myr explain their number. Encounters are followed as far back as the orbit can
-be; beyond that they are a Poisson process with the mean rate of the orbit.
+to 16 Earth radii and weathering within 1 Myr explain their number. Encounters are computed as far back as the orbit is
+predictable; before that they are modelled as a Poisson process with the mean rate of the orbit.
 """
 
 from __future__ import annotations

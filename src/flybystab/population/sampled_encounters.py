@@ -26,9 +26,9 @@ from flybystab.typing import Array
 
 #: Geometric albedo that converts a given diameter to the absolute magnitude by which LCDB spin periods are selected.
 ALBEDO = 0.14
-#: Sets of drawn bodies in which as many in equilibrium as needed must be found.
+#: Number of sets of bodies that are drawn at most to find enough bodies in equilibrium.
 _ATTEMPTS = 20
-#: Verdicts of the ellipsoid after which a body is carried on by grains, if they are asked for.
+#: Verdicts of the ellipsoid after which a body is simulated by grains, if requested.
 ENDS = (str(Verdict.BEYOND_MODEL), str(Verdict.MASS_LOSS), str(Verdict.DISRUPTED))
 #: Fragments of at least this mass fraction are counted.
 LEAST_FRAGMENT = 0.01

@@ -14,7 +14,8 @@ import numpy as np
 
 from flybystab.encounter.attitude import periapsis_axes
 from flybystab.errors import FlybystabError
-from flybystab.flybys.grains_flyby import HANDED_ON, grains_flyby
+from flybystab.flybys.escalation import HANDED_ON
+from flybystab.flybys.grains_flyby import grains_flyby
 from flybystab.screening.clones import Clones
 from flybystab.screening.draws import Attitudes
 from flybystab.screening.encounters import Passage

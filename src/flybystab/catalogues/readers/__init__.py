@@ -1,6 +1,6 @@
-"""Readers of catalogue and orbit files, one module per publisher, found by the content of a file.
+"""Readers of catalogue and orbit files, one module per publisher; the format is detected from the content.
 
-A module of this package registers a function with :func:`reader`; nothing else is edited to add a format.
+A module of this package registers its function with :func:`reader`; a further format is one more module.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ def _load() -> None:
 
 
 def reader_of(text: str) -> Reader | None:
-    """The reader whose format a text has; None where no reader recognises it."""
+    """The reader for the format of a text; None if no reader recognises it."""
     _load()
     return next((r for r in READERS.values() if r.identify(text)), None)
 

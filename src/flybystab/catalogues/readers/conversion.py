@@ -1,4 +1,4 @@
-"""From the elements, states and matrices of orbit files to rows of a catalogue and covariances.
+"""Conversion of the elements, states and matrices of orbit files to catalogue rows and covariances.
 
 Rows hold heliocentric elements of the J2000 ecliptic. States relative to another centre or with other axes are
 converted; their covariances become those of a state with ICRF axes.
@@ -33,7 +33,7 @@ COLUMN_OF: Mapping[str, str] = dict(
 )
 #: Radians of a degree.
 DEGREE = np.pi / 180.0
-#: Semi-major axes beyond this are left out of a row: q and the time of perihelion keep the digits, au.
+#: Semi-major axes beyond this are left out of a row: q and the time of perihelion preserve the digits, au.
 _LARGEST_AXIS = 1e5
 #: Displacement, m, below which the printed digits of an orbit are not counted as its error.
 _NEGLIGIBLE = 1e3
@@ -62,7 +62,7 @@ def number(text: object, name: str, file: str) -> float:
 
 
 def epoch_row(jd: float) -> dict[str, str]:
-    """Column of the epoch. TT and TDB, which differ by less than 2 ms, are not told apart."""
+    """Column of the epoch. TT and TDB, which differ by less than 2 ms, are not distinguished."""
     return {"epoch_jd_tdb": repr(float(jd))}
 
 
@@ -328,7 +328,7 @@ def printed_covariance(
     """Covariance by the printed digits of elements, or None where these displace the asteroid by less than 1 km.
 
     Each element is uniform within half a unit of its last digit; angles have the most decimals of all, since some
-    tables leave out trailing zeros. The result says nothing of the error of the orbit itself.
+    tables leave out trailing zeros. The result does not include the error of the orbit itself.
 
     Parameters
     ----------
@@ -337,7 +337,7 @@ def printed_covariance(
     names, texts : sequences of str
         Elements as in :func:`state_of`, as printed.
     offset : float
-        What is subtracted from the text of ``tp``.
+        Number that is subtracted from the text of ``tp``.
     """
     values = [float(t) - (offset if n == "tp" else 0.0) for n, t in zip(names, texts, strict=True)]
     _check_conic(dict(zip(names, values, strict=True)), source)
@@ -369,7 +369,7 @@ def _check_conic(at: Mapping[str, float], source: str) -> None:
 
 
 def _displacement(names: Sequence[str], values: Sequence[float], sigma: Array) -> float:
-    """Size of the displacement, m, that errors of elements make anywhere on the orbit."""
+    """Largest displacement, m, along the orbit that results from errors of the elements."""
     at = dict(zip(names, sigma, strict=True))
     if "x" in at:
         return float(np.linalg.norm([at[c] for c in "xyz"])) * AU
@@ -388,6 +388,6 @@ def printed_sigmas(names: Sequence[str], texts: Sequence[str]) -> Array:
 
 
 def decimals_of(text: str) -> int:
-    """Decimals that a printed number has, after its exponent is applied."""
+    """Number of decimals of a printed number, with its exponent applied."""
     mantissa, _, exponent = text.strip().lower().partition("e")
     return len(mantissa.partition(".")[2]) - int(exponent or 0)

@@ -2,7 +2,7 @@
 
 Names of columns are those of https://sbpy.readthedocs.io/en/stable/sbpy/data/fieldnames.html and of astroquery's
 ``Horizons.elements``. Elements are heliocentric, J2000 ecliptic: the tables do not name their centre, so that the mean
-motion or the period, where given, is held against the axis.
+motion or the period, where given, is compared with the semi-major axis.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ def entries_of(table: Table, file: str) -> list[Entry]:
     Raises
     ------
     InvalidInput
-        Elements are missing, have no unit, belong to another centre, or stand beside parameters of a force model.
+        Elements are missing, have no unit, refer to another centre, or come with parameters of a force model.
     """
     columns = {key: next((c for c in names if c in table.colnames), "") for key, names in _ALIASES.items()}
     if not (columns["e"] and columns["i"] and columns["node"] and columns["peri"] and columns["epoch"]):
@@ -132,7 +132,7 @@ def _entry(cells: Mapping[str, tuple[Any, Any]], file: str) -> Entry:
 
 
 def _check_centre(cells: Mapping[str, tuple[Any, Any]], a: float, file: str) -> None:
-    """Refuse elements whose mean motion is not that of an orbit about the Sun."""
+    """Raise InvalidInput for elements whose mean motion is not that of an orbit about the Sun."""
     from flybystab.orbit.elements import GM_SUN
 
     if "n" in cells:

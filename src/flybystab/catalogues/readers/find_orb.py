@@ -33,7 +33,7 @@ _ELEMENTS = {"a": "a", "e": "e", "i": "i", "asc_node": "node", "arg_per": "peri"
 _COMETARY = {"q": "q", "e": "e", "i": "i", "asc_node": "node", "arg_per": "peri", "Tp": "tp"}
 #: Parameters of the models with one parameter: Yarkovsky A2 (au/d2), and area over mass (m2/kg).
 _PARAMETERS = {"A2": "A2", "AMR": "AMRAT"}
-#: Keys in capitals that are no parameters of the force model.
+#: Keys in capitals that are not parameters of the force model.
 _OTHER = frozenset({"H", "G", "U", "P", "Q", "M", "MOIDs", "Tp", "Tp_iso", "p_NEO", "p_HZ"})
 
 
@@ -115,12 +115,12 @@ def _is_parameter(key: str) -> bool:
     Contents("cartesian", "full matrix", "none", "none", files="`covar.json`"),
 )
 def read_covariance(text: str, file: str) -> list[Entry]:
-    """The orbit of ``covar.json``, which has no name: that of the file is taken.
+    """The orbit of ``covar.json``, which contains no name: the name of the file is used.
 
     Raises
     ------
     InvalidInput
-        More than six parameters: the file does not say which.
+        The covariance has more than six parameters: the file does not name the additional ones.
     """
     document = parse_json(text, "orbit file", file)
     try:

@@ -1,8 +1,8 @@
 """Tables of orbits with a column FORMAT: Sorcha, layup and OpenOrb (``.csv``, ``.des``).
 
-FORMAT alone names centre, axes and elements: COM, KEP, CART (CAR) are heliocentric, BCOM, BKEP, BCART barycentric,
-all with the ecliptic of J2000; BCART_EQ and CAREQ have axes of the equator. Barycentric elements have the GM of the
-whole solar system. Units au, au/d, deg; epochs and times of perihelion in MJD, TDB (OpenOrb: TT). Columns and
+The column FORMAT determines centre, axes and elements: COM, KEP, CART (CAR) are heliocentric, BCOM, BKEP, BCART
+barycentric, all with the ecliptic of J2000; BCART_EQ and CAREQ have axes of the equator. Barycentric elements have the
+GM of the whole solar system. Units au, au/d, deg; epochs and times of perihelion in MJD, TDB (OpenOrb: TT). Columns and
 conversions: ``parse_orbit_row`` of https://github.com/dirac-institute/sorcha, ``element_order`` of
 https://github.com/Smithsonian/layup, ``readDESOrbitFile`` of https://github.com/oorb/oorb.
 """
@@ -176,7 +176,7 @@ def _entry(row: Mapping[str, str], file: str) -> Entry:
 
 
 def _check(row: Mapping[str, str], file: str) -> None:
-    """Refuse parameters of force models; layup writes them in small letters, with their errors beside them."""
+    """Raise InvalidInput for parameters of force models, which layup writes in lower case with their errors."""
     names = [c for c in row if (looks_like_parameter(c) and c not in _OTHER) or re.match(r"a[1-9](_|$)", c)]
     given = {c.partition("_")[0].upper() for c in names if _given(row[c])}
     given |= {c for c in row if re.match(r"cov_([6-9]_|\d_[6-9])", c) and _given(row[c])}
@@ -189,7 +189,7 @@ def _matrix(row: Mapping[str, str], kind: str, cartesian: bool, axes: str, file:
     Raises
     ------
     InvalidInput
-        A covariance of elements: layup has written it in rad2 and in deg2.
+        A covariance of elements, whose unit (rad2 or deg2) depends on the version of layup.
     """
     if not all(c in row for c in _COVARIANCE) or not any(_given(row[c]) for c in _COVARIANCE):
         return None

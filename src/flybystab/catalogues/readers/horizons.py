@@ -1,8 +1,8 @@
 """Answers of JPL Horizons: osculating elements and vectors, as text or CSV, and the page of an object's own orbit.
 
-Centre, units, axes and time scale stand in the header of the answer
+Centre, units, axes and time scale are read from the header of the answer
 (https://ssd.jpl.nasa.gov/horizons/manual.html#output); the constants of the non-gravitational acceleration in the
-description of the object. Of a table of several times the first is read.
+description of the object. Of a table with several times only the first is read.
 """
 
 from __future__ import annotations
@@ -225,7 +225,7 @@ def _elements(
 def _of_digits(
     jd: float, values: np.ndarray, scale: np.ndarray, texts: list[str], source: str
 ) -> Covariance | None:
-    """Covariance by the digits of a state in any unit."""
+    """Covariance from the printed digits of a state in any unit."""
     in_au = values / np.array([AU] * 3 + [AU / DAY] * 3)
     step = scale / np.array([AU] * 3 + [AU / DAY] * 3)
     shown = []

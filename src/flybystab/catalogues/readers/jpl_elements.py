@@ -1,7 +1,7 @@
 """Element tables of JPL: ``ELEMENTS.NUMBR``, ``ELEMENTS.UNNUM`` and ``ELEMENTS.COMET``.
 
-Columns stand below dashes, as explained at https://ssd.jpl.nasa.gov/sb/elem_tables.html: epoch in MJD, TDB; a or q
-in au; angles in degrees; Tp as ``yyyymmdd.ddddd``, TDB. The tables leave out non-gravitational parameters.
+Columns are marked by lines of dashes, as explained at https://ssd.jpl.nasa.gov/sb/elem_tables.html: epoch in MJD, TDB;
+a or q in au; angles in degrees; Tp as ``yyyymmdd.ddddd``, TDB. The tables leave out non-gravitational parameters.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def read_elements(text: str, file: str) -> list[Entry]:
     """
     header, dashes, *lines = text.splitlines()
     spans = [match.span() for match in re.finditer("-+", dashes)]
-    # A value may stand left of its dashes; the last column is open to the right.
+    # A value may begin left of its dashes; the last column extends to the end of the line.
     starts = [0, *(stop for _, stop in spans[:-1])]
     columns = [" ".join(c.split()) for c in _cut(header, starts)]
     known = {*_KEPLERIAN, *_COMETARY, *_OTHER}

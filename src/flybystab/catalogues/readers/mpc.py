@@ -47,7 +47,7 @@ def from_mpc(row: Mapping[str, str], file: str) -> dict[str, str]:
     # TT and TDB differ by less than 2 ms.
     out["epoch_jd_tdb"] = row["epoch_jd_tt"]
     out["observed_jd"] = _middle(row.get("arc", ""), row.get("last_obs", ""))
-    try:  # the mean motion has more digits of the axis than the axis
+    try:  # the mean motion determines the semi-major axis to more digits than its own column
         axis = (_GAUSS / float(row["n_deg_d"])) ** (2.0 / 3.0)
         if abs(axis - float(row["a_au"])) < 1e-7:
             out["a_au"] = repr(axis)
@@ -60,7 +60,7 @@ def from_mpc(row: Mapping[str, str], file: str) -> dict[str, str]:
 
 
 def _middle(arc: str, last: str) -> str:
-    """Julian date of the middle of an arc ("1893-2026", or "13 d" before the last observation); nothing if unknown."""
+    """Julian date of the middle of an arc ("1893-2026", or "13 d" before the last observation); empty if unknown."""
     try:
         if arc.endswith("d"):
             return repr(date.fromisoformat(last).toordinal() + 1721424.5 - 0.5 * float(arc.split()[0]))

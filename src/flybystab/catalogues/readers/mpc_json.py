@@ -1,9 +1,9 @@
-"""Tables of the Minor Planet Center in JSON: ``mpcorb_extended.json`` and its kin, and answers of its web service.
+"""JSON of the Minor Planet Center: ``mpcorb_extended.json`` and related files, and answers of its web service.
 
 Fields of the extended files: https://minorplanetcenter.net/Extended_Files/Extended_MPCORB_Data_Format_Manual.pdf (
-``Epoch`` is a Julian date, TT); of the web service, which astroquery's ``MPC.query_object`` asks:
-https://minorplanetcenter.net/web_service/. Non-gravitational parameters of the web service are refused: it does not
-give their law.
+``Epoch`` is a Julian date, TT); of the web service, which astroquery's ``MPC.query_object`` queries:
+https://minorplanetcenter.net/web_service/. Answers with non-gravitational parameters raise InvalidInput, since the web
+service does not give their law.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _PERIHELION = (
     "ascending_node",
     "argument_of_perihelion",
 )
-#: Keys in capitals that are no parameters of the force model.
+#: Keys in capitals that are not parameters of the force model.
 _OTHER = frozenset({"H", "G", "U", "M", "NEO"})
 
 

@@ -77,7 +77,7 @@ def _entry(document: Mapping[str, Any], file: str) -> Entry:
     if frame[0].lower() != "ecliptic":
         raise InvalidInput("refsys", frame[0], f"Ecliptic in {file}")
     jd = day + (MJD if form == "MJD" else 0.0)
-    # The cometary elements are nearer to a normal distribution over long arcs; both describe one orbit.
+    # Over long arcs the cometary elements are closer to a normal distribution; both describe the same orbit.
     kind = "COM" if document.get("COM") else "CAR"
     names, values, matrix = _solution(document[kind], _COM if kind == "COM" else _CAR, file)
     source = f"MPC orbit ({file})"

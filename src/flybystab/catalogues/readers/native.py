@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 
 def read_native(text: str, file: str) -> list[Entry]:
-    """Rows of a catalogue; the format that is assumed where no registered reader recognises the text.
+    """Rows of a catalogue: the format assumed if no registered reader recognises the text.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """NASA's web service for near-Earth objects (NeoWs): one object, or a list of them (JSON).
 
 Fields: https://api.nasa.gov (Asteroids - NeoWs); ``orbital_data`` are elements of the JPL Small-Body Database with
-all their digits, without errors. Estimated diameters, which follow from H and an assumed albedo, are not read.
+all their digits, without errors. Estimated diameters are not read, since they follow from H and an assumed albedo.
 """
 
 from __future__ import annotations

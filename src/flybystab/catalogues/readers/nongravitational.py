@@ -40,16 +40,16 @@ def nongravitational_columns(
     Parameters
     ----------
     values : mapping
-        Parameters by the names of JPL, in au/d2, d, m2/kg and, of the law, au; others are not looked at.
+        Parameters by the names of JPL, in au/d2, d, m2/kg and, of the law, au; others are ignored.
     comet : bool
-        Whether A1, A2, A3 without constants of their law follow that of comets.
+        Whether A1, A2, A3 without constants follow the law of comets.
     law : str, optional
         Law of a publisher that does not list its constants.
 
     Raises
     ------
     InvalidInput
-        A value is no finite number, the law is not known, or DT stands without A1, A2, A3.
+        A value is not a finite number, the law is not known, or DT is given without A1, A2, A3.
     """
     given = {n: number(v, n, file) for n, v in values.items() if n in COLUMN_OF_PARAMETER}
     given = {n: v for n, v in given.items() if v != 0.0}
@@ -65,7 +65,7 @@ def law_of(values: Mapping[str, object], comet: bool, file: str) -> str:
     Raises
     ------
     InvalidInput
-        An asteroid without constants, or some of five that agree with neither named law.
+        An asteroid without constants, or constants that agree with neither named law.
     """
     given = {n: number(values[n], n, file) for n in _CONSTANTS if values.get(n) is not None}
     if not given and comet:

@@ -3,8 +3,8 @@
 Columns: ``readOpenOrbOrbitFile`` of https://github.com/oorb/oorb (main/io.f90). The numbers in the last header line
 name them: 2 to 7 Keplerian elements (au, deg), 75 and 76 perihelion distance and time, 39 to 44 a state of the
 ecliptic (au, au/d), 8 the epoch as year, month and day, 74 as MJD (TT); 9 to 14 standard deviations, 15 to 29
-correlations, 78 to 92 covariances. The units of the errors of cometary elements are not documented: they are not
-used.
+correlations, 78 to 92 covariances. Errors of cometary elements are not used, since their units are not
+documented.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""Parameters of orbit solutions beside the six elements: which are modelled, by publisher.
+"""Parameters of orbit solutions other than the six elements, and which of them are modelled, by publisher.
 
-Every reader passes what its file has beside the elements to :func:`check_parameters`. A parameter that is neither
-modelled nor known is refused by its name: leaving it out would give an orbit that its publisher did not determine.
+Every reader passes the further parameters of its file to :func:`check_parameters`. A parameter that is not modelled
+raises an error that names it: without it the orbit would not be that of its publisher.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ MODELLED: Mapping[str, frozenset[str]] = MappingProxyType(
         "find_orb": frozenset({"A2", "AMR"}),
         # Non-gravitational terms of layup have constants g(r) of their own (https://github.com/Smithsonian/layup).
         "FORMAT": frozenset(),
-        # Element tables of MPC and JPL without room for parameters.
+        # Element tables of MPC and JPL have no columns for parameters.
         "table": frozenset(),
     }
 )
@@ -57,22 +57,22 @@ _PARAMETER = re.compile(r"[A-Z][A-Z0-9]{1,7}$")
 
 
 def looks_like_parameter(name: str) -> bool:
-    """Whether a name of a column or key is written as the parameters of force models are: A4, DT, AMRAT."""
+    """Whether the name of a column or key has the form of a parameter of a force model, such as A4, DT, AMRAT."""
     return bool(_PARAMETER.match(name))
 
 
 def named_parameters(text: str) -> list[str]:
-    """Names of parameters that a text gives a value, as ``A2 = -1e-14``."""
+    """Names of the parameters to which a text assigns a value, as in ``A2 = -1e-14``."""
     return re.findall(r"\b([A-Z][A-Z0-9]{1,7}) *= *[-+.\d]", text)
 
 
 def check_parameters(agency: str, names: Iterable[str], file: str) -> None:
-    """Refuse parameters that the force model does not have.
+    """Raise InvalidInput for parameters that the force model does not have.
 
     Raises
     ------
     InvalidInput
-        Names each of them, and what to use instead.
+        The message names each of them and an alternative.
     """
     lacking = [n for n in names if n not in MODELLED[agency]]
     if lacking:

@@ -1,7 +1,7 @@
 """JPL Small-Body Database: tables of the query tool and API (CSV and JSON).
 
 Columns: https://ssd-api.jpl.nasa.gov/doc/sbdb_query.html. Elements are heliocentric, J2000 ecliptic, TDB. Any set of
-columns that defines an orbit and names its object is read.
+columns that defines an orbit and names the object can be read.
 """
 
 from __future__ import annotations
@@ -58,9 +58,9 @@ _SBDB = {
     **_SIGMAS,
 }
 _NAMES = {"a": "a", "e": "e", "i": "i", "om": "node", "w": "peri", "ma": "M", "q": "q", "tp": "tp"}
-#: Columns in capitals that are no parameters of the force model.
+#: Columns in capitals that are not parameters of the force model.
 _OTHER = frozenset({"H", "G", "M1", "M2", "K1", "K2", "PC", "GM", "BV", "UB", "IR", "UV"})
-#: Columns by which a table is known to be JPL's.
+#: Columns that identify a table of JPL.
 _JPL = frozenset(
     {"om", "w", "ma", "tp", "pdes", "full_name", "spkid", "epoch_mjd", "epoch_cal", "moid", "per_y"}
 )
@@ -122,7 +122,7 @@ def _names(row: Mapping[str, str], full: str, key: str) -> dict[str, str]:
 
 
 def _check(row: Mapping[str, str], file: str) -> None:
-    """Refuse parameters of the force model: columns in capitals that are not known as anything else."""
+    """Raise InvalidInput for parameters of the force model: columns in capitals that have no other known meaning."""
     given = {c.removesuffix("_sigma").removesuffix("_kind") for c in row if row[c] and c not in _OTHER}
     check_parameters("JPL", sorted(c for c in given if looks_like_parameter(c) and c not in _OTHER), file)
 
@@ -229,9 +229,9 @@ def _elements(row: Mapping[str, str], file: str) -> dict[str, str]:
 
 
 def _covariance(row: Mapping[str, str], file: str) -> Covariance | None:
-    """Covariance where the catalogue row alone does not say it: 1-sigmas of q, tp, A1, A2, A3, DT, or coarse digits.
+    """Covariance from values that a catalogue row does not hold: 1-sigmas of q, tp, A1, A2, A3, DT, and digits.
 
-    The printed digits count beside the 1-sigmas: the default of the query tool has four.
+    The rounding of the printed digits (four by default in the query tool) is added to the 1-sigmas.
     """
     pushes = [c for c in _PARAMETERS if row.get(c) and row.get(f"{c}_sigma")]
     keplerian = _keplerian(row)
@@ -268,7 +268,7 @@ def thousandfold(text: str, name: str, file: str) -> str:
 
 
 def _missing(columns: set[str]) -> list[str]:
-    """What columns of a query lack to define an orbit and name its object."""
+    """Columns that are missing in a query to define an orbit and to name its object."""
     pair = len({"a", "q", "ad"} & columns) >= 2
     out = [c for c in ("e", "i", "om", "w") if c not in columns and not (c == "e" and pair)]
     for either in (

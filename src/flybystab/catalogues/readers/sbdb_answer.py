@@ -48,7 +48,7 @@ def from_sbdb_answer(text: str, file: str) -> tuple[dict[str, str], Covariance |
     dict
         A catalogue row: elements of the answer at their epoch.
     Covariance or None
-        At the epoch of its own, around the elements that the answer gives for that epoch.
+        At its own epoch, about the elements given for that epoch.
 
     Raises
     ------
@@ -82,7 +82,7 @@ def from_sbdb_answer(text: str, file: str) -> tuple[dict[str, str], Covariance |
 
 
 def _with_digits(row: Mapping[str, str], covariance: Covariance | None) -> Covariance | None:
-    """The covariance of the printed digits in place of one that they exceed: an answer without ``full-prec=1``."""
+    """The covariance of the printed digits if it exceeds the given one, as in an answer without ``full-prec=1``."""
     if not all(row.get(c) for c in _COLUMNS.values()):
         return covariance
     texts = [row[c] for c in _COLUMNS.values()]
@@ -201,7 +201,7 @@ def _covariance(
 def _uncorrelated(
     orbit: Mapping[str, Any], pushes: Mapping[str, Any], source: str, file: str
 ) -> Covariance | None:
-    """1-sigmas of elements and accelerations; None where the row alone has them all, or where they are lacking."""
+    """Covariance from 1-sigmas of elements and accelerations; None if none is given or all have columns in the row."""
     elements = {item["name"]: item for item in orbit["elements"]}
     with_errors = [n for n, p in pushes.items() if p.get("sigma")]
     use = tuple(_COLUMNS)

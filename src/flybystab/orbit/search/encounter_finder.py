@@ -6,64 +6,50 @@ Asteroids are massless and integrated independently (:mod:`flybystab.orbit.searc
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from functools import lru_cache
 from itertools import pairwise
 from numbers import Real
-from typing import Any
+from typing import Any, NamedTuple
 
 import astropy.units as u
 import numpy as np
 from astropy.table import QTable
 from astropy.time import Time
 from astropy.units import Quantity
-from numpy.typing import NDArray
 
-from flybystab.constants import DAY, YEAR
 from flybystab.core.numerics.threads import in_order, worker_count
 from flybystab.errors import Impact, InvalidInput, NotConverged
-from flybystab.orbit.almanac import GRID, N_FAST, N_SLOW, SLOT
-from flybystab.orbit.barycentre import barycentre_in
-from flybystab.orbit.ephemeris import BELT, BODIES, N_BODIES, SUN, Ephemeris, Window
-from flybystab.orbit.forces import FORCES, LAW_SIZE
-from flybystab.orbit.observatories import geographic
-from flybystab.orbit.orbit import (
-    TWIN_DISTANCE,
-    TWIN_SPEED,
-    Orbit,
-    _ephemeris,
-    default_forces,
-    later,
-    seconds,
-)
+from flybystab.orbit.ephemeris import BODIES, SUN, Ephemeris
+from flybystab.orbit.orbit import Orbit, _ephemeris, later
 from flybystab.orbit.planets import PLANETS, Planet, planet
-from flybystab.orbit.predictability import deviation_epoch, deviations_of
-from flybystab.orbit.search.acceleration import Field, field
+from flybystab.orbit.predictability import deviations_of
+from flybystab.orbit.search.encounter_table import (
+    ASTEROID,
+    BODY,
+    EDGE,
+    IMPACT,
+    TIME,
+    TIME_AND_STATE,
+    encounter_table,
+    forces_used,
+    in_span,
+)
 from flybystab.orbit.search.entry import entry
-from flybystab.orbit.search.force_selection import N_SHARES, NAMES, reduced
+from flybystab.orbit.search.force_selection import N_SHARES
 from flybystab.orbit.search.minima import WIDTH
 from flybystab.orbit.search.neighbours import add_growth
+from flybystab.orbit.search.search_setup import (
+    SearchForces,
+    SearchSpan,
+    initial_states,
+    limits_of,
+    search_forces,
+    search_span,
+    search_tolerances,
+)
 from flybystab.orbit.search.track import EXHAUSTED, INSIDE, MAX_STEPS, STALLED, search
-from flybystab.orbit.target_plane import target_plane
 from flybystab.progress import check_progress, progress_bar
 from flybystab.typing import Array
 from flybystab.units import checked_time, to_si
-
-_SPEED = u.m / u.s
-
-#: A passage this close to an end of the span counts at `start` and not at `stop`, s. It exceeds the error of the time,
-#: so that exactly one of two adjacent spans contains the passage.
-_EDGE = 1.0
-#: Margin of the integration beyond the span, so that a minimum at its end is bracketed, s.
-_MARGIN = 60.0
-#: Tolerance over the error (m) of the median asteroid after ten years; the error grows with the square of time
-#: (``flybystab bench sky``).
-_AT_10_YEARS, _TOLERANCES = 1e-12 / 100.0, (1e-15, 1e-8)
-
-
-@lru_cache(maxsize=4)
-def _window(eph: Ephemeris, day: float, fraction: float, start: float, stop: float) -> Window:
-    """The ephemeris around a search; kept, with its almanac, for the next asteroid of the same epoch."""
-    return eph.window(Time(day, fraction, format="jd", scale="tdb"), start, stop)
 
 
 def find_encounters(
@@ -145,11 +131,114 @@ def find_encounters(
     """
     rows = _objects(objects)
     workers = worker_count(workers, threads)
+    start, stop = checked_time(start, "start"), checked_time(stop, "stop")
+    _check_options(start, stop, forces, tolerance)
+    check_progress(progress)
+    found, reach = _planets_within(planets, within)
+    accuracy = to_si(error, u.m, "error", low=0.0)
+    eph = _ephemeris(ephemeris)
+    span, epochs = search_span(rows, start, stop, eph, growth)
+    states = initial_states(rows, span.window, epochs)
+    # A tenth: several displacements add up, and passages enlarge them.
+    least = 0.1 * accuracy if forces is None and not growth else 0.0
+    acting = search_forces(rows, found, forces, least, span.window, epochs, states)
+    limits, floors = limits_of(found, reach)
+    tolerances = search_tolerances(span, epochs, accuracy, tolerance, growth)
+    job = _Search(
+        rows, span, acting, epochs, states, limits, floors, tolerances, np.zeros((len(rows), N_SHARES)), {}
+    )
+    raw = _without_early_impacts(job, _integrated(job, workers, progress))
+    # A fall into the Sun ends an orbit and is always a row.
+    asked = np.isin(raw[:, BODY], [SUN, *(BODIES.index(b.name) for b in found)])
+    elsewhere = [
+        {
+            "asteroid": rows[int(r[ASTEROID])][0],
+            "planet": BODIES[int(r[BODY])],
+            "time_jd_tdb": later(span.middle, r[TIME]).jd,
+        }
+        for r in raw[~asked]
+    ]
+    raw = raw[asked]
+    kept, share, left_out = forces_used(acting.names, job.shares, least)
+    meta = {
+        "ephemeris": span.window.name,
+        "forces": list(kept),
+        "share_km": share,
+        "left_out_km": left_out,
+        "impacts_elsewhere": elsewhere,
+        "failed": [job.failed[i] for i in sorted(job.failed)],
+        "frame": "ICRF",
+        "time_scale": "TDB",
+        "tolerance": float(tolerances.min(initial=1.0)),
+    }
+    contacts = _contacts(job, raw)
+    out = encounter_table(rows, raw, contacts, span.middle, span.window, meta)
+    if growth:
+        beside = {i: deviations_of(rows[i][1], eph) for i in np.unique(out["index"]).tolist()}
+        add_growth(
+            out,
+            contacts[:, 0],
+            beside,
+            acting.laws,
+            span.window,
+            lambda i: acting.of(i, job.shares[i]),
+            tolerances,
+            workers,
+        )
+    return out
+
+
+class _Search(NamedTuple):
+    """A search: orbits (n), span, forces, limits (by body), tolerances, and what the integration adds.
+
+    Attributes
+    ----------
+    shares : ndarray, shape (n, N_SHARES)
+        Estimated displacement by each force, m; written by the search.
+    failed : dict of int to dict
+        Asteroids that could not be followed, with the reason; written by the search.
+    """
+
+    rows: list[tuple[str, Orbit]]
+    span: SearchSpan
+    forces: SearchForces
+    epochs: Array
+    states: Array
+    limits: Array
+    floors: Array
+    tolerances: Array
+    shares: Array
+    failed: dict[int, dict[str, str]]
+
+    def fail(self, i: int, error: Exception) -> None:
+        """Record that asteroid `i` could not be followed; raises the error if it is the only one."""
+        if len(self.rows) == 1:
+            raise error
+        self.failed[i] = {"asteroid": self.rows[i][0], "why": str(error)}
+
+
+def _check_options(start: Time, stop: Time, forces: tuple[str, ...] | None, tolerance: float | None) -> None:
+    """Check span, forces and tolerance.
+
+    Raises
+    ------
+    InvalidInput
+    """
     if forces is not None and (isinstance(forces, str) or not isinstance(forces, Iterable)):
         raise InvalidInput("forces", forces, "a sequence of names")
-    start, stop = checked_time(start, "start"), checked_time(stop, "stop")
     if not start < stop:
         raise InvalidInput("stop", stop.iso, f"a time after start, {start.iso}")
+    if tolerance is not None and not (isinstance(tolerance, Real) and 1e-16 <= tolerance <= 1e-4):
+        raise InvalidInput("tolerance", tolerance, "a number in [1e-16, 1e-4]")
+
+
+def _planets_within(planets: Sequence[str], within: Quantity) -> tuple[list[Planet], Array]:
+    """The planets and the largest distance from each, m, checked.
+
+    Raises
+    ------
+    InvalidInput, UnknownName, UnitMismatch
+    """
     if not isinstance(planets, Iterable):
         raise InvalidInput("planets", planets, "a name or a sequence of names")
     names = [planets] if isinstance(planets, str) else list(planets)
@@ -159,162 +248,105 @@ def find_encounters(
     reach = to_si(within, u.m, "within", shape=None, low=0.0, open_low=True)
     if reach.shape not in ((), (1,), (len(found),)):
         raise InvalidInput("within", within, "one distance, or one per planet")
-    reach = np.broadcast_to(reach, (len(found),)).astype(float)
-    if tolerance is not None and not (isinstance(tolerance, Real) and 1e-16 <= tolerance <= 1e-4):
-        raise InvalidInput("tolerance", tolerance, "a number in [1e-16, 1e-4]")
-    accuracy = to_si(error, u.m, "error", low=0.0)
-    eph = _ephemeris(ephemeris)
-    middle = later(start, 0.5 * seconds(stop, start))
-    t_start, t_stop = seconds(start, middle), seconds(stop, middle)
-    epochs = _epochs(rows, middle)
-    known = [seconds(deviation_epoch(orbit), middle) for _, orbit in rows] if growth else []
-    first, last = ((jd - middle.tdb.jd1 - middle.tdb.jd2) * DAY for jd in (eph.start_jd, eph.stop_jd))
-    begin, end = t_start - _MARGIN, t_stop + _MARGIN
-    if first <= t_start and t_stop <= last:
-        begin, end = max(begin, first + 1e-3), min(end, last - 1e-3)
-    every = [begin, end, *epochs, *known]
-    window = _window(eph, middle.tdb.jd1, middle.tdb.jd2, min(every), max(every))
-    chosen = forces
-    if chosen is None:
-        kinds = {orbit.nongrav.active: orbit for _, orbit in rows}
-        used = {name for orbit in kinds.values() for name in default_forces(orbit, *(b.name for b in found))}
-        chosen = tuple(name for name in FORCES if name in used)
-    longest = np.maximum(np.abs(epochs - t_start), np.abs(epochs - t_stop))
-    if tolerance is None:
-        tolerances = np.clip(_AT_10_YEARS * accuracy * (10.0 * YEAR / longest) ** 2, *_TOLERANCES)
-        if growth:  # passages amplify errors: those of the tolerance, too
-            tolerances = np.minimum(tolerances, 1e-14)
-    else:
-        tolerances = np.full(len(rows), float(tolerance))
-    everything = field(window, [n for n in chosen if n != "non-gravitational"])
-    limits = np.zeros(len(BODIES))
-    limits[[BODIES.index(b.name) for b in found]] = reach
-    limits[SUN] = 0.0  # a perihelion is no encounter
-    floors = np.array([PLANETS[name].impact_distance for name in BODIES])
-    always = np.zeros(N_FAST + N_SLOW, dtype=bool)
-    for name in ("sun", *(b.name for b in found)):
-        b = BODIES.index(name)
-        always[SLOT[b] + N_FAST * GRID[b]] = True
-    laws = np.zeros((len(rows), LAW_SIZE))
-    if "non-gravitational" in chosen:
-        for i, (_, orbit) in enumerate(rows):
-            if orbit.nongrav.active:
-                laws[i] = orbit.nongrav.row
-    states = _states(rows, window, epochs)
-    # A massive asteroid does not attract itself.
-    twins = {} if forces is not None else _twins(window, epochs, states)
-    own = {
-        i: field(window, [n for n in chosen if n not in ("non-gravitational", f"{name} point mass")])
-        for i, name in twins.items()
-    }
-    shares = np.zeros((len(rows), N_SHARES))
-    # A tenth: several shares add up, and passages on the way enlarge them.
-    least = 0.1 * accuracy if forces is None and not growth else 0.0
+    return found, np.broadcast_to(reach, (len(found),)).astype(float)
 
-    failed: dict[int, dict[str, str]] = {}
 
-    def run(part: slice) -> list[Array]:
-        tables = own.get(part.start, everything), laws[part], epochs[part], states[part]
-        steps = tolerances[part]
-        size = len(tables[2])
-        i, space, parts = 0, 64 * size + 256, []
-        while i < size:
-            out = np.empty((space, WIDTH))
-            i, n, status, reached = search(
-                *tables, begin, end, limits, floors, steps, least, always, shares[part], i, out
-            )
-            if status in (INSIDE, STALLED, EXHAUSTED):
-                name, orbit = rows[part][i]
-                why = (
-                    starts_inside(name, orbit.epoch, PLANETS[BODIES[int(reached)]])
-                    if status == INSIDE
-                    else NotConverged(
-                        f"{name}: "
-                        + ("the step size collapsed" if status == STALLED else f"{MAX_STEPS:,} steps taken")
-                        + f" at {later(middle, reached).iso} TDB"
-                    )
-                )
-                if len(rows) == 1:
-                    raise why
-                failed[part.start + i] = {"asteroid": name, "why": str(why)}
-                i += 1
-            elif n == 0:
-                space *= 4
-            out[:n, 11] += part.start
-            parts.append(out[:n].copy())
-        return parts
-
+def _integrated(
+    job: _Search, workers: int, progress: bool | Callable[[int, int, int], None] | None
+) -> Array:
+    """Rows of all encounters, sorted by asteroid and time."""
+    total, own = len(job.rows), job.forces.own
     # Parts small enough for an even load of the threads, large enough for a small overhead of Python.
-    size = max(1, min(64, -(-len(rows) // (4 * workers)))) if workers > 1 else max(len(rows), 1)
-    cuts = sorted({*range(0, len(rows), size), *twins, *(i + 1 for i in twins), len(rows)})
+    size = max(1, min(64, -(-total // (4 * workers)))) if workers > 1 else max(total, 1)
+    cuts = sorted({*range(0, total, size), *own, *(i + 1 for i in own), total})
     tasks = [slice(i, j) for i, j in pairwise(cuts)]
     flat: list[Array] = []
-    check_progress(progress)
-    with progress_bar(not callable(progress) and progress, len(rows), "orbits", "encounters") as tick:
-        for task, parts in zip(tasks, in_order(run, tasks, workers), strict=True):
+    with progress_bar(not callable(progress) and progress, total, "orbits", "encounters") as tick:
+        for task, parts in zip(tasks, in_order(lambda part: _part(job, part), tasks, workers), strict=True):
             flat += parts
             tick(task.stop)
             if callable(progress):
-                progress(task.stop, len(rows), sum(map(len, flat)))
+                progress(task.stop, total, sum(map(len, flat)))
     raw = np.concatenate(flat) if flat else np.empty((0, WIDTH))
-    raw = raw[np.lexsort((raw[:, 1], raw[:, 11]))]
-    # An impact between the epoch of an orbit and the span ends the search of that asteroid.
-    since = np.array([epochs[int(i)] for i in raw[:, 11]])
-    early = (raw[:, 1] < t_start - _EDGE) & (since < t_start)
-    late = (raw[:, 1] >= t_stop - _EDGE) & (since > t_stop)
-    for r in raw[(raw[:, 10] > 0.0) & (early | late)]:
-        i = int(r[11])
-        hit = Impact(
-            f"{rows[i][0]} meets {BODIES[int(r[0])]} at {later(middle, float(r[1])).iso} TDB, between its epoch "
-            f"and the span of the search"
+    return raw[np.lexsort((raw[:, TIME], raw[:, ASTEROID]))]
+
+
+def _part(job: _Search, part: slice) -> list[Array]:
+    """Rows of the encounters of some of the asteroids, which have one field of forces."""
+    forces, span = job.forces, job.span
+    tables = (
+        forces.own.get(part.start, forces.everything),
+        forces.laws[part],
+        job.epochs[part],
+        job.states[part],
+    )
+    size = len(job.epochs[part])
+    i, space, parts = 0, 64 * size + 256, []
+    while i < size:
+        out = np.empty((space, WIDTH))
+        i, n, status, reached = search(
+            *tables,
+            span.begin,
+            span.end,
+            job.limits,
+            job.floors,
+            job.tolerances[part],
+            forces.least,
+            forces.always,
+            job.shares[part],
+            i,
+            out,
         )
-        if len(rows) == 1:
-            raise hit
-        failed[i] = {"asteroid": rows[i][0], "why": str(hit)}
-    raw = raw[_in_span(raw, t_start, t_stop)]
-    # A fall into the Sun ends an orbit for good and is always a row.
-    asked = np.isin(raw[:, 0], [SUN, *(BODIES.index(b.name) for b in found)])
-    elsewhere = [
-        {"asteroid": rows[int(r[11])][0], "planet": BODIES[int(r[0])], "time_jd_tdb": later(middle, r[1]).jd}
-        for r in raw[~asked]
-    ]
-    raw = raw[asked]
-    kept, share, left_out = _forces_used(chosen, shares, least)
-    meta = {
-        "ephemeris": window.name,
-        "forces": list(kept),
-        "share_km": share,
-        "left_out_km": left_out,
-        "impacts_elsewhere": elsewhere,
-        "failed": [failed[i] for i in sorted(failed)],
-        "frame": "ICRF",
-        "time_scale": "TDB",
-        "tolerance": float(tolerances.min(initial=1.0)),
-    }
+        if status in (INSIDE, STALLED, EXHAUSTED):
+            name, orbit = job.rows[part][i]
+            if status == INSIDE:
+                job.fail(part.start + i, starts_inside(name, orbit.epoch, PLANETS[BODIES[int(reached)]]))
+            else:
+                what = "the step size collapsed" if status == STALLED else f"{MAX_STEPS:,} steps taken"
+                when = later(span.middle, reached).iso
+                job.fail(part.start + i, NotConverged(f"{name}: {what} at {when} TDB"))
+            i += 1
+        elif n == 0:
+            space *= 4
+        out[:n, ASTEROID] += part.start
+        parts.append(out[:n].copy())
+    return parts
 
-    def field_of(i: int) -> Field:
-        return reduced(own.get(i, everything), shares[i], least, always)
 
-    contacts = raw[:, 1:8].copy()
-    for k in np.flatnonzero(raw[:, 10] > 0.0):
-        i, hit_body = int(raw[k, 11]), int(raw[k, 0])
-        sign = 1.0 if raw[k, 1] >= epochs[i] else -1.0
+def _without_early_impacts(job: _Search, raw: Array) -> Array:
+    """Rows within the span; an impact between the epoch of an orbit and the span ends the search of that asteroid."""
+    t_start, t_stop = job.span.start, job.span.stop
+    since = np.array([job.epochs[int(i)] for i in raw[:, ASTEROID]])
+    early = (raw[:, TIME] < t_start - EDGE) & (since < t_start)
+    late = (raw[:, TIME] >= t_stop - EDGE) & (since > t_stop)
+    for r in raw[(raw[:, IMPACT] > 0.0) & (early | late)]:
+        i = int(r[ASTEROID])
+        job.fail(
+            i,
+            Impact(
+                f"{job.rows[i][0]} meets {BODIES[int(r[BODY])]} at {later(job.span.middle, float(r[TIME])).iso} TDB, "
+                f"between its epoch and the span of the search"
+            ),
+        )
+    return raw[in_span(raw, t_start, t_stop)]
+
+
+def _contacts(job: _Search, raw: Array) -> Array:
+    """Time (s) and relative state of each row: closest approach, or entry of an impact."""
+    contacts = raw[:, TIME_AND_STATE].copy()
+    for k in np.flatnonzero(raw[:, IMPACT] > 0.0):
+        i, body = int(raw[k, ASTEROID]), int(raw[k, BODY])
+        sign = 1.0 if raw[k, TIME] >= job.epochs[i] else -1.0
         contacts[k, 0], contacts[k, 1:] = entry(
-            field_of(i), laws[i], window, hit_body, raw[k], float(floors[hit_body]), sign
+            job.forces.of(i, job.shares[i]),
+            job.forces.laws[i],
+            job.span.window,
+            body,
+            raw[k],
+            float(job.floors[body]),
+            sign,
         )
-    out = _table(rows, raw, contacts, middle, window, meta)
-    if growth:
-        beside = {i: deviations_of(rows[i][1], eph) for i in np.unique(out["index"]).tolist()}
-        add_growth(out, contacts[:, 0], beside, laws, window, field_of, tolerances, workers)
-    return out
-
-
-def _in_span(raw: Array, t_start: float, t_stop: float) -> NDArray[np.bool_]:
-    """Rows of a sorted result inside the span, each passage once where the epoch of an orbit lies at it."""
-    keep = (raw[:, 1] >= t_start - _EDGE) & (raw[:, 1] < t_stop - _EDGE)
-    same = (np.diff(raw[:, 1]) < _EDGE) & (np.diff(raw[:, 11]) == 0.0) & (np.diff(raw[:, 0]) == 0.0)
-    keep[1:] &= ~same
-    return keep
+    return contacts
 
 
 def starts_inside(name: str, epoch: Time, body: Planet) -> InvalidInput:
@@ -323,94 +355,6 @@ def starts_inside(name: str, epoch: Time, body: Planet) -> InvalidInput:
     return InvalidInput(
         "orbit", what, f"a start more than {body.impact_distance / 1e3:.0f} km from its centre"
     )
-
-
-def _epochs(rows: list[tuple[str, Orbit]], origin: Time) -> Array:
-    """Epochs, s (TDB) from `origin`; whole days first, so that no digit is lost."""
-    zero = origin.tdb
-    # Asteroids of a catalogue share few epochs, and reading a Time is slow.
-    epochs = {id(orbit.epoch): orbit.epoch for _, orbit in rows}
-    known = {key: (t.jd1, t.jd2) for key, t in epochs.items()}
-    pairs = np.array([known[id(orbit.epoch)] for _, orbit in rows]).reshape(-1, 2)
-    return ((pairs[:, 0] - zero.jd1) + (pairs[:, 1] - zero.jd2)) * DAY
-
-
-def _states(rows: list[tuple[str, Orbit]], window: Window, epochs: Array) -> Array:
-    """Barycentric states at the epochs, shape (n, 6), m and m/s."""
-    out = np.empty((len(rows), 6))
-    centres = np.array([orbit.centre for _, orbit in rows], dtype=object)
-    for i, (_, orbit) in enumerate(rows):
-        out[i, :3] = orbit.position.to_value(u.m)
-        out[i, 3:] = orbit.velocity.to_value(_SPEED)
-    barycentric = centres == "ssb"
-    if barycentric.any():
-        out[barycentric] += barycentre_in(window, epochs[barycentric])
-    for centre in set(centres) - {"ssb"}:
-        where = centres == centre
-        out[where] += window.states(BODIES.index(centre), epochs[where])
-    return out
-
-
-def _twins(window: Window, epochs: Array, states: Array) -> dict[int, str]:
-    """Numbers and names of the orbits that are those of massive asteroids."""
-    out = {}
-    for k, name in enumerate(BELT, N_BODIES):
-        away = states - window.states(k, epochs)
-        near = (np.linalg.norm(away[:, :3], axis=1) < TWIN_DISTANCE) & (
-            np.linalg.norm(away[:, 3:], axis=1) < TWIN_SPEED
-        )
-        out.update(dict.fromkeys(np.flatnonzero(near).tolist(), name))
-    return out
-
-
-def _forces_used(
-    chosen: tuple[str, ...], shares: Array, least: float
-) -> tuple[tuple[str, ...], dict[str, float], dict[str, float]]:
-    """Forces used for at least one asteroid, their largest displacements (km) where known, and those of the others."""
-    largest = {name: float(v) for name, v in zip(NAMES, shares.max(axis=0, initial=0.0), strict=True) if name}
-    out = {name for name, value in largest.items() if value < least and name in chosen and len(shares)}
-    kept = tuple(n for n in chosen if n not in out)
-    share, left_out = ({n: largest[n] / 1e3 for n in some if n in largest} for some in (kept, sorted(out)))
-    return kept, share, left_out
-
-
-def _table(
-    rows: list[tuple[str, Orbit]],
-    raw: Array,
-    contacts: Array,
-    origin: Time,
-    window: Window,
-    meta: dict[str, Any],
-) -> QTable:
-    """The result; `contacts` holds times (s) and relative states: closest approaches, or entries of impacts."""
-    index = raw[:, 11].astype(int)
-    gm = window.gm[raw[:, 0].astype(int)]
-    hits = raw[:, 10] > 0.0
-    speed2 = raw[:, 9] + 2.0 * gm / raw[:, 8]
-    b, _ = target_plane(raw[:, 2:8], gm)
-    out = QTable()
-    out["asteroid"] = np.array([rows[i][0] for i in index], dtype=str)
-    out["planet"] = np.array([BODIES[int(b)] for b in raw[:, 0]], dtype=str)
-    zero = origin.tdb
-    out["time"] = Time(np.full(len(raw), zero.jd1), zero.jd2 + raw[:, 1] / DAY, format="jd", scale="tdb")
-    out["distance"] = (raw[:, 8] * u.m).to(u.km)
-    out["v_rel"] = (np.sqrt(np.maximum(speed2, 0.0)) * u.m / u.s).to(u.km / u.s)
-    out["v_inf"] = (np.sqrt(np.maximum(raw[:, 9], 0.0)) * u.m / u.s).to(u.km / u.s)
-    out["b_t"], out["b_r"] = (b[:, 0] * u.m).to(u.km), (b[:, 1] * u.m).to(u.km)
-    out["impact"] = hits
-    out["index"] = index
-    out["position"] = (contacts[:, 1:4] * u.m).to(u.km)
-    out["velocity"] = (contacts[:, 4:] * u.m / u.s).to(u.km / u.s)
-    if hits.any():
-        at_earth = hits & (out["planet"] == "earth")
-        places = np.full((len(raw), 2), np.nan)
-        when = Time(zero.jd1, zero.jd2 + contacts[:, 0] / DAY, format="jd", scale="tdb")
-        if at_earth.any():
-            places[at_earth] = geographic(contacts[at_earth, 1:4], when[at_earth])
-        out["entry_time"] = np.where(hits, when.isot, "")
-        out["entry_longitude"], out["entry_latitude"] = places[:, 0] * u.deg, places[:, 1] * u.deg
-    out.meta = meta
-    return out
 
 
 def _objects(objects: Any) -> list[tuple[str, Orbit]]:
