@@ -311,7 +311,7 @@ def integrators(n: int, seed: int) -> Counter[str]:
         names = [name for name, _, _ in run.events]
         count["with flow"] += yielded
         count["beyond the model"] += run.reason == "beyond model"
-        if run.reason == "beyond model":  # where the other goes on
+        if run.reason == "beyond model":  # where the other integrator continues
             continue
         if coarse is None or fine is None:
             count["event-free not converged"] += 1

@@ -95,7 +95,7 @@ def matches(listed: dict[str, np.ndarray], index: np.ndarray, jd: np.ndarray) ->
 
 
 def stages(count: int = 1000) -> None:
-    """Print rate and losses of the search by the error asked for, on orbits drawn at random.
+    """Print speed and missed encounters of the search by the allowed error, on random orbits.
 
     A first pass with a large error would flag asteroids for the full search, from the epoch to the last one flagged.
     """

@@ -168,7 +168,7 @@ def _jd(text: str) -> Time:
 
 
 def main(arguments: list[str]) -> int:
-    """Print the tables that were asked for, by default all."""
+    """Print the requested tables, by default all."""
     known = {"planets": planets, "tracks": tracks}
     for name in arguments or list(known):
         if name not in known:

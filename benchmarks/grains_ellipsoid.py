@@ -41,7 +41,7 @@ OUTCOMES = ("kept", "moved", "lost")
 
 
 class Case(NamedTuple):
-    """A flyby, and what it belongs to."""
+    """A flyby of the comparison."""
 
     body: fs.Body
     encounter: fs.Encounter

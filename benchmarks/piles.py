@@ -66,7 +66,7 @@ def grains() -> None:
                     if beyond
                     else f"{a[i, 1] / a[i, 0]:.3f} {a[i, 2] / a[i, 0]:.3f} {period:6.2f}  "
                 )
-                if q >= 2.1:  # equal volumes: ln a1 = -ln(ratios)/3; 6:1 stands for what is beyond
+                if q >= 2.1:  # equal volumes: ln a1 = -ln(ratios)/3; 6:1 is used for larger ratios
                     misfit.append(np.log(b * c) / 3.0 - np.log(a[i, 1] * a[i, 2] / a[i, 0] ** 2) / 3.0)
             print(f"{surface:26s} {phi:4.0f}  {'  '.join(cells)}  {np.sqrt(np.mean(np.square(misfit))):.3f}")
 

@@ -176,12 +176,12 @@ def throughput() -> None:
 
 
 def nowhere(asteroid: Asteroid, settings: Settings) -> list[Passage]:
-    """No passage: what is left is the overhead of a task."""
+    """No encounter: measures the overhead of a task."""
     return []
 
 
 class Rows(Screening):
-    """Rows that cost nothing: what is left is the journal and the writing."""
+    """Rows without computation: measures the journal and the writing of tables."""
 
     def results(self, *args: Any, skip: Any = (), **kwargs: Any) -> Iterator[tuple[int, dict[str, Any]]]:
         """The first asteroid's row for all of them; each pair ends in the wrong order."""

@@ -1,4 +1,4 @@
-"""What each force is worth for the 2029 passage of Apophis, as a table.
+"""Effect of each force on the 2029 encounter of Apophis, as a table.
 
 Usage: ``python benchmarks/sky.py apophis``. Reference data are read from ``../shared/data`` (or
 ``$FLYBYSTAB_SHARED/data``); nothing is downloaded. Accuracy and speed over many asteroids: ``flybystab bench sky``.

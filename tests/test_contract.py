@@ -42,7 +42,7 @@ def test_stability(body):
     assert s.stable_infinitesimal
     for orders in (s.critical_strain, s.critical_energy):
         assert all(getattr(orders, name) > 0 for name in ("second", "third", "barrier"))
-    assert s.kappa_crit is None  # associative by default: kappa has no say
+    assert s.kappa_crit is None  # associative by default: kappa has no effect
 
 
 def test_flyby(body):

@@ -1,4 +1,4 @@
-"""Every example runs, and one number of each is held against what it must be."""
+"""Every example runs, and one number of each is compared with an independent value."""
 
 import re
 import runpy
@@ -96,7 +96,7 @@ def test_survival_of_real_clones(monkeypatch, tmp_path):
     assert names["least"] == pytest.approx(0.025 ** (1 / 300), abs=1e-6)  # Clopper-Pearson with all of n
     spread = {what: np.ptp(values) for what, values in names["ratio"].items()}
     assert spread["orbit alone"] < 0.01 * spread["orbit and attitude"]
-    # the tide goes as the third power of the distance, and with it about what it does to the spin
+    # the tide, and approximately the change of the spin, is proportional to the inverse cube of the distance
     q = names["clones"].distance
     change = names["ratio"]["orbit alone"] - 1.0
     assert 0.3 < np.ptp(change) / abs(np.mean(change)) / (3 * float(np.ptp(q) / np.mean(q))) < 3.0

@@ -1,4 +1,4 @@
-"""Public functions end in a result or a named error, whatever their arguments; more calls: benchmarks/attack.py."""
+"""Public functions end in a result or a named error, for any arguments; more calls: benchmarks/attack.py."""
 
 import pytest
 

@@ -1,4 +1,4 @@
-"""``flybystab bench sky`` on a few asteroids: what its tables say is what was measured."""
+"""``flybystab bench sky`` on a few asteroids: its tables hold the measured values."""
 
 import numpy as np
 import pytest

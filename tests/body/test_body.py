@@ -1,4 +1,4 @@
-"""A body is what it was when it was made, and takes nothing that it could misread."""
+"""A body does not change after its construction, and ambiguous values are rejected."""
 
 import pickle
 

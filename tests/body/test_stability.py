@@ -384,7 +384,7 @@ def test_bad_input_is_named():
 
 
 def test_bodies_at_yield_that_flow_on_are_not_stable_to_infinitesimal_perturbations():
-    """Axes 1 : .691 : .155, w2 = .254, exactly the friction that it needs: the dynamics carry it far away."""
+    """Axes 1 : .691 : .155, w2 = .254, exactly the required friction: in the dynamics it moves far from its shape."""
     b = body((1, 0.691, 0.155), 0.254, yield_surface="drucker-prager")
     enough = equilibrium(b).required_friction_angle * (1 + 1e-9)
     b = b.with_(material=b.material.with_(friction_angle=enough))

@@ -39,7 +39,7 @@ def test_extremes_are_those_of_the_slope_change(history):
 def test_normal_and_tangential_parts_are_the_effective_acceleration(history):
     slope = history.slope.to_value(u.rad)
     assert -history.outward.value == pytest.approx(history.acceleration.value * np.cos(slope), rel=1e-9)
-    # the first row by hand: gravity of the polyhedron, centrifugal acceleration and a small tide
+    # the first row from its terms: gravity of the polyhedron, centrifugal acceleration and a small tide
     gravity = SHAPE.gravity(SHAPE.centroids, PILE.density)[1].value
     w = PILE.omega
     centrifugal = -np.cross(w, np.cross(w, SHAPE.centroids.value))

@@ -350,7 +350,7 @@ def test_the_total_mass_is_the_sum_of_the_planets():
 
 @pytest.mark.parametrize("kind", ["BKEP", "BCOM", "BCART", "CART", "KEP", "COM", "CAREQ"])
 def test_every_format_gives_the_same_orbit(tmp_path, kind):
-    """The orbit of sorcha_kep.csv written in each FORMAT by two-body formulas of its own."""
+    """The orbit of sorcha_kep.csv written in each FORMAT by independent two-body formulas."""
     from flybystab.catalogues.readers.conversion import heliocentric_state
     from flybystab.orbit.elements import GM_SUN, ecliptic_to_icrf, elements_from_state
 

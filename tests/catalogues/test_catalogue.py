@@ -278,7 +278,7 @@ def test_the_script_rebuilds_the_embedded_file(tmp_path):
         check=True,
         capture_output=True,
     )
-    # Elements computed on the way differ in their last digits by the processor and its mathematical library.
+    # The last digits of computed elements depend on the processor and its mathematical library.
     built, kept = (list(csv.reader(p.open(encoding="utf-8"))) for p in (out, REPO / "data" / "asteroids.csv"))
     assert [len(row) for row in built] == [len(row) for row in kept]
     for new, old in zip(itertools.chain(*built), itertools.chain(*kept), strict=True):

@@ -45,7 +45,7 @@ def test_classes_are_those_of_the_mpc():
 
 
 def test_mean_motion_gives_the_axis_its_digits():
-    """JPL's axis of Apophis: eight digits of n are worth more than seven of a."""
+    """JPL's axis of Apophis: eight digits of n determine it better than seven of a."""
     truth = fs.Asteroid.from_catalogue("Apophis")
     assert float(truth.row["epoch_jd_tdb"]) == 2461000.5
     a = float(truth.row["a_au"])

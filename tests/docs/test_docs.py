@@ -1,4 +1,4 @@
-"""Documentation that can be run is run, and what it names exists."""
+"""The code in the documentation runs, and the objects that it names exist."""
 
 import re
 from pathlib import Path

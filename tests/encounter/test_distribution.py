@@ -32,7 +32,7 @@ def impactor(miss, sigma, distance=1.3e6):
     )
 
 
-#: Speed far away, and misses to target-plane points: B = miss v/v_inf. The tides of Sun and Moon shift all of
+#: Hyperbolic excess speed, and misses to target-plane points: B = miss v/v_inf. The tides of Sun and Moon shift all of
 #: them alike, by 0.2 thousand km: the middle is taken from the nominal orbit.
 V_INF = np.sqrt(SPEED**2 - 2 * EARTH.gm * 1e-9 / 1.3e6)
 SCALE = SPEED / V_INF

@@ -75,7 +75,7 @@ def test_a_whole_body_has_all_of_its_margins():
     assert m.strain >= np.log(2405.551 / 1400) - 1e-6
     assert m.nearest[0] == "axis ratio"
     assert m.relative["axis ratio"] == pytest.approx(1 - ratio / 6.0)
-    # the same without a history, which is then made when it is asked for
+    # the same without a history, which is then computed on access
     again = flyby(PILE, earth(2.0), history=False).margins
     assert again.axis_ratio == pytest.approx(ratio)
 
@@ -132,7 +132,7 @@ def test_one_more_class_is_one_more_entry(monkeypatch):
 
 
 def test_the_classes_are_those_of_a_flyby(monkeypatch):
-    """Both routes ask the one table: a body that flowed, all of it bound, belongs to its first class."""
+    """Both functions use the one table: a body that flowed, all of it bound, belongs to the first class."""
     assert flyby(PILE, earth(2.2)).verdict == flyby_many([PILE], [earth(2.2)]).verdict[0] == "RESHAPED"
     monkeypatch.setattr(verdicts, "CLASSES", [MassClass(Verdict.DISRUPTED, "S", -np.inf)])
     r = flyby(PILE, earth(2.2))

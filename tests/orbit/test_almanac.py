@@ -45,7 +45,7 @@ def test_places_are_those_of_the_ephemeris(name, start, days):
         places_at(book, t, out)
         for b in range(N_ALL):
             truth = window.states(b, np.array([t]))[0, :3]
-            # the asteroids' table has kinks of its own of up to 60,000 km
+            # the table of the asteroids itself has kinks of up to 60,000 km
             assert np.abs(out[b] - truth).max() < (0.05 if b < N_BODIES else 1e8)
 
 

@@ -1,4 +1,4 @@
-"""Clones of an orbit: the distribution that was asked for, the epoch of the covariance, published errors."""
+"""Clones of an orbit: their distribution, the epoch of the covariance, published errors."""
 
 from dataclasses import replace
 
@@ -103,7 +103,7 @@ def test_states_of_a_covariance_are_those_of_orbits_with_its_frame_and_centre(ki
 @pytest.mark.parametrize("centre", ["sun", "ssb"])
 @pytest.mark.parametrize("frame", ["ecliptic", "ICRF"])
 def test_sigma_points_have_the_covariance_of_the_state(kind, centre, frame):
-    """The columns of the sigma points, turned to the frame by hand, against a covariance converted as a whole."""
+    """The columns of the sigma points, rotated to the frame explicitly, against a covariance converted as a whole."""
     plain = random_covariance(kind)
     made = replace(plain, frame=frame, centre=centre)
     orbit = replace(apophis(), epoch=EPOCH, centre=centre, covariance=made)

@@ -1,4 +1,4 @@
-"""A body and an ephemeris are one new entry each: nothing else is edited."""
+"""A body and an ephemeris are one new entry each, without any other change."""
 
 import os
 import subprocess
@@ -30,7 +30,7 @@ def fresh():
 
 
 def excerpt(path, pairs=None):
-    """Eighty days of DE421 as a file of its own."""
+    """Eighty days of DE421 in a separate file."""
     source = SPK.open(str(need_ephemeris("de421").path))
     summaries = [
         (name, values)
@@ -71,7 +71,7 @@ def test_an_ephemeris_that_lacks_a_body_is_refused(tmp_path, monkeypatch, fresh)
 
 
 def test_a_body_without_an_ephemeris(monkeypatch):
-    """Enough for a hyperbolic encounter; one on a real orbit says that the place of the body is not known."""
+    """Sufficient for a hyperbolic encounter; one on a real orbit raises an error, since the position is not known."""
     body = planets.Planet("eris", 1.108e12, 1.163e6, 0.0, (0.0, 0.0, 1.0), 0.0, 136199, 1e13)
     monkeypatch.setitem(planets.PLANETS, "eris", body)
     encounter = Encounter.hyperbolic("eris", 2e6 * u.m, 3 * u.km / u.s)

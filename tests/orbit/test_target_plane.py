@@ -1,4 +1,4 @@
-"""Target plane against two-body motion seen from far away, and the same in tables and encounters."""
+"""Target plane against two-body motion far from the planet, and the same in tables and encounters."""
 
 import astropy.units as u
 import numpy as np

@@ -65,7 +65,7 @@ def test_a_body_of_no_spin_touches_at_its_half_width():
     """Faces of the body along the axes of the orbit: the height at which it touches is a semi-axis, to a centimetre."""
     for axis, turn in ((0, np.eye(3)), (1, Rotation.from_euler("z", 90, degrees=True).as_matrix())):
         reach = float(STICK.axes[axis])
-        # it turns with the tide and the planet turns under it by 1e-2 on the way down: 2e-4 of its length
+        # the tide turns the body, and the planet moves by 1e-2 during the fall: 2e-4 of its length
         assert flyby(STICK, moon(reach - 2.0), attitude=turn).verdict == "IMPACT"
         assert flyby(STICK, moon(reach + 2.0), attitude=turn).verdict == "INTACT"
 
@@ -98,7 +98,7 @@ def test_contact_is_where_an_independent_course_touches(period):
 
 
 def test_a_flowing_body_touches_with_its_shape_of_then():
-    """Drawn out by the tide on the way in, it touches from higher than its first long semi-axis; a rigid one passes."""
+    """Stretched by the tide, the body touches from above its initial long semi-axis, where a rigid one passes."""
     floor = PLANETS["earth"].impact_distance
     passing = Encounter.hyperbolic("earth", floor * u.m + 1.6 * u.km, 1 * u.km / u.s)
     turn = Rotation.from_euler("z", 75, degrees=True)

@@ -1,4 +1,4 @@
-"""Figures: what they show is what was computed, with units on the axes, and maps agree with single flybys."""
+"""Figures show the computed values, with units on the axes; maps agree with single flybys."""
 
 import astropy.units as u
 import numpy as np

@@ -104,7 +104,7 @@ def test_spin_barrier_and_failure_have_both_panels():
     assert "oblate" in flat.get_xlabel()
     assert "prolate" in long.get_xlabel()
     styles = {(line.get_color(), line.get_linestyle()) for line in flat.lines if "°" in str(line.get_label())}
-    assert len(styles) == 6  # told apart in grey, too
+    assert len(styles) == 6  # distinguishable in greyscale
     assert [a.get_title() for a in barrier_figure(body()).axes] == [
         "volume-preserving flow",
         "associative flow",

@@ -1,4 +1,4 @@
-"""A catalogue by structural stability is what its bodies are one by one."""
+"""The structural stability of a catalogue agrees with that of its bodies one by one."""
 
 import astropy.units as u
 import numpy as np

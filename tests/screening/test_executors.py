@@ -44,7 +44,7 @@ def alive(pid):
         os.kill(pid, 0)
     except ProcessLookupError:
         return False
-    # killed, and nobody has asked for its status yet
+    # killed, and its exit status has not been read yet
     return Path(f"/proc/{pid}/stat").read_text().split()[2] != "Z" if Path("/proc").is_dir() else True
 
 

@@ -1,4 +1,4 @@
-"""Samples that grains carry on: the same rows whatever the executor, one unit of the journal a sample."""
+"""Samples computed by grains: the rows do not depend on the executor, and each sample is one unit of the journal."""
 
 import json
 from concurrent.futures import ThreadPoolExecutor

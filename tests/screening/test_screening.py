@@ -146,7 +146,7 @@ def test_samples_may_be_split_at_will():
 
 
 def test_a_deep_passage_is_work_for_every_worker():
-    """The parts of one asteroid's samples are calls of their own, each of them small."""
+    """The samples of one asteroid are computed in separate small calls."""
 
     sizes = []
 
@@ -340,7 +340,7 @@ def test_finished_tables_are_not_overwritten_unasked(tmp_path):
     other = screening(3, samples=2, seed=9)
     other.run(out, overwrite=True)
     assert read_results(out).meta["settings"]["seed"] == 9
-    # A run that was stopped goes on over its own table, and only over its own.
+    # An interrupted run is resumed over its own table, and only over its own.
 
     def interrupt(state):
         if state.done:
@@ -386,7 +386,7 @@ def test_row_groups_are_appended_while_tasks_end(tmp_path, monkeypatch):
 @pytest.mark.parametrize("suffix", ["ecsv", "parquet"])
 @pytest.mark.parametrize("limit", [2_000, 9_000, 12_500])
 def test_a_disk_that_fills_up_in_the_middle_keeps_what_is_done(tmp_path, limit, suffix, monkeypatch):
-    """A limit on the size of files stands for the disk; it hits the journal, or the table."""
+    """A limit on the size of files simulates a full disk, for the journal or the table."""
     resource = pytest.importorskip("resource")
     if suffix == "parquet":
         pytest.importorskip("pyarrow")

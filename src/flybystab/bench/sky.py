@@ -38,7 +38,7 @@ YEARS = (0.6, 10.0)
 
 
 def rows(figure: str | Path | None = None, asteroids: int = 500) -> list[dict[str, Any]]:
-    """Rows of three tables, told apart by ``table``: ``accuracy``, ``outlier``, ``speed``."""
+    """Rows of three tables, named in the column ``table``: ``accuracy``, ``outlier``, ``speed``."""
     known = orbits()
     out: list[dict[str, Any]] = []
     for name in ("de421", "de440"):

@@ -250,7 +250,7 @@ class Pile:
     spin: Quantity | None = field(default=None, kw_only=True)
     material: Material | None = field(default=None, kw_only=True)
 
-    body: Body = field(init=False, repr=False)  #: the ellipsoid that stands for the pile
+    body: Body = field(init=False, repr=False)  #: the equivalent ellipsoid of the pile
     sizes: GrainSizes = field(init=False, repr=False)
 
     def __post_init__(self) -> None:

@@ -205,7 +205,7 @@ def _read_tab(data: bytes) -> Mesh:
     vertices = np.array([row[1:4] for row in rows[1 : 1 + nv]])
     numbers = [int(row[0]) for row in rows[1 : 1 + nv]]
     rest = rows[1 + nv :]
-    if len(rows[0]) == 1:  # the number of facets has a line of its own
+    if len(rows[0]) == 1:  # the number of facets is on a separate line
         nf, rest = int(rest[0][0]), rest[1:]
     else:
         nf = int(rows[0][1])

@@ -46,7 +46,7 @@ class StabilityTable:
     curvature_at_yield : ndarray
         ``Phi''/(p V)`` with the required friction mobilised.
     energy_second, energy_third, energy_barrier : Quantity
-        Least critical energy, J; in units of the binding energy in a map. nan where not asked for.
+        Least critical energy, J; in units of the binding energy in a map. nan where not computed.
     strain_second, strain_third, strain_barrier : ndarray
         Least critical strain at second order; the strains of least energy at the other two.
     """
@@ -64,7 +64,7 @@ class StabilityTable:
     strain_barrier: Array
 
     def names(self) -> NDArray[np.str_]:
-        """The levels in words."""
+        """Names of the levels."""
         return np.array([*LEVELS, "not a shape"])[self.level]
 
     def reshaped(self, shape: tuple[int, ...]) -> StabilityTable:

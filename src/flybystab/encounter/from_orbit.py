@@ -289,7 +289,7 @@ def _around(
         0.25,
         0.125,
         0.0625,
-    ):  # an encounter with the Moon on the way is shorter than that with the planet
+    ):  # an encounter with the Moon is shorter than that with the planet
         panels, miss = tide_panels(tide, t_in - zero, end - zero, tau, width=width)
         if miss < 1e-10:  # below lies the rounding of barycentric coordinates
             break

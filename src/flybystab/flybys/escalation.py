@@ -74,7 +74,7 @@ def handed_on(
     pile: Pile | None = None,
     progress: Progressing = None,
 ) -> FlybyResult:
-    """The result of the ellipsoid, or that of grains where they are needed or asked for.
+    """The result of the ellipsoid, or that of grains where they are needed or requested.
 
     They are needed past the largest axis ratio of the ellipsoid, for a loss of mass, and where the material of the
     ellipsoid is out of contact at the end. They are not run where the centre of the body reaches the ground.

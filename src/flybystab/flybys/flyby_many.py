@@ -196,7 +196,7 @@ def _fail(rows: Any) -> None:
 def _broadcast(
     bodies: Any, encounters: Any, attitudes: Any
 ) -> tuple[list[Body], list[Encounter], list[Any] | None]:
-    """The arguments as lists; a single body, encounter or rotation stands for all rows."""
+    """The arguments as lists; a single body, encounter or rotation is used for all rows."""
     if hasattr(attitudes, "as_matrix"):  # a scipy Rotation, of one or of many
         attitudes = attitudes.as_matrix()
     one_attitude = isinstance(attitudes, np.ndarray) and attitudes.shape == (3, 3)

@@ -62,7 +62,7 @@ RAD_S = u.rad / u.s
 
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class FlybyResult(Record):
-    """Outcome of an encounter. Quantities, history, body and margins are computed when they are first asked for.
+    """Outcome of an encounter. Quantities, history, body and margins are computed on first access.
 
     Attributes
     ----------

@@ -29,7 +29,7 @@ from flybystab.tabular import Record
 from flybystab.typing import Array
 from flybystab.units import brief, to_si
 
-#: Relative error of a step of the integration below the error asked for.
+#: Tolerance of the integration over the allowed error.
 STEP = 1e-2
 #: Relative distance of ``L^2/(2E)`` from a moment of inertia below which the spin counts as steady about that axis.
 STEADY = 1e-12
@@ -219,7 +219,7 @@ class _Motion:
     def followed(
         self, first: Array, *, octupole: bool, tolerance: float
     ) -> tuple[Array, tuple[float, float]]:
-        """State at the end of the encounter, and the largest torques of second and third moments on the way."""
+        """State at the end of the encounter, and the largest torques of second and third moments during it."""
         largest = [0.0, 0.0]
 
         def rate(t: float, y: Array) -> Array:

@@ -43,7 +43,7 @@ COLUMNS = (
     ("P(yield)", True),
     ("Margin (deg)", True),
 )
-#: Colour of each verdict (Okabe & Ito; told apart by the text beside it, too).
+#: Colour of each verdict (Okabe & Ito), which is also given as text.
 COLOURS = {
     Verdict.INTACT: "#009E73",
     Verdict.RESHAPED: "#F0E442",

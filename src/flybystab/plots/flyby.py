@@ -28,7 +28,7 @@ def _hours(history: History) -> Any:
 
 
 def _shade(axes: Any, history: History, labels: bool = False) -> None:
-    """Shade plastic flow (grey) and dispersal (hatched), with entries for the legend if asked for."""
+    """Shade plastic flow (grey) and dispersal (hatched), with entries for the legend if requested."""
     t = _hours(history)
     for regime, name, style in (
         ("flowing", "plastic flow", {"facecolor": "0.85"}),

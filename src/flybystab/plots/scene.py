@@ -138,7 +138,7 @@ def animation(
     *,
     progress: Progressing = None,
 ) -> Path:
-    """Write an animation: the path around the planet, and the body in a panel of its own.
+    """Write an animation: the path around the planet, and the body in a second panel.
 
     Parameters
     ----------

@@ -147,7 +147,7 @@ def free_rotation(asteroid: Asteroid, draw: Draws, phases: int = 720) -> Draws:
 
 
 def completed(asteroid: Asteroid, population: Population | None = None) -> Asteroid:
-    """The asteroid with the medians of the population for what its row lacks; its assumptions say so.
+    """The asteroid with the medians of the population for missing values, which are listed as assumptions.
 
     Raises
     ------

@@ -16,7 +16,7 @@ Tables = Mapping[str, tuple[Path, Mapping[str, Column]]]
 
 
 class Outputs:
-    """Tables that grow in the order of the tasks, whatever the order in which the tasks end.
+    """Tables written in the order of the tasks, independent of the order in which the tasks end.
 
     The rows of a task are appended as soon as all tasks before it are finished; those of tasks that end early stay in
     the journal, on disk. An unfinished table has a temporary name: after a kill the journal holds every row.

@@ -204,7 +204,7 @@ def verdicts_each(
     *,
     tolerance: float = 1e-7,
 ) -> SampleVerdicts:
-    """Verdicts on bodies, each in a passage of its own (arguments as of :func:`sample_verdicts`)."""
+    """Verdicts on bodies with a separate passage for each (arguments as of :func:`sample_verdicts`)."""
     return SampleVerdicts.joined(
         [
             sample_verdicts(p, draw.part(i, i + 1), attitudes.part(i, i + 1), material, tolerance=tolerance)

@@ -277,7 +277,7 @@ def _identity(path: Path) -> tuple[int, ...] | None:
 
 
 def move_into_place(part: Path, path: Path, replaced: tuple[int, ...] | None) -> None:
-    """Rename a complete file, unless a file other than `replaced` has its name by now.
+    """Rename a complete file, unless a file other than `replaced` has its name meanwhile.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""The quick margin against full dynamics: what it calls INTACT never yields."""
+"""The bound on yield against the full dynamics: a body that the bound calls INTACT never yields."""
 
 import runpy
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Kernels on disk follow the sources of all that they call."""
+"""Kernels on disk are recompiled if a source of any kernel that they call has changed."""
 
 import ast
 import os

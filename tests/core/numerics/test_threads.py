@@ -47,7 +47,7 @@ def test_searches_take_workers_and_the_old_keyword():
 
 @pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork on this system")
 def test_a_fork_while_threads_compute_is_warned_of():
-    """The child of such a fork may hang: in a process of its own, which ends in any case."""
+    """The child of such a fork may hang: tested in a separate process with a time limit."""
     import subprocess
     import sys
 

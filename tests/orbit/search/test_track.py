@@ -1,4 +1,4 @@
-"""The search inside an integration: looking changes nothing."""
+"""The search within an integration does not change the integration."""
 
 import astropy.units as u
 import numpy as np
@@ -27,7 +27,7 @@ def test_borrowed_rooms_are_apart():
 
 
 def test_refining_an_approach_does_not_move_the_asteroid():
-    """The same steps, whether other approaches on the way are refined or not: the same to the last bit."""
+    """The steps do not depend on whether other approaches are refined: identical to the last bit."""
     names = ("Apophis", "Eros", "Toutatis", "Anteros", "Phaethon", "Ganymed")
     orbits = [fs.Asteroid.from_catalogue(name).orbit for name in names]
     span = Time("2010-01-01", scale="tdb"), Time("2049-01-01", scale="tdb")
