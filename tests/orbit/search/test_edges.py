@@ -58,7 +58,7 @@ def test_an_epoch_at_the_passage_gives_one_row(found, after):
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
 def test_nothing_is_found_beyond_an_impact(sign):
-    """A vertical fall on the Earth; a search that begins after the impact raises an error, in both directions of time."""
+    """A vertical fall on the Earth; a search that begins after the impact raises an error, forward and backward."""
     need_ephemeris("de421")
     epoch = Time("2026-01-01", scale="tdb")
     down = Orbit.from_state(epoch, [1e9, 0.0, 0.0] * u.m, [-sign * 1e4, 0.0, 0.0] * u.m / u.s, centre="earth")
