@@ -17,7 +17,7 @@ from flybystab.body.surface_slope import SlopeChange, SurfaceSlopes
 from flybystab.encounter.distribution import EncounterDistribution
 from flybystab.encounter.linear_target_plane import ellipse
 from flybystab.flybys.binary import BinarySample
-from flybystab.flybys.grains_flyby import GrainsCourse, GrainsOutcome
+from flybystab.flybys.grains_outcome import GrainsCourse, GrainsOutcome
 from flybystab.flybys.spin_forecast import SpinForecast
 from flybystab.plots.flyby import BLACK, BLUE, ORANGE, RED
 from flybystab.typing import Array

@@ -17,7 +17,7 @@ from flybystab.encounter.distribution import EncounterDistribution
 from flybystab.errors import InvalidInput
 from flybystab.flybys.binary import BinarySample
 from flybystab.flybys.critical import CriticalValues
-from flybystab.flybys.grains_flyby import GrainsCourse, GrainsOutcome
+from flybystab.flybys.grains_outcome import GrainsCourse, GrainsOutcome
 from flybystab.flybys.history import History
 from flybystab.flybys.outcome_map import OutcomeMap, TargetMap
 from flybystab.flybys.result import FlybyResult

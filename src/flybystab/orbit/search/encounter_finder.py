@@ -251,9 +251,7 @@ def _planets_within(planets: Sequence[str], within: Quantity) -> tuple[list[Plan
     return found, np.broadcast_to(reach, (len(found),)).astype(float)
 
 
-def _integrated(
-    job: _Search, workers: int, progress: bool | Callable[[int, int, int], None] | None
-) -> Array:
+def _integrated(job: _Search, workers: int, progress: bool | Callable[[int, int, int], None] | None) -> Array:
     """Rows of all encounters, sorted by asteroid and time."""
     total, own = len(job.rows), job.forces.own
     # Parts small enough for an even load of the threads, large enough for a small overhead of Python.
