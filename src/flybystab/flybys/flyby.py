@@ -21,7 +21,7 @@ from flybystab.flybys.batch import (
     one_row,
     step_tolerance,
 )
-from flybystab.flybys.grains_flyby import handed_on, request
+from flybystab.flybys.escalation import handed_on, request
 from flybystab.flybys.inputs import FlybyInputs
 from flybystab.flybys.result import FlybyResult
 from flybystab.flybys.rigid_course import check_tension
