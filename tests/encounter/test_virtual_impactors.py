@@ -54,7 +54,7 @@ def test_the_chord_through_the_disc(miss):
 def test_no_impact_is_an_empty_table():
     found = fs.virtual_impactors(impactor((120e3, 2e3), (1e3, 1.0)), EPOCH, later(EPOCH, 3 * DAY), n=21)
     assert len(found) == 0
-    assert found.colnames == ["time", "distance", "sigma", "stretching", "width", "probability"]
+    assert found.colnames == ["time", "distance", "sigma", "stretching", "width", "probability", "v_inf"]
 
 
 def test_2024_yr4_and_the_moon(shared):

@@ -63,3 +63,21 @@ def test_slow_passage_by_rebound(events, orbits):
     enc = Encounter.from_orbit(orbits["2020 MB"], "earth", near, ephemeris="de421")
     assert abs(enc.time.jd - float(event["jd"])) < 60 / 86400
     assert abs(enc.distance.to_value(u.au) - float(event["dist"])) < 1e-8
+
+
+def test_rows_whose_listed_time_is_not_the_minimum(shared):
+    """Three rows are 29 to 40 minutes from the least distance; at the listed time the distances agree."""
+    need_ephemeris("de440")
+    names = ("2020 CR2", "2020 BH10", "2020 HT7")
+    with gzip.open(shared / "cad_earth_2020_jan_jun.csv.gz", "rt") as file:
+        rows = [r for r in csv.DictReader(file) if r["des"] in names and float(r["dist"]) < 0.01]
+    with gzip.open(shared / "nea_sbdb_fullprec_2020-09.csv.gz", "rt") as file:
+        known = {r["pdes"]: sbdb_orbit(r) for r in csv.DictReader(file) if r["pdes"] in names}
+    assert {r["des"] for r in rows} == set(names)
+    for row in rows:
+        time = Time(float(row["jd"]), format="jd", scale="tdb")
+        position, velocity = known[row["des"]].at(time, "earth", "de440")
+        gap = np.linalg.norm(position).to_value(u.km) - float(row["dist"]) * u.au.to(u.km)
+        assert abs(gap) < 0.1, row["des"]
+        late = (-(position @ velocity) / (velocity @ velocity)).to_value(u.s)
+        assert abs(late) > 1500.0, row["des"]

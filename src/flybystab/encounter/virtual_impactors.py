@@ -10,6 +10,7 @@ be found.
 
 from __future__ import annotations
 
+import warnings
 from typing import Any
 
 import astropy.units as u
@@ -20,7 +21,7 @@ from astropy.units import Quantity
 
 from flybystab.constants import DAY
 from flybystab.encounter.linear_target_plane import disc_probability
-from flybystab.errors import InvalidInput
+from flybystab.errors import InaccurateOrbit, InvalidInput
 from flybystab.orbit.covariance import PUSHES, Covariance
 from flybystab.orbit.ephemeris import Ephemeris
 from flybystab.orbit.orbit import Orbit, deviated, later, seconds
@@ -63,7 +64,9 @@ class _Line:
         steps = _SMALL * covariance.factor.T
         ahead, back = (covariance.deviations(covariance.values + s * steps) for s in (1.0, -1.0))
         states, pushes = ((0.5 * (x - y) / _SMALL).T for x, y in zip(ahead, back, strict=True))
-        change = self.orbit.state_transition(time, self.eph)
+        with warnings.catch_warnings():  # a direction does not need the state to a kilometre
+            warnings.simplefilter("ignore", InaccurateOrbit)
+            change = self.orbit.state_transition(time, self.eph)
         moved = change.matrix[:3] @ states + change.parameters[:3] @ pushes
         return np.asarray(np.linalg.svd(moved)[2][0])
 
@@ -132,7 +135,8 @@ def virtual_impactors(
     QTable
         A row for each possible impact, in order of time: ``time`` (TDB) and ``distance`` (km; two-body, without a
         surface) of the closest orbit on the line, ``sigma`` (its position on the line), ``stretching`` (km of the
-        target plane for one sigma along the line), ``width`` (km, standard deviation across it), ``probability``.
+        target plane for one sigma along the line), ``width`` (km, standard deviation across it), ``probability``,
+        ``v_inf`` (km/s).
         Impacts whose part of the line is shorter than the distance of two orbits can be missed.
 
     Raises
@@ -169,6 +173,7 @@ def virtual_impactors(
         values = np.array([r[name] for r in rows], dtype=float)
         out[name] = values if unit is None else (values * u.m).to(unit)
     out["probability"] = np.array([r["probability"] for r in rows], dtype=float)
+    out["v_inf"] = (np.array([r["v_inf"] for r in rows], dtype=float) * u.m / u.s).to(u.km / u.s)
     out.meta = {
         "planet": body.name,
         "orbits": count,
@@ -243,6 +248,7 @@ def _impact(
         "sigma": sigma,
         "stretching": stretch,
         "width": float(np.sqrt(across @ covariance @ across)),
+        "v_inf": float(best[4]),
         "probability": disc_probability(best[2:4] - matrix @ z0, covariance, disc),
     }
 
