@@ -1,7 +1,7 @@
 """First answer on a fresh machine: processor time of the compilation, by kernel, and of the same command afterwards.
 
 Each case runs in a process of its own with an empty folder for kernels. The times of a kernel leave out the kernels
-that it calls. On two idle cores the wall time is that of the processor; loading from the disk is not included.
+that it calls; what a second process compiles meanwhile (:mod:`flybystab.flybys.precompile`) is not included.
 """
 
 from __future__ import annotations
