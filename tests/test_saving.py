@@ -70,6 +70,7 @@ MAKERS = {
     "Recovery": lambda: pushed(body(), np.diag([1.0, 0.0, -1.0]), 1e10 * u.J),
     "RecoveryLimit": lambda: fs.recovery(body(), directions=2, refinements=1, searches=2, precision=0.5),
     "Requirements": lambda: fs.requirements(body(), density_sigma=200 * u.kg / u.m**3, samples=5),
+    "CohesionBounds": lambda: fs.cohesion_bounds(body()),
     "ElasticStress": lambda: fs.elastic_stress(body()),
     "YieldRegion": lambda: fs.elastic_stress(body()).yield_region(),
     "ElasticChange": lambda: fs.elastic_change(body(), encounter()),

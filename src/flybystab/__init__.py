@@ -21,6 +21,7 @@ _HOME = {
     "Asteroid": "catalogues.asteroid",
     "BinarySample": "flybys.binary",
     "Body": "body.body",
+    "CohesionBounds": "body.limit_analysis",
     "Covariance": "orbit.covariance",
     "CriticalValues": "flybys.critical",
     "DisruptionRates": "population.verdict_rates",
@@ -65,6 +66,7 @@ _HOME = {
     "bound_fraction": "flybys.verdict",
     "catalogue": "catalogues.catalogue",
     "cite": "io.citation",
+    "cohesion_bounds": "body.limit_analysis",
     "critical": "flybys.critical",
     "density_intervals": "body.bounds",
     "disruption_rates": "population.disruption",
@@ -78,6 +80,7 @@ _HOME = {
     "flyby": "flybys.flyby",
     "flyby_many": "flybys.flyby_many",
     "flyby_margin": "flybys.margin",
+    "fresh_fraction": "population.freshness",
     "freshness": "population.freshness",
     "infer": "screening.inference",
     "known_population": "population.model_population",
@@ -120,6 +123,7 @@ if TYPE_CHECKING:
     from flybystab.body.bounds import Requirements, density_intervals, requirements
     from flybystab.body.elastic_stress import ElasticStress, elastic_stress
     from flybystab.body.equilibrium import Equilibrium, equilibrium, failure_distance, spin_limits
+    from flybystab.body.limit_analysis import CohesionBounds, cohesion_bounds
     from flybystab.body.pile import Pile, PileState, make_pile
     from flybystab.body.recovery import RecoveryLimit, recovery, recovery_energy
     from flybystab.body.roche_lobe import roche_lobe
@@ -166,7 +170,7 @@ if TYPE_CHECKING:
     from flybystab.plots.results import plot_result
     from flybystab.plots.shape_map import shape_map, slope_change_figure
     from flybystab.population.disruption import disruption_rates
-    from flybystab.population.freshness import freshness
+    from flybystab.population.freshness import fresh_fraction, freshness
     from flybystab.population.model_population import known_population, read_population
     from flybystab.population.rates import EncounterRates, encounter_rates
     from flybystab.population.verdict_rates import DisruptionRates

@@ -30,6 +30,7 @@ from flybystab.body.equilibrium import tide_components
 from flybystab.constants import G
 from flybystab.core.ellipsoid.rigid_stress import overload, rigid_stress
 from flybystab.core.ellipsoid.tide import COMPONENTS
+from flybystab.tabular import Record
 from flybystab.typing import Array
 from flybystab.units import brief
 
@@ -42,7 +43,7 @@ SHARPNESS = (10.0, 50.0, 250.0)
 
 
 @dataclass(frozen=True)
-class CohesionBounds:
+class CohesionBounds(Record):
     """Cohesion that keeps an ellipsoid from failing anywhere.
 
     Attributes
