@@ -19,6 +19,7 @@ def test_a_module_is_found_by_its_place(tmp_path, monkeypatch):
     (tmp_path / "another_publisher.py").write_text(MODULE)
     file = tmp_path / "orbits.any"
     file.write_text("MINE Own Other")
+    readers.reader_names()  # registers the modules of the package in its own table
     monkeypatch.setattr(readers, "READERS", dict(readers.READERS))
     monkeypatch.setattr(readers, "__path__", [*readers.__path__, str(tmp_path)])
     readers._load.cache_clear()
