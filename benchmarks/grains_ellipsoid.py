@@ -1,22 +1,27 @@
 """What grains say of the ellipsoid: random flybys of piles beside the ellipsoid on several yield surfaces.
 
-python benchmarks/grains_ellipsoid.py cases [--cases N] [--grains N] [--minutes M]    table over random flybys
-python benchmarks/grains_ellipsoid.py map [--grains N]                               outcomes over periapsis and v_inf
+python benchmarks/grains_ellipsoid.py cases [--cases N] [--grains N] [--minutes M] [--jobs J]   random flybys
+python benchmarks/grains_ellipsoid.py map [--grains N]                          outcomes over periapsis and v_inf
 
 Cases: Earth, Venus or Jupiter; elongation a1/a3 of 1 to 3; spin about the short axis or tumbling; cohesion none or 0
-to 50 Pa; friction of 30 to 40 deg; one pile a case. A case is determined by its number: longer runs only add cases.
-With ``--minutes`` the run ends in time and says how many cases it has.
+to 50 Pa; friction of 30 to 40 deg; one pile a case. A case is determined by its number. Finished cases are kept in
+``out/grains_cases_N.csv`` (N grains), so that a run that was stopped, by ``--minutes`` or otherwise, continues with
+the next case and the table covers all finished ones.
 """
 
 from __future__ import annotations
 
 import argparse
 import time
+from concurrent.futures import FIRST_COMPLETED, ProcessPoolExecutor, wait
+from itertools import islice
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import astropy.units as u
 import numpy as np
 from scipy.spatial.transform import Rotation
+from scipy.stats import binomtest
 
 import flybystab as fs
 from flybystab.bench.grains import body, earth
@@ -25,6 +30,7 @@ from flybystab.errors import FlybystabError
 from flybystab.flybys.grains_outcome import GrainsRun
 from flybystab.flybys.grains_run import one_pile
 from flybystab.orbit.planets import PLANETS
+from flybystab.typing import Array
 
 #: Change of the long axis above which a body has moved; share of the largest clump below which it is lost.
 MOVED, LOST = 0.03, 0.9
@@ -41,7 +47,7 @@ OUTCOMES = ("kept", "moved", "lost")
 
 
 class Case(NamedTuple):
-    """A flyby of the comparison."""
+    """A flyby, and the kinds of case it belongs to."""
 
     body: fs.Body
     encounter: fs.Encounter
@@ -105,64 +111,110 @@ def ellipsoid(case: Case, surface: str, change: float) -> tuple[int, float]:
     return 2 if lost else outcome(1.0, stretch), stretch
 
 
-def cases(count: int, grains: int, minutes: float) -> None:
-    """The table over random cases."""
-    begun, done, refused = time.monotonic(), 0, 0
-    pairs: dict[str, list[tuple[int, int, float]]] = {name: [] for name, _, _ in MODELS}
-    members: list[tuple[str, ...]] = []
-    for number in range(count):
-        if time.monotonic() - begun > 60.0 * minutes:
-            break
-        case = case_of(number)
-        if fs.equilibrium(case.body).required_friction_angle > case.body.material.friction_angle and (
-            case.body.material.c_pa == 0.0
-        ):
-            refused += 1
-            continue
-        try:
-            answers = [ellipsoid(case, surface, change) for _, surface, change in MODELS]
-            pile = make_pile(case.body, grains, number, keep=False)
-            run: GrainsRun = one_pile(
-                pile, case.body, case.encounter, case.encounter.periapsis_axes.T @ case.turn, number
-            )
-        except FlybystabError:
-            refused += 1
-            continue
-        done += 1
-        found = outcome(run.largest_fraction, run.stretch)
-        members.append(case.groups)
-        for (name, _, _), (model, stretch) in zip(MODELS, answers, strict=True):
-            both = found == model == 1
-            pairs[name].append((found, model, np.log(stretch / run.stretch) if both else np.nan))
-        if done % 20 == 0:
-            print(f"# {done} cases in {(time.monotonic() - begun) / 60:.1f} min", flush=True)
-    counts = np.bincount([p[0] for p in pairs[MODELS[0][0]]], minlength=3)
+def answers_of(number: int, grains: int) -> list[Any]:
+    """Row of a case: number, largest clump and stretch of the pile, outcome and stretch of each model.
+
+    The largest clump is nan for a case that is not run: a body that does not stand at rest, or no pile of it.
+    """
+    case = case_of(number)
+    empty = [number, np.nan, np.nan, *[np.nan] * (2 * len(MODELS))]
+    friction = fs.equilibrium(case.body).required_friction_angle
+    if friction > case.body.material.friction_angle and case.body.material.c_pa == 0.0:
+        return empty
+    try:
+        models = [ellipsoid(case, surface, change) for _, surface, change in MODELS]
+        pile = make_pile(case.body, grains, number, keep=False)
+        axes = case.encounter.periapsis_axes.T @ case.turn
+        run: GrainsRun = one_pile(pile, case.body, case.encounter, axes, number)
+    except FlybystabError:
+        return empty
+    return [number, run.largest_fraction, run.stretch, *(x for pair in models for x in pair)]
+
+
+def finished(file: Path) -> dict[int, list[float]]:
+    """Finished cases of a file by their numbers; a last line that was cut off is dropped."""
+    width = 3 + 2 * len(MODELS)
+    lines = file.read_text().splitlines(keepends=True) if file.exists() else []
+    rows = [[float(x) for x in line.split(",")] for line in lines if line.endswith("\n")]
+    return {int(row[0]): row for row in rows if len(row) == width}
+
+
+def cases(count: int, grains: int, minutes: float, jobs: int) -> None:
+    """Run the cases that are not in the file yet, and print the table over all of them."""
+    end = time.monotonic() + 60.0 * minutes
+    file = Path("out") / f"grains_cases_{grains}.csv"
+    file.parent.mkdir(exist_ok=True)
+    known = finished(file)
+    if file.exists() and not file.read_text().endswith("\n"):
+        file.write_text("".join(",".join(map(repr, row)) + "\n" for row in known.values()))
+    missing = (n for n in range(count) if n not in known)
+    with ProcessPoolExecutor(jobs) as pool, file.open("a") as out:
+        running = {pool.submit(answers_of, n, grains) for n in islice(missing, jobs)}
+        while running:
+            done, running = wait(running, return_when=FIRST_COMPLETED)
+            for future in done:
+                row = future.result()
+                known[row[0]] = row
+                out.write(",".join(map(repr, map(float, row))) + "\n")
+                out.flush()
+            if time.monotonic() < end:
+                running |= {pool.submit(answers_of, n, grains) for n in islice(missing, len(done))}
+    table([known[n] for n in sorted(known) if n < count], grains)
+
+
+def interval(k: int, n: int) -> str:
+    """Percentage with its 95 % interval (Wilson)."""
+    if n == 0:
+        return "-"
+    found = binomtest(k, n).proportion_ci(0.95, method="wilson")
+    return f"{100 * k / n:.1f} ({100 * found.low:.1f}-{100 * found.high:.1f})"
+
+
+def table(rows: list[list[float]], grains: int) -> None:
+    """Print how often each model errs, and how far its stretch is off."""
+    run = np.array([row for row in rows if np.isfinite(row[1])])
+    numbers, stretch = run[:, 0].astype(int), run[:, 2]
+    found = np.array([outcome(*row) for row in run[:, 1:3]])
+    counts = np.bincount(found, minlength=3)
+    n = len(run)
     print(
-        f"{done} flybys of one pile of {grains} grains each ({refused} drawn ones do not stand at rest); "
-        f"grains: {counts[0]} kept (a1 within {MOVED:.0%}), {counts[1]} moved, {counts[2]} lost "
-        f"(largest clump < {LOST:g})"
+        f"{n} flybys of one pile of {grains} grains each ({len(rows) - n} drawn ones do not stand at rest); grains: "
+        f"{counts[0]} kept\n(a1 within {MOVED:.0%}), {counts[1]} moved, {counts[2]} lost (largest clump < {LOST:g}). "
+        "Too safe: lost called moved + moved or lost\ncalled kept. In % of all flybys, with 95 % intervals; "
+        "rms of ln(a1 of the model/of grains) where both moved.\n"
     )
-    print(
-        "surface (phi of the pile)    too safe (lost called moved, moved or lost called kept)   "
-        "too careful   rms ln(a1)"
-    )
-    for name, _, _ in MODELS:
-        found, model, ratio = (np.array(x) for x in zip(*pairs[name], strict=True))
-        safe, careful = model < found, model > found
+    head = f"{'too safe':>9s} {'%':>16s} {'too careful':>12s} {'%':>16s} {'rms ln(a1)':>11s}"
+    print(f"{'surface (phi of the pile)':26s} {head}")
+    for k, (name, _, _) in enumerate(MODELS):
+        model, ratio = errors(run, found, stretch, k)
+        safe, careful = (model < found).sum(), (model > found).sum()
+        lost = ((found == 2) & (model == 1)).sum()
         print(
-            f"{name:28s} {safe.sum():4d} ({((found == 2) & (model == 1)).sum():3d}, {(safe & (model == 0)).sum():3d}) "
-            f"{careful.sum():48d} {np.sqrt(np.nanmean(ratio**2)):12.3f} ({np.isfinite(ratio).sum()})"
+            f"{name:26s} {f'{lost}+{safe - lost}':>9s} {interval(safe, n):>16s} {careful:12d} "
+            f"{interval(careful, n):>16s} {spread(ratio):>11s}"
         )
-    print("\nMohr-Coulomb by kind of case   flybys   too safe   too careful   rms ln(a1)")
-    found, model, ratio = (np.array(x) for x in zip(*pairs["mohr-coulomb"], strict=True))
-    for group in sorted({g for m in members for g in m}):
-        chosen = np.array([group in m for m in members])
-        ok = chosen & np.isfinite(ratio)
-        rms = np.sqrt(np.mean(ratio[ok] ** 2)) if ok.any() else np.nan
+    print(f"\n{'Mohr-Coulomb by kind':20s} {'flybys':>6s} {head}")
+    model, ratio = errors(run, found, stretch, [name for name, _, _ in MODELS].index("mohr-coulomb"))
+    groups = [case_of(number).groups for number in numbers]
+    for group in sorted({g for m in groups for g in m}):
+        chosen = np.array([group in m for m in groups])
+        size, safe, careful = chosen.sum(), (chosen & (model < found)).sum(), (chosen & (model > found)).sum()
         print(
-            f"{group:28s} {chosen.sum():8d} {(chosen & (model < found)).sum():10d} "
-            f"{(chosen & (model > found)).sum():13d} {rms:12.3f} ({ok.sum()})"
+            f"{group:20s} {size:6d} {safe:9d} {interval(safe, size):>16s} {careful:12d} "
+            f"{interval(careful, size):>16s} {spread(ratio[chosen]):>11s}"
         )
+
+
+def errors(run: Array, found: Array, stretch: Array, k: int) -> tuple[Array, Array]:
+    """Outcomes of a model, and ln of its stretch over that of grains where both moved (else nan)."""
+    model, its = run[:, 3 + 2 * k].astype(int), run[:, 4 + 2 * k]
+    return model, np.where((found == 1) & (model == 1), np.log(its / stretch), np.nan)
+
+
+def spread(ratio: Array) -> str:
+    """Rms and number of what is finite."""
+    ratio = ratio[np.isfinite(ratio)]
+    return f"{np.sqrt(np.mean(ratio**2)):.3f} ({len(ratio)})" if len(ratio) else "-"
 
 
 def outcome_map(grains: int) -> None:
@@ -200,9 +252,10 @@ def main(arguments: list[str] | None = None) -> None:
     parser.add_argument("--cases", type=int, default=500)
     parser.add_argument("--grains", type=int, default=200)
     parser.add_argument("--minutes", type=float, default=np.inf)
+    parser.add_argument("--jobs", type=int, default=1, help="processes")
     options: Any = parser.parse_args(arguments)
     if options.what == "cases":
-        cases(options.cases, options.grains, options.minutes)
+        cases(options.cases, options.grains, options.minutes, options.jobs)
     else:
         outcome_map(options.grains)
 
