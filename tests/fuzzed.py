@@ -75,7 +75,11 @@ NAMED = {
     "names": [("e", "q"), ("e",)],
     "matrix": [np.eye(6), -np.eye(6), np.full((6, 6), np.nan)],
     "facets": [[[0, 1, 2]], [[0, 1, 9]], np.full((4, 3), np.nan)],
-    "tide": [np.eye(3) * 1e-8 / u.s**2, np.full((3, 3), np.nan) / u.s**2, np.arange(9.0).reshape(3, 3) / u.s**2],
+    "tide": [
+        np.eye(3) * 1e-8 / u.s**2,
+        np.full((3, 3), np.nan) / u.s**2,
+        np.arange(9.0).reshape(3, 3) / u.s**2,
+    ],
     "level": [0.5, 1.0, 2.0],
     "levels": [(0.5,), (2.0,)],
     "material": [fs.Material()],
@@ -155,7 +159,11 @@ def files():
     """Folder of files that can be read."""
     folder = tempfile.TemporaryDirectory()
     place = Path(folder.name)
-    source = Path(str(resources.files("flybystab.data") / "asteroids.csv")).read_text(encoding="utf-8").splitlines()
+    source = (
+        Path(str(resources.files("flybystab.data") / "asteroids.csv"))
+        .read_text(encoding="utf-8")
+        .splitlines()
+    )
     chosen = [line for line in source if not line.startswith("#")][:1]
     chosen += [line for line in source if ",Apophis," in line]
     (place / "orbits.csv").write_text("\n".join(chosen) + "\n")
@@ -187,12 +195,25 @@ def valid():
     orbit, when, density = asteroid.orbit, TIMES[0], 2000 * u.kg / u.m**3
     month = {"start": Time("2029-04-01", scale="tdb"), "stop": Time("2029-05-01", scale="tdb")}
     passage = {"body": body, "encounter": near}
-    deg, day, turn = u.deg, u.d, np.diag([1.0, 0.0, -1.0])
+    deg, turn = u.deg, np.diag([1.0, 0.0, -1.0])
     t = np.linspace(-5e4, 5e4, 201) * u.s
     track = {"times": t, "positions": near.position(t), "velocities": near.velocity(t)}
-    elements = {"epoch": when, "a": 0.9 * u.au, "e": 0.2, "i": 3 * deg, "node": 204 * deg, "peri": 126 * deg, "M": 100 * deg}
+    elements = {
+        "epoch": when,
+        "a": 0.9 * u.au,
+        "e": 0.2,
+        "i": 3 * deg,
+        "node": 204 * deg,
+        "peri": 126 * deg,
+        "M": 100 * deg,
+    }
     state = {"epoch": when, "position": (1.0, 0.1, 0.1) * u.au, "velocity": (1.0, 30.0, 0.1) * u.km / u.s}
-    covariance = {"epoch": when, "names": asteroid.orbit.covariance.names, "values": asteroid.orbit.covariance.values, "matrix": asteroid.orbit.covariance.matrix}
+    covariance = {
+        "epoch": when,
+        "names": asteroid.orbit.covariance.names,
+        "values": asteroid.orbit.covariance.values,
+        "matrix": asteroid.orbit.covariance.matrix,
+    }
     corners = {"vertices": shape.vertices, "facets": shape.facets}
     population = fs.known_population()[:5]
     _, place = files()
@@ -228,7 +249,11 @@ def valid():
         "DisruptionRates.contributors": {},
         "DisruptionRates.cumulative": {"diameters": 1 * u.km},
         "DisruptionRates.lifetime": {},
-        "DisruptionRates.outcome_map": {"periapsis": [1.5, 2.0], "v_inf": [5, 10] * u.km / u.s, "planet_name": "earth"},
+        "DisruptionRates.outcome_map": {
+            "periapsis": [1.5, 2.0],
+            "v_inf": [5, 10] * u.km / u.s,
+            "planet_name": "earth",
+        },
         "DisruptionRates.rate": {"verdict": "DISRUPTED"},
         "DisruptionRates.spin_change_rate": {"least": 0.1},
         "ElasticStress.at": {"points": np.zeros((1, 3)) * u.m},
@@ -249,7 +274,7 @@ def valid():
         "EncounterRates.sample": {"count": 5, "seed": 0},
         "EncounterRates.within": {"periapsis": 20000 * u.km},
         "Equilibrium.other_surfaces": {},
-                "Equilibrium.read": {"path": place / "equilibrium.ecsv"},
+        "Equilibrium.read": {"path": place / "equilibrium.ecsv"},
         "FlybyResult.with_": {},
         "GrainsOutcome.probabilities": {},
         "Material": {"friction_angle": 35 * deg, "cohesion": 0 * u.Pa},
@@ -265,7 +290,11 @@ def valid():
         "Pile.state": {},
         "Requirements.quantiles": {"name": "friction_angle"},
         "Shape": corners,
-        "Shape.contact_binary": {"first": (200, 150, 140) * u.m, "second": (150, 120, 100) * u.m, "facets": 200},
+        "Shape.contact_binary": {
+            "first": (200, 150, 140) * u.m,
+            "second": (150, 120, 100) * u.m,
+            "facets": 200,
+        },
         "Shape.from_ellipsoid": {"semi_axes": (200, 150, 140) * u.m, "facets": 200},
         "Shape.gravity": {"points": [(500, 0, 0)] * u.m, "density": density},
         "Shape.perturbed": {"semi_axes": (200, 150, 140) * u.m, "amplitude": 0.02, "seed": 0, "facets": 200},
@@ -278,7 +307,11 @@ def valid():
         "atlas": {"results": place / "screening.ecsv", "folder": "x", "overwrite": True},
         "attitude_at_start": passage | {"at_periapsis": np.eye(3)},
         "binary_flyby": {"primary": body, "encounter": near, "semi_major_axis": 2 * u.km, "samples": 2},
-        "bound_fraction": {"shape": np.eye(3) * 1e4, "velocity_gradient": np.zeros((3, 3)), "density": 2000.0},
+        "bound_fraction": {
+            "shape": np.eye(3) * 1e4,
+            "velocity_gradient": np.zeros((3, 3)),
+            "density": 2000.0,
+        },
         "catalogue": {},
         "cite": {},
         "critical": passage | {"quantity": "periapsis", "phases": 1},
@@ -296,7 +329,13 @@ def valid():
         "flyby_margin": passage,
         "freshness": {"asteroid": asteroid, "distances": {"earth": 1e5 * u.km}},
         "impact_energy": {"mass": 1e10 * u.kg, "speed": 20 * u.km / u.s},
-        "infer": {"asteroid": asteroid, "encounters": [near], "densities": density, "cohesions": 0 * u.Pa, "attitudes": 2},
+        "infer": {
+            "asteroid": asteroid,
+            "encounters": [near],
+            "densities": density,
+            "cohesions": 0 * u.Pa,
+            "attitudes": 2,
+        },
         "known_population": {},
         "lobe_history": {"body": lobes, "encounter": near, "shape": shape},
         "make_pile": {"body": body, "grains": 30},

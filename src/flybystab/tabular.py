@@ -19,6 +19,7 @@ from astropy.units import Quantity
 
 from flybystab import saving
 from flybystab._version import __version__
+from flybystab.arguments import check_arguments
 from flybystab.encoding import decoded, encoded
 from flybystab.errors import InvalidInput
 from flybystab.saving import with_unit
@@ -73,6 +74,7 @@ class Results:
 
         return pandas.DataFrame(saving.flat(self._columns()[0]))
 
+    @check_arguments
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
         """Write to ``.ecsv``, ``.parquet`` (extra ``parquet``), ``.json``, ``.nc`` (extra ``xarray``) or ``.csv``.
 
@@ -92,6 +94,7 @@ class Results:
         raise NotImplementedError
 
     @classmethod
+    @check_arguments
     def read(cls, path: str | Path) -> Self:
         """The result in a file that :meth:`save` wrote.
 

@@ -56,7 +56,7 @@ def to_si(
             raise UnitMismatch(name, value, f"a Quantity in {unit}, e.g. {name} = 1 * u.Unit('{unit}')")
         try:
             value = np.asarray(value, dtype=float) * u.dimensionless_unscaled
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise InvalidInput(name, value, "a number") from None
     if np.any(getattr(value, "mask", False)):
         raise InvalidInput(name, value, "values without gaps: some are masked (missing)")

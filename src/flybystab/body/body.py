@@ -11,6 +11,7 @@ import numpy as np
 from astropy.units import Quantity
 from numpy.typing import NDArray
 
+from flybystab.arguments import check_arguments
 from flybystab.constants import G
 from flybystab.core.material.surfaces import DEFAULT, NAMES
 from flybystab.errors import InvalidInput, NotModelled, UnitMismatch, UnknownName, UnsettledBody
@@ -79,7 +80,7 @@ class Material:
         object.__setattr__(self, "c_pa", to_si(self.cohesion, u.Pa, "cohesion", low=0.0))
         dilatancy = to_si(self.dilatancy, u.dimensionless_unscaled, "dilatancy", low=0.0, high=1.0)
         object.__setattr__(self, "dilatancy", dilatancy)
-        if self.yield_surface not in YIELD_SURFACES:
+        if str(self.yield_surface) not in YIELD_SURFACES:
             near = get_close_matches(str(self.yield_surface), YIELD_SURFACES, cutoff=0.4)
             raise UnknownName("yield surface", str(self.yield_surface), near, f"(known: {YIELD_SURFACES})")
         if not isinstance(self.brittle, bool | np.bool_):
@@ -210,12 +211,14 @@ class Body:
             with u.set_enabled_equivalencies(u.dimensionless_angles()):
                 omega = to_si(self.spin, u.rad / u.s, "spin", shape=(3,))
         rho = to_si(self.density, u.kg / u.m**3, "density", low=0.0, open_low=True)
+        if not isinstance(self.dispersed, bool | np.bool_):
+            raise InvalidInput("dispersed", self.dispersed, "True or False")
         least, most = DENSITY_RANGE
         if not (self.dispersed or least <= rho <= most):
             raise InvalidInput(
                 "density", self.density, f"{least:g} to {most:g} kg / m3 (1 g / cm3 is 1000 kg / m3)"
             )
-        if self.state not in STATES:
+        if str(self.state) not in STATES:
             raise InvalidInput("state", self.state, f"one of {', '.join(STATES)}")
         for name in ("semi_axes", "density", "spin_period", "spin"):
             if getattr(self, name) is not None:
@@ -226,6 +229,7 @@ class Body:
             object.__setattr__(self, name, value)
 
     @classmethod
+    @check_arguments
     def from_shape(
         cls,
         shape: Shape,

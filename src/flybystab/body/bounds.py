@@ -8,6 +8,8 @@ import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
 
+from flybystab.arguments import check_arguments
+from flybystab.arguments import levels as checked_levels
 from flybystab.body.body import DENSITY_RANGE, Body
 from flybystab.body.equilibrium import stress_components, tide_components
 from flybystab.constants import G
@@ -42,11 +44,16 @@ class Requirements(Tabular):
     greatest_density: Quantity
     in_tension: Quantity
 
+    @check_arguments
     def quantiles(self, name: str, levels: tuple[float, ...] = (0.1587, 0.5, 0.8413)) -> Quantity:
         """Quantiles of one of the attributes, e.g. ``r.quantiles("cohesion")``: median and 1-sigma ends."""
-        values = getattr(self, name)
+        values = getattr(self, name, None)
+        if not isinstance(values, Quantity):
+            raise InvalidInput("name", name, "the name of a quantity of this result")
         # Nearest-rank quantiles stay defined next to inf.
-        return np.quantile(values.value, levels, method="inverted_cdf") * values.unit
+        return (
+            np.quantile(values.value, checked_levels(levels, "levels"), method="inverted_cdf") * values.unit
+        )
 
     def probability_of_tension(self) -> float:
         """Fraction of the samples in mean tension, which friction cannot support."""
@@ -61,6 +68,7 @@ class Requirements(Tabular):
         )
 
 
+@check_arguments
 def density_intervals(body: Body, tide: Quantity | None = None) -> Quantity:
     """Densities at which the body, with its shape, spin and material, is in admissible equilibrium.
 
@@ -93,6 +101,7 @@ def required_cohesion(body: Body, friction_angle: Quantity, tide: Quantity | Non
     return np.array([demand(code, f, 0.0, c)[1] for f in phi.ravel()]).reshape(phi.shape) * u.Pa
 
 
+@check_arguments
 def requirements(
     body: Body,
     *,

@@ -20,6 +20,7 @@ import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
 
+from flybystab.arguments import check_arguments
 from flybystab.body.body import Body, Material, check_body
 from flybystab.body.equilibrium import tide_components
 from flybystab.constants import G
@@ -91,6 +92,7 @@ class ElasticStress(Record):
     def __repr__(self) -> str:
         return f"<ElasticStress Poisson {self.poisson:g}, mean pressure {brief(-np.trace(self.mean) / 3.0)}>"
 
+    @check_arguments
     def at(self, points: Quantity) -> Quantity:
         """Stress tensors (n, 3, 3), Pa, at points (n, 3) inside the ellipsoid, principal axes; tension is positive."""
         x = to_si(points, u.m, "points", shape=None)
@@ -101,6 +103,7 @@ class ElasticStress(Record):
         rows = _stress_rows(x, self.body.axes, self.poisson)
         return rows @ self._coefficients * u.Pa
 
+    @check_arguments
     def yield_region(self, material: Material | None = None) -> YieldRegion:
         """Share of the volume beyond the yield surface of a material, and where yield starts.
 

@@ -17,6 +17,7 @@ import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
 
+from flybystab.arguments import check_arguments
 from flybystab.body.body import (
     DEFAULT_SURFACE,
     YIELD_SURFACES,
@@ -87,11 +88,13 @@ class Equilibrium(Record):
             for name in names
         }
 
+    @check_arguments
     def other_surfaces(self, resolution: Quantity = 0.05 * u.deg) -> str:
         """Required friction on the default surface or the compression cone where it differs from the body's, as text.
 
         Empty where it does not, by more than `resolution`.
         """
+        resolution = to_si(resolution, u.deg, "resolution", low=0.0) * u.deg
         own = self.required_friction_angle
         said = []
         for name, angle in self.required_by_surface.items():
@@ -220,6 +223,7 @@ def cohesion_for(material: Material, tension: float) -> float:
     return tension / share if share > 0.0 else np.inf
 
 
+@check_arguments
 def spin_limits(body: Body, friction_angle: Quantity | None = None) -> Quantity:
     """Slowest and fastest steady spin about ``a3`` that the material can bear.
 
@@ -248,6 +252,7 @@ def spin_limits(body: Body, friction_angle: Quantity | None = None) -> Quantity:
     return limits**0.5 * u.rad / u.s
 
 
+@check_arguments
 def failure_distance(
     body: Body,
     mass_parameter: Quantity,

@@ -62,7 +62,7 @@ def grain_sizes(
     ------
     UnknownName, InvalidInput
     """
-    if distribution not in DISTRIBUTIONS:
+    if str(distribution) not in DISTRIBUTIONS:
         near = get_close_matches(str(distribution), DISTRIBUTIONS, cutoff=0.4)
         raise UnknownName("size distribution", str(distribution), near, f"(known: {DISTRIBUTIONS})")
     if index is not None:

@@ -16,6 +16,7 @@ import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
 
+from flybystab.arguments import check_arguments
 from flybystab.body.body import Body, Material, check_settled, refuse_cut_off
 from flybystab.body.grain_calibration import Friction, contact_cohesion, contact_friction
 from flybystab.body.grain_sizes import GrainSizes, grain_sizes
@@ -71,6 +72,7 @@ class PileState:
         return len(self.simulation.grains.mass)
 
 
+@check_arguments
 def make_pile(
     body: Body,
     grains: int = 500,
@@ -108,6 +110,7 @@ def make_pile(
     InvalidInput
         A friction angle beyond the calibrated range, too strong a cohesion, or a number of grains out of range.
     """
+    whole(seed, "seed", 0)
     if friction is None:
         check_grains(body, grains)
     friction = friction or contact_friction(body.material.phi)
@@ -278,7 +281,7 @@ class Pile:
         return make_pile(
             self.body,
             self.grains,
-            self.seed if seed is None else seed,
+            self.seed if seed is None else whole(seed, "seed", 0),
             shape=self.source if isinstance(self.source, Shape) else None,
             sizes=self.sizes,
         )

@@ -15,6 +15,7 @@ import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
 
+from flybystab.arguments import check_arguments
 from flybystab.body.body import Body, check_body, refuse_cut_off
 from flybystab.body.equilibrium import equilibrium
 from flybystab.body.stability import unit_deviator
@@ -92,6 +93,7 @@ def pushed(
     return _recovery(body, _push(body, direction, joule, _dilatancy(body, dilatancy), tolerance))
 
 
+@check_arguments
 def recovery_energy(
     body: Body,
     direction: Any,
@@ -178,6 +180,7 @@ class RecoveryLimit(Record):
         return f"<RecoveryLimit {share:.3g} of the binding energy, sampling error {self.error:.2g}; {self.runs} runs>"
 
 
+@check_arguments
 def recovery(
     body: Body,
     *,

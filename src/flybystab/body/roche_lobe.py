@@ -17,6 +17,7 @@ import numpy as np
 from astropy.units import Quantity
 from numpy.typing import NDArray
 
+from flybystab.arguments import check_arguments
 from flybystab.body.body import Body
 from flybystab.body.equilibrium import tide_components
 from flybystab.body.shape import Shape
@@ -57,6 +58,7 @@ class RocheLobe(Tabular):
     share_outside: float
 
 
+@check_arguments
 def roche_lobe(shape: Shape, body: Body, tide: Quantity | None = None) -> RocheLobe:
     """Roche lobe of a shape at the spin of a body, in an optional tide.
 

@@ -13,6 +13,7 @@ import numpy as np
 from astropy.units import Quantity
 from numpy.typing import NDArray
 
+from flybystab.arguments import check_arguments
 from flybystab.body.mesh import MassProperties, edges_of, mass_properties, self_intersections
 from flybystab.body.shape_files import read_mesh, write_mesh
 from flybystab.constants import G
@@ -114,6 +115,7 @@ class Shape:
             object.__setattr__(self, name, value)
 
     @classmethod
+    @check_arguments
     def read(cls, path: str | Path, *, unit: u.UnitBase) -> Shape:
         """A shape from a file.
 
@@ -248,6 +250,7 @@ class Shape:
         scale = np.cbrt(3.0 * self._mass.volume / (4.0 * np.pi * np.prod(axes)))
         return scale * axes * u.m
 
+    @check_arguments
     def scaled(self, *, diameter: Quantity | None = None, volume: Quantity | None = None) -> Shape:
         """The same shape scaled to another size.
 
@@ -309,6 +312,7 @@ class Shape:
         potential, acceleration, _ = self.gravity(self.centroids, one)
         return potential.value, acceleration.value
 
+    @check_arguments
     def write(self, path: str | Path, fields: Mapping[str, Quantity] | None = None) -> None:
         """Write the mesh and quantities by facet, as legacy VTK (for ParaView and pyvista) or PLY.
 

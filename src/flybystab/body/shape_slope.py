@@ -11,6 +11,7 @@ import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
 
+from flybystab.arguments import check_arguments
 from flybystab.body.body import Body
 from flybystab.body.equilibrium import tide_components
 from flybystab.body.shape import Shape
@@ -19,6 +20,7 @@ from flybystab.core.ellipsoid.surface_slope import effective_field
 from flybystab.typing import Array
 
 
+@check_arguments
 def shape_slopes(shape: Shape, body: Body, tide: Quantity | None = None) -> SurfaceSlopes:
     """Slopes over the facets of a shape that rotates as a body does, in an optional tide.
 

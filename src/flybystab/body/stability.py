@@ -36,6 +36,7 @@ import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
 
+from flybystab.arguments import check_arguments
 from flybystab.body.body import DEFAULT_SURFACE, Body, check_body, refuse_cut_off
 from flybystab.body.equilibrium import Equilibrium, equilibrium, spin_limits
 from flybystab.body.spin_state import SpinState, spin_state
@@ -197,6 +198,7 @@ class Stability(Record):
             ).critical_energy.barrier
         return found
 
+    @check_arguments
     def other_surfaces(self, resolution: float = 0.01) -> str:
         """Barrier on the default surface or the compression cone where it differs from the body's, as text.
 
@@ -334,6 +336,7 @@ class Push(Record):
     loss: Orders
 
 
+@check_arguments
 def push(body: Body, direction: Any, strain: Any, *, dilatancy: float = 1.0) -> Push:
     """Kinetic energy lost by a perturbation in a given direction, against strain.
 
@@ -376,7 +379,7 @@ def push(body: Body, direction: Any, strain: Any, *, dilatancy: float = 1.0) -> 
     )
     scene = ellipsoid(*arguments)
     p1, p2, p3 = powers(scene, x)
-    t = np.asarray(strain, dtype=float)
+    t = to_si(strain, u.dimensionless_unscaled, "strain", shape=None)
     second = -(t * p1 + t**2 / 2 * p2)
     whole = np.array([_loss(scene, x, ti) for ti in t.ravel()]).reshape(t.shape)
     joule = units.energy * u.J

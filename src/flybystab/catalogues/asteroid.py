@@ -13,6 +13,7 @@ import numpy as np
 from astropy.time import Time
 from astropy.units import Quantity
 
+from flybystab.arguments import check_arguments, finite, vector
 from flybystab.body.body import Body, Material
 from flybystab.body.shape import Shape
 from flybystab.catalogues.covariance_files import embedded_covariance
@@ -88,6 +89,7 @@ class Asteroid(Record):
     covariance: Covariance | None = field(default=None, repr=False)
     own_orbit: Orbit | None = field(default=None, repr=False)
 
+    @check_arguments
     def __init__(
         self,
         row: Mapping[str, str] | None = None,
@@ -132,6 +134,7 @@ class Asteroid(Record):
             object.__setattr__(self, key, value)
 
     @classmethod
+    @check_arguments
     def from_catalogue(cls, name: str | int, material: Material | None = None) -> Asteroid:
         """The asteroid of the embedded catalogue with this number, name or designation.
 
@@ -152,16 +155,19 @@ class Asteroid(Record):
         return find(catalogue(), name, "the embedded catalogue").with_material(material)
 
     @classmethod
+    @check_arguments
     def from_file(cls, path: str | Path, name: str | int, material: Material | None = None) -> Asteroid:
         """The asteroid with this number, name or designation of a file with the catalogue's columns."""
         from flybystab.catalogues.catalogue import catalogue, find
 
         return find(catalogue(path), name, str(path)).with_material(material)
 
+    @check_arguments
     def with_material(self, material: Material | None) -> Asteroid:
         """The same asteroid with another material (None: unchanged)."""
         return self if material is None else replace(self, material=material)
 
+    @check_arguments
     def with_shape(self, shape: Shape) -> Asteroid:
         """The same asteroid with the equivalent ellipsoid of a polyhedral shape (:meth:`Body.from_shape`).
 
@@ -212,6 +218,7 @@ class Asteroid(Record):
         """Rival spin solutions, with weights; a screening draws one for each sample. Empty where there are none."""
         return solutions_of(self.row)
 
+    @check_arguments
     def with_tumbling(
         self,
         precession_period: Quantity,
@@ -239,7 +246,9 @@ class Asteroid(Record):
             row[column] = repr(to_si(value, u.h, column, low=0.0, open_low=True))
         row["tumbling_mode"] = mode
         if inertia is not None:
-            first, second = inertia
+            if np.shape(inertia) != (2,):
+                raise InvalidInput("inertia", inertia, "two ratios of moments of inertia")
+            first, second = (finite(x, "inertia") for x in inertia)
             if not (0.0 < first <= second <= 1.0 < first + second):
                 raise InvalidInput("inertia", inertia, "0 < J1/J3 <= J2/J3 <= 1 < J1/J3 + J2/J3")
             squares = np.array([second + 1.0 - first, first + 1.0 - second, first + second - 1.0])
@@ -254,6 +263,7 @@ class Asteroid(Record):
     def __repr__(self) -> str:
         return f"<Asteroid {self.label}>"
 
+    @check_arguments
     def completed(self, other: Asteroid) -> Asteroid:
         """The same asteroid with unknown physical values and names completed from another row."""
         row = dict(self.row)
@@ -348,6 +358,7 @@ class Asteroid(Record):
         """The body, of the asteroid's `material`; a tumbler at phase zero of its rotation."""
         return self.body_with()
 
+    @check_arguments
     def body_with(self, material: Material | None = None, *, phase: float = 0.0) -> Body:
         """The body.
 
@@ -412,6 +423,7 @@ class Asteroid(Record):
         lon, lat = (np.radians(self._number(c)) for c in ("pole_ecl_lon_deg", "pole_ecl_lat_deg"))
         return ecliptic_direction(float(lon), float(lat))
 
+    @check_arguments
     def attitude(self, angle: Quantity, *, phase: float = 0.0, pole: Any = None) -> np.ndarray:
         """Rotation from body axes to ICRF.
 
@@ -433,7 +445,7 @@ class Asteroid(Record):
         InvalidInput
             No pole is known and none is given.
         """
-        direction = self.pole if pole is None else np.asarray(pole, dtype=float)
+        direction = self.pole if pole is None else vector(pole, "pole")
         if direction is None:
             raise InvalidInput("pole", "(unknown)", f"a direction: the catalogue has no pole of {self.label}")
         momentum = np.array([0.0, 0.0, 1.0])

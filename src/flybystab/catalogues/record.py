@@ -197,6 +197,8 @@ class Record:
         InvalidInput
             The cell is empty, not a finite number, or out of its :data:`LIMITS`.
         """
+        if not isinstance(column, str) or column not in UNITS:
+            raise InvalidInput("column", column, "the name of a numeric column")
         return self._number(column) * UNITS[column]
 
     def _number(self, column: str) -> float:

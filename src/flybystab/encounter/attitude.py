@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from flybystab.arguments import check_arguments
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
 from flybystab.typing import Array
@@ -16,6 +17,7 @@ from flybystab.typing import Array
 ORTHOGONAL = 1e-8
 
 
+@check_arguments
 def periapsis_axes(encounter: Encounter) -> Array:
     """Rotation matrix, frame of the encounter -> periapsis frame (x periapsis, z angular momentum).
 
@@ -65,7 +67,7 @@ def attitude_matrix(attitude: Any) -> Array:
     matrix = attitude.as_matrix() if hasattr(attitude, "as_matrix") else attitude
     try:
         matrix = np.asarray(matrix, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InvalidInput("attitude", attitude, "a rotation matrix or a scipy Rotation") from None
     if matrix.shape != (3, 3) or not np.all(np.isfinite(matrix)):
         raise InvalidInput("attitude", attitude, "a (3, 3) rotation matrix of finite numbers")

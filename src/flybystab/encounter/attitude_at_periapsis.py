@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from flybystab.arguments import check_arguments
 from flybystab.body.body import Body
 from flybystab.encounter.attitude import attitude_matrix, rotation_rates
 from flybystab.encounter.encounter import Encounter
@@ -15,6 +16,7 @@ from flybystab.typing import Array
 _TOLERANCE = 1e-11
 
 
+@check_arguments
 def attitude_at_start(body: Body, encounter: Encounter, at_periapsis: Any) -> Array:
     """Attitude at the start of an encounter of a body that would have a given one at closest approach without a tide.
 

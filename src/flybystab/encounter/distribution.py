@@ -19,6 +19,7 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 from scipy.stats import binomtest
 
+from flybystab.arguments import check_arguments, finite
 from flybystab.core.numerics.threads import worker_count
 from flybystab.encounter.linear_target_plane import LinearPlane, ellipse, linear_plane
 from flybystab.encounter.reach import far_enough
@@ -92,10 +93,11 @@ class EncounterDistribution(Tabular):
         """Fraction of the clones that reach the atmosphere or the surface."""
         return float(np.mean(self.impact))
 
+    @check_arguments
     def impact_interval(self, level: float = 0.95) -> tuple[float, float]:
         """Clopper-Pearson interval of the impact probability, from sampling alone."""
         test = binomtest(int(self.impact.sum()), len(self))
-        interval = test.proportion_ci(confidence_level=level, method="exact")
+        interval = test.proportion_ci(confidence_level=finite(level, "level", 0.0, 1.0), method="exact")
         return float(interval.low), float(interval.high)
 
     @property
@@ -108,8 +110,10 @@ class EncounterDistribution(Tabular):
         """Standard deviation of the time of closest approach over the clones that were found."""
         return np.std(self.time_offset[self.found], ddof=1)
 
+    @check_arguments
     def distance_interval(self, level: float = 0.9973) -> Quantity:
         """Quantiles of the distance that leave out ``(1 - level)/2`` on either side, shape (2,)."""
+        level = finite(level, "level", 0.0, 1.0)
         return np.quantile(self.distance[self.found], [0.5 - 0.5 * level, 0.5 + 0.5 * level])
 
     @property
@@ -129,6 +133,7 @@ class EncounterDistribution(Tabular):
         )
 
 
+@check_arguments
 def encounter_distribution(
     orbit: Any,
     planet: str | Planet,

@@ -13,6 +13,7 @@ import numpy as np
 from astropy.time import Time
 from astropy.units import Quantity
 
+from flybystab.arguments import check_arguments, vector
 from flybystab.core.dynamics.ground import Ground
 from flybystab.core.ellipsoid.tide import TidePanels, tensor, tide_at, tide_panels
 from flybystab.encounter.reach import SETTLE, far_enough
@@ -161,10 +162,12 @@ class Encounter:
         times = to_si(t, u.s, "t", shape=None)
         return self.track.states(np.ravel(times)).reshape(*np.shape(times), 6)
 
+    @check_arguments
     def positions(self, t: Array) -> Array:
         """As :meth:`position` on floats: m, shape (n, 3), at `t` s from closest approach, shape (n,)."""
         return self.track.states(np.atleast_1d(np.asarray(t, dtype=float)))[:, :3]
 
+    @check_arguments
     def distances(self, t: Array) -> Array:
         """As :meth:`radius` on floats: m, shape (n,), at `t` s from closest approach, shape (n,)."""
         return np.sqrt(np.sum(self.positions(t) ** 2, axis=1))
@@ -224,6 +227,7 @@ class Encounter:
         x, z = x / np.linalg.norm(x), h / np.linalg.norm(h)
         return np.stack([x, np.cross(z, x), z])
 
+    @check_arguments
     def b_plane(self, north: Sequence[float] = NORTH) -> Quantity:
         """Target-plane coordinates ``(B.T, B.R)`` of the two-body hyperbola at closest approach, shape (2,).
 
@@ -238,7 +242,7 @@ class Encounter:
             For a bound orbit, which has no target plane, or if the asymptote points north.
         """
         when = 0.0 if self.impact_time is None else min(0.0, self.impact_time)
-        b, v_inf = target_plane(self.track.states(np.array([when])), self.planet.gm, north)
+        b, v_inf = target_plane(self.track.states(np.array([when])), self.planet.gm, vector(north, "north"))
         return (checked(b[0], float(v_inf[0]), north) * u.m).to(u.km)
 
     @classmethod
@@ -347,6 +351,7 @@ class Encounter:
         return sampled(cls, body, *samples(times, positions, velocities), start, wait, j2, axis)
 
     @classmethod
+    @check_arguments
     def from_spk(
         cls,
         path: str | Path,
@@ -399,6 +404,7 @@ class Encounter:
         return cls._along(found, body, start, settle, j2, pole)
 
     @classmethod
+    @check_arguments
     def from_oem(
         cls,
         path: str | Path,
@@ -453,6 +459,7 @@ class Encounter:
         return replace(out, distance_error=(found.error * u.m).to(u.km), ephemeris=found.ephemeris or None)
 
     @classmethod
+    @check_arguments
     def from_orbit(
         cls,
         orbit: Orbit,
@@ -510,7 +517,11 @@ class Encounter:
         body = _planet(planet)
         if body.name not in BODIES or body.name == "sun":
             raise InvalidInput("planet", body.name, f"one of {', '.join(BODIES[1:])}")
-        reach = to_si(search, u.s, "search", low=0.0, open_low=True)
+        reach = to_si(search, u.s, "search", low=0.0, high=3.2e9, open_low=True)
+        if forces is not None and not (
+            isinstance(forces, tuple | list) and all(isinstance(f, str) for f in forces)
+        ):
+            raise InvalidInput("forces", forces, "a sequence of names of forces")
         largest = far_enough(body) if within is None else to_si(within, u.m, "within", low=0.0, open_low=True)
         accuracy = to_si(error, u.m, "error", low=0.0, open_low=True)
         wait = to_si(settle, u.s, "settle", low=0.0)

@@ -16,6 +16,7 @@ import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
 
+from flybystab.arguments import check_arguments
 from flybystab.constants import YEAR
 from flybystab.errors import InvalidInput
 from flybystab.units import to_si
@@ -24,6 +25,7 @@ from flybystab.units import to_si
 MEGATON = 4.184e15
 
 
+@check_arguments
 def impact_energy(mass: Quantity, speed: Quantity) -> Quantity:
     """Kinetic energy at impact, in J.
 
@@ -37,6 +39,7 @@ def impact_energy(mass: Quantity, speed: Quantity) -> Quantity:
     return 0.5 * m * v * v * u.J
 
 
+@check_arguments
 def palermo_scale(probability: float, energy: Quantity, time: Quantity) -> float:
     """Palermo scale of one possible impact.
 
@@ -60,6 +63,7 @@ def palermo_scale(probability: float, energy: Quantity, time: Quantity) -> float
     return float(np.log10(p / (0.03 * megatons**-0.8 * years)))
 
 
+@check_arguments
 def torino_scale(probability: float, energy: Quantity) -> int:
     """Torino scale, 0 to 10, of one possible impact within a century.
 

@@ -19,6 +19,7 @@ from astropy.table import QTable
 from astropy.time import Time
 from astropy.units import Quantity
 
+from flybystab.arguments import check_arguments
 from flybystab.constants import DAY
 from flybystab.encounter.linear_target_plane import disc_probability
 from flybystab.errors import InaccurateOrbit, InvalidInput
@@ -94,6 +95,7 @@ class _Line:
         return out
 
 
+@check_arguments
 def virtual_impactors(
     orbit: Any,
     start: Time | str,

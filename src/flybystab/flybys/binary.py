@@ -19,6 +19,7 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 from scipy.integrate import DOP853
 
+from flybystab.arguments import check_arguments
 from flybystab.body.body import Body
 from flybystab.constants import G
 from flybystab.encounter.encounter import Encounter
@@ -79,6 +80,7 @@ class BinarySample(Tabular):
     def __len__(self) -> int:
         return len(self.fate)
 
+    @check_arguments
     def probability(self, fate: str) -> float:
         """Fraction of the sample with a fate."""
         if fate not in (BOUND, ESCAPE, COLLISION):
@@ -89,6 +91,7 @@ class BinarySample(Tabular):
         return f"<BinarySample {len(self)} phases: {counted(self.fate)}>"
 
 
+@check_arguments
 def binary_flyby(
     primary: Body,
     encounter: Encounter,

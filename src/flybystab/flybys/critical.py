@@ -12,8 +12,9 @@ import numpy as np
 from astropy.units import Quantity
 from numpy.typing import NDArray
 
+from flybystab.arguments import check_arguments
 from flybystab.body.body import DENSITY_RANGE, Body
-from flybystab.encounter.attitude import about_z
+from flybystab.encounter.attitude import about_z, attitude_matrix
 from flybystab.encounter.attitude_at_periapsis import attitude_at_start
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput, UnknownName
@@ -113,6 +114,7 @@ class CriticalValues(Tabular):
         return f"<CriticalValues {self.quantity} for {self.outcome}: {span} over {len(self)} phases>"
 
 
+@check_arguments
 def critical(
     body: Body,
     encounter: Encounter,
@@ -181,7 +183,7 @@ def critical(
     if not ends[0] < ends[1]:
         raise InvalidInput("low", low, f"less than high = {ends[1]:g} {parameter.unit}")
     angle = np.pi * np.arange(n) / n
-    base = np.eye(3) if attitude is None else attitude
+    base = attitude_matrix(attitude)
     space = np.geomspace if parameter.logarithmic and ends[0] > 0.0 else np.linspace
     grid = space(ends[0], ends[1], SCAN)
 

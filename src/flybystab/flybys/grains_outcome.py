@@ -10,6 +10,7 @@ import numpy as np
 from astropy.units import Quantity
 from numpy.typing import NDArray
 
+from flybystab.arguments import check_arguments, finite
 from flybystab.flybys.verdict import Verdict, classed
 from flybystab.tabular import Collection, Record, Tabular
 from flybystab.typing import Array
@@ -186,6 +187,7 @@ class GrainsOutcome(Collection):
         found = [r.largest_fraction for r in self.runs]
         return min(found), max(found)
 
+    @check_arguments
     def probabilities(self, confidence: float = 0.68) -> dict[Verdict, tuple[float, float, float]]:
         """Fraction of the seeds with each verdict, and its Jeffreys interval at a level of confidence.
 
@@ -193,7 +195,7 @@ class GrainsOutcome(Collection):
         """
         from scipy.stats import beta
 
-        n, tail = len(self.runs), 0.5 * (1.0 - confidence)
+        n, tail = len(self.runs), 0.5 * (1.0 - finite(confidence, "confidence", 0.0, 1.0))
         out = {}
         for verdict in Verdict:
             k = sum(r.verdict == verdict for r in self.runs)

@@ -10,6 +10,7 @@ import numpy as np
 from astropy.units import Quantity
 from numpy.typing import NDArray
 
+from flybystab.arguments import check_arguments
 from flybystab.body.body import Body
 from flybystab.encounter.attitude import about_z, periapsis_axes
 from flybystab.encounter.encounter import Encounter
@@ -80,6 +81,7 @@ class OutcomeMap(Tabular):
         return np.mean(self.verdict != str(Verdict.INTACT), axis=-1)
 
 
+@check_arguments
 def outcome_map(
     body: Body,
     periapsis: Quantity,
@@ -181,6 +183,7 @@ class TargetMap(Tabular):
         return (capture_radius(self.planet.gm, self.planet.impact_distance, v) * u.m).to(u.km)
 
 
+@check_arguments
 def target_map(
     body: Body,
     v_inf: Quantity,

@@ -9,6 +9,8 @@ import numpy as np
 from astropy.units import Quantity
 from numpy.typing import NDArray
 
+from flybystab.arguments import check_arguments
+from flybystab.arguments import levels as checked_levels
 from flybystab.body.body import Body
 from flybystab.catalogues.tumbling import ecliptic_direction
 from flybystab.encounter.attitude import periapsis_axes
@@ -63,12 +65,18 @@ class SpinForecast(Tabular):
         longitude = np.rad2deg(np.arctan2(y, x)) % 360.0
         return longitude * u.deg, np.rad2deg(np.arcsin(np.clip(z, -1.0, 1.0))) * u.deg
 
+    @check_arguments
     def quantiles(self, name: str, levels: tuple[float, ...] = (0.05, 0.5, 0.95)) -> Quantity:
         """Quantiles of a quantity over the phases."""
-        values = getattr(self, name)
-        return np.quantile(values.value, levels, method="inverted_cdf") * values.unit
+        values = getattr(self, name, None)
+        if not isinstance(values, Quantity):
+            raise InvalidInput("name", name, "the name of a quantity of this result")
+        return (
+            np.quantile(values.value, checked_levels(levels, "levels"), method="inverted_cdf") * values.unit
+        )
 
 
+@check_arguments
 def spin_forecast(
     asteroid: SpinStates | Body,
     encounter: Encounter,

@@ -10,6 +10,7 @@ import numpy as np
 from astropy.units import Quantity
 from numpy.typing import NDArray
 
+from flybystab.arguments import check_arguments, finite
 from flybystab.body.body import Body, Material, refuse_cut_off
 from flybystab.core.ellipsoid.yield_bound import INTACT, quick_margins
 from flybystab.encounter.attitude import attitude_matrix
@@ -57,6 +58,7 @@ class Survival(Tabular):
     def __len__(self) -> int:
         return len(self.verdict)
 
+    @check_arguments
     def probability(self, *verdicts: str, level: float = 0.95) -> tuple[float, float, float]:
         """Fraction of these verdicts (by default INTACT and RESHAPED) and its Clopper-Pearson interval.
 
@@ -68,7 +70,7 @@ class Survival(Tabular):
         wanted = np.isin(self.verdict, [str(v) for v in (verdicts or SURVIVES)])
         lost = int(np.count_nonzero(self.verdict == "FAILED"))
         k, n = int(wanted.sum()), len(self)
-        low = binomtest(k, n).proportion_ci(level, "exact").low
+        low = binomtest(k, n).proportion_ci(finite(level, "level", 0.0, 1.0), "exact").low
         high = binomtest(min(k + lost, n), n).proportion_ci(level, "exact").high
         return k / n, float(low), float(high)
 
@@ -84,6 +86,7 @@ class Survival(Tabular):
         return f"<Survival {len(self)} clones: {counted(self.verdict)}; {chance}>"
 
 
+@check_arguments
 def survival(
     body: Body | SpinStates,
     distribution: EncounterDistribution,

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from flybystab.arguments import check_arguments
 from flybystab.core import verdict_codes as codes
 from flybystab.core.ellipsoid.bound_mass import bound_share, one_pass_share
 from flybystab.typing import Array
@@ -82,6 +83,7 @@ def class_of(bound: float) -> MassClass:
     return next(c for c in CLASSES if bound > c.least)
 
 
+@check_arguments
 def bound_fraction(shape: Array, velocity_gradient: Array, density: float) -> float:
     """Mass fraction that stays bound, for a homogeneous ellipsoid with velocity ``L x``.
 

@@ -21,6 +21,7 @@ import numpy as np
 from astropy.table import QTable
 
 from flybystab._version import __version__
+from flybystab.arguments import check_arguments
 from flybystab.errors import InvalidInput
 from flybystab.flybys.document import plain, table_document
 from flybystab.flybys.verdict import Verdict
@@ -58,6 +59,7 @@ MARK = "encounters.json"
 _FILES = ("atlas.css", "atlas.js")
 
 
+@check_arguments
 def atlas(
     results: QTable | str | Path,
     folder: str | Path,

@@ -16,11 +16,12 @@ import numpy as np
 from astropy.time import Time
 from numpy.typing import NDArray
 
+from flybystab.arguments import check_arguments, check_kinds
 from flybystab.errors import InvalidInput, UnknownName
 from flybystab.orbit.elements import ecliptic_to_icrf, gm_of, state_in_plane
 from flybystab.orbit.planets import PLANETS
 from flybystab.typing import Array
-from flybystab.units import to_si
+from flybystab.units import checked_time, to_si, whole
 
 #: The sets of elements: cometary (JPL), Keplerian (NEOCC and catalogues), equinoctial (NEODyS), or a state. ``tp`` is
 #: the time of perihelion less the epoch; ``h, k = e sin, e cos`` of the longitude of perihelion, ``P, Q = tan(i/2)
@@ -86,6 +87,11 @@ class Covariance:
     centre: str = "sun"
 
     def __post_init__(self) -> None:
+        check_kinds(self, "epoch", "values", "matrix", "source", "correlated", "caveat")
+        if not isinstance(self.names, tuple | list) or not all(isinstance(name, str) for name in self.names):
+            raise InvalidInput("names", self.names, "a sequence of names")
+        for name in ("values", "matrix"):
+            object.__setattr__(self, name, np.asarray(getattr(self, name), dtype=float))
         if not self.frame:
             object.__setattr__(self, "frame", "ICRF" if "x" in self.names else "ecliptic")
         if self.frame not in ("ecliptic", "ICRF"):
@@ -120,6 +126,7 @@ class Covariance:
             )
 
     @classmethod
+    @check_arguments
     def in_units(
         cls,
         epoch: Time,
@@ -141,11 +148,19 @@ class Covariance:
         InvalidInput, UnitMismatch
             No covariance, or a unit that does not fit its parameter.
         """
+        checked_time(epoch, "epoch")
         for name in names:
             if name not in _SI:
                 raise InvalidInput("names", name, f"parameters out of {[*_SI]}")
         if len(units) != len(names):
             raise InvalidInput("units", len(units), f"one a parameter, {len(names)}")
+        numbers = np.asarray(values), np.asarray(matrix)
+        if numbers[0].shape != (len(names),) or numbers[1].shape != 2 * (len(names),):
+            raise InvalidInput(
+                "covariance",
+                numbers[1].shape,
+                f"{len(names)} values and a matrix ({len(names)}, {len(names)})",
+            )
         factor = np.array([to_si(1.0 * x, _SI[n], n) for n, x in zip(names, units, strict=True)])
         return cls(
             epoch.tdb,
@@ -187,6 +202,7 @@ class Covariance:
         values, vectors = self._spectrum
         return np.asarray(self.sigma[:, None] * vectors * np.sqrt(np.maximum(values, 0.0)))
 
+    @check_arguments
     def samples(self, n: int, seed: int) -> tuple[Array, int]:
         """Parameters drawn from the normal distribution, shape (n, len(names)), SI; number drawn again.
 
@@ -199,6 +215,7 @@ class Covariance:
         InvalidInput
             If a row was rejected 100 times: the elements are not normally distributed.
         """
+        n, seed = whole(n, "n", 0), whole(seed, "seed", 0)
         z = np.random.default_rng(seed).standard_normal((n, len(self.names)))
         out = self.values + z @ self.factor.T
         again = 0
@@ -232,13 +249,20 @@ class Covariance:
         a = self._column(parameters, "a")
         return np.asarray(((a > 0.0) & (e >= 0.0) & (e < 1.0)) | ((a < 0.0) & (e > 1.0)))
 
+    @check_arguments
     def states(self, parameters: Array) -> Array:
         """States, shape (m, 6), m and m/s, ICRF axes, relative to the centre, of parameters (m, n)."""
-        states = self._in_frame(parameters)
+        states = self._in_frame(self._rows(parameters))
         if self.frame == "ICRF":
             return states
         turn = ecliptic_to_icrf()
         return np.array([np.concatenate([turn @ x[:3], turn @ x[3:]]) for x in states])
+
+    def _rows(self, parameters: Array) -> Array:
+        found = np.asarray(parameters, dtype=float)
+        if found.ndim != 2 or found.shape[1] != len(self.names):
+            raise InvalidInput("parameters", parameters, f"rows of {len(self.names)} parameters")
+        return found
 
     def _in_frame(self, parameters: Array) -> Array:
         """States with the axes of the covariance."""
@@ -288,8 +312,10 @@ class Covariance:
             frame="ICRF",
         )
 
+    @check_arguments
     def pushes(self, parameters: Array) -> Array:
         """A1, A2, A3 (m/s2), DT (s), AMRAT (m2/kg) less their means, shape (m, 5); zero if not estimated."""
+        parameters = self._rows(parameters)
         out = np.zeros((len(parameters), len(PUSHES)))
         for j, name in enumerate(PUSHES):
             if name in self.names:
@@ -297,6 +323,7 @@ class Covariance:
                 out[:, j] = parameters[:, at] - self.values[at]
         return out
 
+    @check_arguments
     def deviations(self, parameters: Array) -> tuple[Array, Array]:
         """States and non-gravitational parameters less those of the mean, shapes (m, 6) and (m, 5)."""
         return self.states(parameters) - self.states(self.values[None, :]), self.pushes(parameters)

@@ -12,6 +12,7 @@ import numpy as np
 from astropy.time import Time
 from astropy.units import Quantity
 
+from flybystab.arguments import check_arguments
 from flybystab.constants import AU, DAY
 from flybystab.errors import FlybystabWarning, Impact, InaccurateOrbit, InvalidInput, UnknownName
 from flybystab.orbit.barycentre import barycentre_in, barycentre_of_de440
@@ -256,6 +257,7 @@ class Orbit:
         push = _nongrav(A1, A2, A3, law, DT, AMRAT)
         return cls._at(_epoch(epoch), np.concatenate([r, v]), where, barycentre, push, name, covariance)
 
+    @check_arguments
     def barycentric(self, window: Window) -> Array:
         """State at the epoch relative to the barycentre of the ephemeris of a window, shape (6,), m and m/s."""
         state = np.concatenate([self.position.to_value(u.m), self.velocity.to_value(u.m / u.s)])
@@ -264,6 +266,7 @@ class Orbit:
             return state + barycentre_in(window, t)[0]
         return state + window.states(BODIES.index(self.centre), t)[0]
 
+    @check_arguments
     def flight(
         self, window: Window, forces: tuple[str, ...] | None = None, epsilon: float = EPSILON
     ) -> Flight:
@@ -276,6 +279,7 @@ class Orbit:
             epsilon,
         )
 
+    @check_arguments
     def at(
         self, time: Time, centre: str = "sun", ephemeris: str | Ephemeris | None = None
     ) -> tuple[Quantity, Quantity]:
@@ -426,6 +430,7 @@ class Orbit:
             frame="ICRF",
         )
 
+    @check_arguments
     def to_skyfield(self, centre: str = "sun", ephemeris: str | Ephemeris | None = None) -> OrbitVector:
         """Position as a vector function of skyfield, with all forces.
 
@@ -446,6 +451,7 @@ class Orbit:
 
         return OrbitVector(self, str(centre).lower(), _ephemeris(ephemeris))
 
+    @check_arguments
     def clones(
         self,
         n: int,
@@ -482,6 +488,7 @@ class Orbit:
         found = covariance.deviations(parameters[first:last])
         return deviated(self, covariance.epoch, *found, "clone", ephemeris, first)
 
+    @check_arguments
     def sigma_points(self, ephemeris: str | Ephemeris | None = None) -> tuple[tuple[Orbit, ...], ...]:
         """Pairs of orbits, plus and minus one sigma along each principal axis of the correlations.
 

@@ -10,6 +10,8 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 
+from flybystab.arguments import check_arguments
+from flybystab.errors import InvalidInput
 from flybystab.flybys.verdict import Verdict
 from flybystab.plots.style import new_figure, styled
 from flybystab.population.rates import EncounterRates
@@ -131,9 +133,12 @@ def size_plot(axes: Any, result: DisruptionRates) -> Any:
     return axes
 
 
+@check_arguments
 @styled
 def population_figure(result: DisruptionRates, rates: Sequence[EncounterRates]) -> Figure:
     """Encounters, verdicts by planet, probability over periapsis and speed, and rates against size, on one page."""
+    if not isinstance(rates, list | tuple) or not all(hasattr(one, "within") for one in rates) or not rates:
+        raise InvalidInput("rates", rates, "EncounterRates, one a planet")
     figure = new_figure(9.6, 7.6)
     (first, second), (third, fourth) = figure.subplots(2, 2)
     rate_plot(first, rates)

@@ -55,9 +55,12 @@ def plot_result(result: Any, axes: Any = None, **options: Any) -> Any:
     InvalidInput
         There is no figure of this kind of result.
     """
-    if axes is not None:
-        return _plot(result, axes, **options)
-    return _plot_alone(result, **options)
+    if axes is None:
+        return _plot_alone(result, **options)
+    given = np.asarray(axes, dtype=object).ravel()
+    if not len(given) or not all(hasattr(one, "plot") for one in given):
+        raise InvalidInput("axes", axes, "matplotlib axes")
+    return _plot(result, axes, **options)
 
 
 @styled

@@ -9,15 +9,18 @@ import numpy as np
 from astropy.units import Quantity
 from numpy.typing import NDArray
 
+from flybystab.arguments import check_arguments
 from flybystab.body.shape import Shape
 from flybystab.body.surface_history import SurfaceHistory
 from flybystab.body.surface_slope import SlopeChange
+from flybystab.errors import InvalidInput
 from flybystab.plots.style import new_figure, styled
 
 #: Directions of view, with the image's right and up: from +x, +y and +z of the principal frame.
 VIEWS = (("+x", 0, (1, 2)), ("+y", 1, (0, 2)), ("+z", 2, (0, 1)))
 
 
+@check_arguments
 def shape_map(
     axes: Any,
     shape: Shape,
@@ -46,8 +49,17 @@ def shape_map(
     PolyCollection
         For a colour bar.
     """
+    from matplotlib import colormaps
     from matplotlib.collections import PolyCollection
 
+    if axes is None or view not in [v[0] for v in VIEWS]:
+        raise InvalidInput("axes, view", (axes, view), f"matplotlib axes and one of {[v[0] for v in VIEWS]}")
+    if np.shape(values) != (len(shape.facets),) or cmap not in colormaps:
+        raise InvalidInput(
+            "values, cmap", (np.shape(values), cmap), "one value a facet and the name of a colour map"
+        )
+    if limits is not None and (np.shape(limits) != (2,) or not limits[0] < limits[1]):
+        raise InvalidInput("limits", limits, "two numbers, the lower first")
     _, depth, (right, up) = next(v for v in VIEWS if v[0] == view)
     mirror = -1.0 if view == "+y" else 1.0  # x runs to the left when seen from +y with z up
     facing = shape.normals[:, depth] > 0.0
@@ -73,6 +85,7 @@ def shape_map(
 
 
 @styled
+@check_arguments
 def slope_change_figure(shape: Shape, change: SlopeChange, repose: Quantity = 35 * u.deg) -> Any:
     """Slopes before an encounter, the greatest during it, and the largest change, in three views each.
 

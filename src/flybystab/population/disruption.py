@@ -20,6 +20,7 @@ from astropy.table import QTable, vstack
 from astropy.units import Quantity
 
 from flybystab._version import __version__
+from flybystab.arguments import check_arguments
 from flybystab.body.body import Material, refuse_cut_off
 from flybystab.errors import FlybystabWarning, InvalidInput
 from flybystab.flybys.verdict import Verdict
@@ -38,6 +39,7 @@ PLANETS = ("mercury", "venus", "earth", "mars")
 STRATA = 8
 
 
+@check_arguments
 def disruption_rates(
     population: Any,
     planets: Sequence[str] = PLANETS,

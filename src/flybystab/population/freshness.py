@@ -18,6 +18,7 @@ from astropy.table import QTable
 from astropy.time import Time
 from astropy.units import Quantity
 
+from flybystab.arguments import check_arguments
 from flybystab.catalogues.asteroid import Asteroid
 from flybystab.errors import InvalidInput
 from flybystab.orbit.search.encounter_finder import find_encounters
@@ -90,6 +91,7 @@ def fresh_probability(ages: Sequence[Array], span: float, rate: float, weatherin
     return float(np.mean([1.0 if np.any(np.asarray(a) <= weathering) else beyond for a in ages]))
 
 
+@check_arguments
 def freshness(
     asteroid: Asteroid,
     distances: Mapping[str, Quantity],

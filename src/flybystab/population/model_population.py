@@ -32,6 +32,7 @@ import astropy.units as u
 import numpy as np
 from astropy.table import QTable
 
+from flybystab.arguments import check_arguments
 from flybystab.errors import InvalidInput, UnknownName
 from flybystab.files import csv_rows, parse_toml, read_text
 from flybystab.screening.distributions import Distribution, distribution_of
@@ -54,6 +55,7 @@ KILOMETRE = 17.75
 _TRIES = 1000
 
 
+@check_arguments
 def read_population(path: str | Path, *, columns: Sequence[str] | None = None, seed: int = 0) -> QTable:
     """Orbits of a population from a file.
 
@@ -88,6 +90,7 @@ def read_population(path: str | Path, *, columns: Sequence[str] | None = None, s
     return table
 
 
+@check_arguments
 def known_population(limit: float = KILOMETRE) -> QTable:
     """Orbits of the known near-Earth asteroids brighter than an absolute magnitude (MPC, February 2026).
 

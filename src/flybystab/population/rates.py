@@ -11,6 +11,7 @@ import numpy as np
 from astropy.table import QTable, Table
 from astropy.units import Quantity
 
+from flybystab.arguments import check_arguments
 from flybystab.catalogues.asteroid import Asteroid
 from flybystab.constants import AU
 from flybystab.core.numerics.threads import in_order, worker_count
@@ -117,6 +118,7 @@ class EncounterRates(Tabular):
         )
 
 
+@check_arguments
 def encounter_rates(
     orbits: Any,
     planet_name: str | Planet = "earth",
@@ -161,6 +163,8 @@ def encounter_rates(
     if planet_orbit is None:
         target = _mean_orbit(body)
     else:
+        if not isinstance(planet_orbit, tuple | list) or len(planet_orbit) != 3:
+            raise InvalidInput("planet_orbit", planet_orbit, "semi-major axis, eccentricity and inclination")
         a, e, i = planet_orbit
         target = np.array(
             [

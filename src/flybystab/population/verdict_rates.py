@@ -12,6 +12,7 @@ from astropy.table import QTable
 from astropy.units import Quantity
 from numpy.typing import ArrayLike, NDArray
 
+from flybystab.arguments import check_arguments
 from flybystab.errors import InvalidInput
 from flybystab.flybys.verdict import Verdict
 from flybystab.orbit.planets import planet
@@ -52,6 +53,7 @@ class DisruptionRates(Collection):
     def _rows(self) -> dict[str, Any]:
         return {name: self.table[name] for name in self.table.colnames}
 
+    @check_arguments
     def rate(self, verdict: str, planet_name: str | None = None) -> Quantity:
         """Rate of a verdict, 1/yr, over all planets or for one."""
         mask = self.table["verdict"] == str(verdict)
@@ -59,11 +61,13 @@ class DisruptionRates(Collection):
             mask &= self.table["planet"] == planet(planet_name).name
         return self.table["rate"][mask].sum()
 
+    @check_arguments
     def lifetime(self, *verdicts: str) -> Quantity:
         """Mean time, Myr, until a body of the population meets one of the verdicts."""
         total = sum((self.rate(v) for v in verdicts), 0.0 / u.yr)
         return (self.bodies / total).to(u.Myr) if total.value > 0.0 else np.inf * u.Myr
 
+    @check_arguments
     def changed_fraction(self, time: Quantity, *verdicts: str) -> float:
         """Fraction of the population that met one of the verdicts within a time, ``1 - exp(-time/lifetime)``.
 
@@ -74,6 +78,7 @@ class DisruptionRates(Collection):
         lifetime = self.lifetime(*(verdicts or CHANGED)).to_value(u.s)
         return float(-np.expm1(-span / lifetime))
 
+    @check_arguments
     def spin_change_rate(self, least: float) -> Quantity:
         """Rate, 1/yr, of bodies that stay INTACT and whose spin rate changes by more than the fraction `least`."""
         share = to_si(least, u.dimensionless_unscaled, "least", low=0.0)
@@ -100,6 +105,7 @@ class DisruptionRates(Collection):
         weight = self.samples["weight"].to_value(1 / u.yr)
         return np.array([weight @ np.sum(own >= size, axis=1) for size in sizes]) / u.yr
 
+    @check_arguments
     def contributors(self, *verdicts: str, most: int = 10) -> QTable:
         """Orbits with the largest rates of the verdicts: ``orbit`` (row of the population), ``rate``, ``samples``.
 
@@ -123,6 +129,7 @@ class DisruptionRates(Collection):
             "elongation": _quantiles(np.asarray(chosen["elongation"]), weight),
         }
 
+    @check_arguments
     def outcome_map(
         self, periapsis: ArrayLike, v_inf: Quantity, *verdicts: str, planet_name: str
     ) -> NDArray[np.float64]:

@@ -28,6 +28,7 @@ from astropy.time import Time
 from astropy.units import Quantity
 
 from flybystab._version import __version__
+from flybystab.arguments import check_arguments
 from flybystab.body.body import Material
 from flybystab.catalogues.catalogue import Asteroid
 from flybystab.errors import FlybystabWarning, InvalidInput, OutputFailed
@@ -281,6 +282,7 @@ class _Kept:
         return self._journal.parts(asteroid)
 
 
+@check_arguments
 def screen(
     asteroids: str | Path | Sequence[Asteroid | str | int | Path] | None,
     start: Time | str,

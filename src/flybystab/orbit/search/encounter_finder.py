@@ -16,6 +16,7 @@ from astropy.table import QTable
 from astropy.time import Time
 from astropy.units import Quantity
 
+from flybystab.arguments import check_arguments
 from flybystab.core.numerics.threads import in_order, worker_count
 from flybystab.errors import Impact, InvalidInput, NotConverged
 from flybystab.orbit.ephemeris import BODIES, SUN, Ephemeris
@@ -52,6 +53,7 @@ from flybystab.typing import Array
 from flybystab.units import checked_time, to_si
 
 
+@check_arguments
 def find_encounters(
     objects: Any,
     start: Time | str,
