@@ -17,7 +17,7 @@ TABLES = {
     "flyby": "flybystab bench flyby --output docs/images/precision.png",
     "forecast": "python examples/apophis_forecast.py",
     "grains": "python benchmarks/piles.py grains",
-    "grains_cases": "python benchmarks/grains_ellipsoid.py cases --minutes 48",
+    "grains_cases": "python benchmarks/grains_ellipsoid.py cases --cases 1600 --jobs 2",
     "grains_flybys": "python benchmarks/grains_references.py flybys --cases 26",
     "grains_flybys_2": "python benchmarks/grains_references.py flybys --first 26 --seeds 2",
     "grains_map": "python benchmarks/grains_ellipsoid.py map --grains 150",

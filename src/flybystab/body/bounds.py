@@ -18,7 +18,7 @@ from flybystab.core.numerics.jit import kernel
 from flybystab.errors import InvalidInput
 from flybystab.tabular import Tabular
 from flybystab.typing import Array
-from flybystab.units import brief, to_si
+from flybystab.units import brief, to_si, whole
 
 
 @dataclass(frozen=True)
@@ -137,7 +137,7 @@ def requirements(
         raise InvalidInput("spin", body.spin, "steady spin about a3")
     if samples < 1:
         raise InvalidInput("samples", samples, "a positive integer")
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng(whole(seed, "seed", 0))
 
     def spread(
         value: Array, sigma: Quantity | None, unit: u.UnitBase, name: str, shape: tuple[int, ...]

@@ -109,6 +109,8 @@ def spin_forecast(
     The body is rigid: the forecast depends on the ratios of its moments of inertia, on spin state, pole, phase and on
     the tide, but not on density, size or strength.
     """
+    if not isinstance(asteroid, Body) and not hasattr(asteroid, "pole"):
+        raise InvalidInput("asteroid", asteroid, "an Asteroid or a Body")
     if not isinstance(encounter, Encounter) or encounter.impact:
         raise InvalidInput("encounter", encounter, "an Encounter without an impact")
     known = not isinstance(asteroid, Body) and asteroid.pole is not None and encounter.frame == "ICRF"
