@@ -3,7 +3,7 @@
 PYTHON ?= python3
 PY = .venv/bin/python
 
-.PHONY: demo test check docs dist clean
+.PHONY: demo test check docs dist minimum clean
 
 .venv/bin/python:
 	$(PYTHON) -m venv .venv
@@ -43,6 +43,10 @@ dist: .venv/.test
 	rm -rf dist build
 	$(PY) -m build --outdir dist . > /dev/null
 	$(PY) scripts/smoke_test.py dist
+
+# Declared minimum versions, in an environment of their own.
+minimum:
+	$(PYTHON) scripts/minimum_versions.py
 
 clean:
 	rm -rf .venv out build dist src/*.egg-info

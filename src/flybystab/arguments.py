@@ -66,7 +66,7 @@ KINDS: Mapping[str, tuple[str, Callable[[Any], bool]]] = {
 #: Classes of this package and of astropy that are recognised by their name, so that this module imports none of them.
 #: An Asteroid stands for its orbit.
 CLASSES = (
-    "Asteroid", "Axes", "Body", "Covariance", "DisruptionRates", "Encounter", "EncounterDistribution", "Ephemeris",
+    "Asteroid", "Axes", "Body", "Covariance", "DisruptionRates", "Encounter", "Ephemeris",
     "Friction", "GrainSizes", "Material", "Orbit", "Pile", "Planet", "Population", "QTable", "Shape",
     "SlopeChange", "Time", "Window",
 )  # fmt: skip

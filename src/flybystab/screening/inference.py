@@ -18,7 +18,6 @@ from astropy.table import QTable
 from astropy.time import Time
 from astropy.units import Quantity
 
-from flybystab.arguments import check_arguments
 from flybystab.body.body import DEFAULT_SURFACE, Body, Material
 from flybystab.catalogues.asteroid import identity
 from flybystab.catalogues.catalogue import Asteroid
@@ -40,7 +39,6 @@ NEGLIGIBLE = float(np.radians(0.05))
 _STEEP = 1.5
 
 
-@check_arguments
 def infer(
     asteroid: Asteroid | Body,
     encounters: Sequence[Encounter] = (),

@@ -6,12 +6,35 @@ The shell shows the notice during a command (:mod:`flybystab.cli.compile_notice`
 
 from __future__ import annotations
 
+import os
 import sys
+from pathlib import Path
 from typing import TextIO
 
-from numba.core import event
+from numba.core import config, event
+from numba.misc.appdirs import AppDirs
+
+from flybystab.core.numerics.jit import CACHE
 
 WORDS = "flybystab: compiling numerical kernels, once on this machine (about a minute) ...\n"
+#: Where the package cannot be written, and where the user's cache folder cannot either.
+KEPT = "flybystab: compiling numerical kernels (about a minute), once; they are kept in {folder} ...\n"
+NOT_KEPT = (
+    "flybystab: compiling numerical kernels (about a minute) for this process only: neither the package nor the user's "
+    "cache folder can be written; set NUMBA_CACHE_DIR to a folder that can\n"
+)
+
+
+def words() -> str:
+    """The notice: where the kernels are kept, if not beside their sources."""
+    if not CACHE:
+        return NOT_KEPT
+    if config.CACHE_DIR:
+        return KEPT.format(folder=config.CACHE_DIR)
+    package = Path(__file__).resolve().parents[2]
+    if os.access(package / "core" / "numerics", os.W_OK):
+        return WORDS
+    return KEPT.format(folder=AppDirs(appname="numba", appauthor=False).user_cache_dir)
 
 
 class Announcement(event.Listener):
@@ -35,7 +58,7 @@ class Announcement(event.Listener):
         if not self.said:
             self.said = True
             stream = sys.stderr if self.stream is None else self.stream
-            stream.write(WORDS)
+            stream.write(words())
             stream.flush()
 
     def on_start(self, event: event.Event) -> None:
