@@ -68,7 +68,7 @@ KINDS: Mapping[str, tuple[str, Callable[[Any], bool]]] = {
 CLASSES = (
     "Asteroid", "Axes", "Body", "Covariance", "DisruptionRates", "Encounter", "Ephemeris",
     "Friction", "GrainSizes", "Material", "Orbit", "Pile", "Planet", "Population", "QTable", "Shape",
-    "SlopeChange", "Time", "Window",
+    "SlopeChange", "Window",
 )  # fmt: skip
 
 

@@ -395,6 +395,7 @@ class Asteroid(Record):
         spin = self.angular_velocities(np.array([phase]))[0]
         return Body(semi_axes=self.semi_axes, density=density, spin=spin * u.rad / u.s, material=material)
 
+    @check_arguments
     def angular_velocities(self, phase: Array) -> Array:
         """Angular velocities along the body axes, rad/s, shape (n, 3), at phases of the rotation, shape (n,).
 

@@ -209,6 +209,7 @@ class Encounter:
             way.tau, way.start, way.width, self.planet.impact_distance, self.height, 1.0, way.coefficients
         )
 
+    @check_arguments
     def tidal_tensor(self, t: float) -> Array:
         """Tidal tensor, frame of the encounter, (3, 3), 1/s2, at `t` seconds from closest approach."""
         six, panels = np.empty(6), self.tide

@@ -10,6 +10,7 @@ import numpy as np
 from flybystab.arguments import check_arguments
 from flybystab.core import verdict_codes as codes
 from flybystab.core.ellipsoid.bound_mass import bound_share, one_pass_share
+from flybystab.errors import InvalidInput
 from flybystab.typing import Array
 
 
@@ -101,6 +102,9 @@ def bound_fraction(shape: Array, velocity_gradient: Array, density: float) -> fl
     density : float
         kg/m3.
     """
+    for name, value in (("shape", shape), ("velocity_gradient", velocity_gradient)):
+        if np.shape(value) != (3, 3) or not np.all(np.isfinite(value)):
+            raise InvalidInput(name, value, "a (3, 3) matrix of finite numbers")
     return float(bound_share(*_arrays(shape, velocity_gradient), float(density)))
 
 

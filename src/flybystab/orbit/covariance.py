@@ -87,7 +87,7 @@ class Covariance:
     centre: str = "sun"
 
     def __post_init__(self) -> None:
-        check_kinds(self, "epoch", "values", "matrix", "source", "correlated", "caveat")
+        check_kinds(self, "epoch", "values", "matrix", "source", "correlated", "caveat", "frame", "centre")
         if not isinstance(self.names, tuple | list) or not all(isinstance(name, str) for name in self.names):
             raise InvalidInput("names", self.names, "a sequence of names")
         for name in ("values", "matrix"):

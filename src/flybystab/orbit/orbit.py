@@ -348,6 +348,7 @@ class Orbit:
             )
         return flight.state
 
+    @check_arguments
     def state_transition(self, time: Time, ephemeris: str | Ephemeris | None = None) -> StateTransition:
         """Derivatives of the state at another time by the state at the epoch and the non-gravitational parameters.
 
@@ -389,6 +390,7 @@ class Orbit:
         )
         return StateTransition(self.epoch.tdb, later(self.epoch, t), found[:, :6], found[:, 6:], error)
 
+    @check_arguments
     def covariance_at(self, time: Time, ephemeris: str | Ephemeris | None = None) -> Covariance:
         """Covariance of the heliocentric state at another time, to first order.
 

@@ -11,7 +11,7 @@ import sys
 from pathlib import Path
 from typing import TextIO
 
-from numba.core import config, event
+from numba.core import event
 from numba.misc.appdirs import AppDirs
 
 from flybystab.core.numerics.jit import CACHE
@@ -29,8 +29,8 @@ def words() -> str:
     """The notice: where the kernels are kept, if not beside their sources."""
     if not CACHE:
         return NOT_KEPT
-    if config.CACHE_DIR:
-        return KEPT.format(folder=config.CACHE_DIR)
+    if folder := os.environ.get("NUMBA_CACHE_DIR"):
+        return KEPT.format(folder=folder)
     package = Path(__file__).resolve().parents[2]
     if os.access(package / "core" / "numerics", os.W_OK):
         return WORDS
