@@ -9,7 +9,7 @@ MODULE = """
 from flybystab.catalogues.readers import reader
 
 
-@reader("mine", lambda text: text.startswith("MINE "))
+@reader("mine", lambda text: text.startswith("MINE "), ())
 def read(text, file):
     return [({"name": word}, None) for word in text.split()[1:]]
 """
