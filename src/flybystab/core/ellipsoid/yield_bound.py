@@ -14,7 +14,7 @@ Both bound the change of ``w w``. Where ``J_2`` is close to ``J_3`` the axis may
 two short axes; then the stress turns with it, but for terms in ``S_2 - S_3``, and the smaller bound counts.
 
 If every stress within that distance ``d`` of the undisturbed one is inside the yield surface the body cannot yield:
-INTACT is proved without integrating anything. With the gauge ``gamma = sin(phi)/k`` the yield function
+INTACT is proved without integrating anything. With the gauge ``gamma = sin(phi)/k`` the yield function::
 
     f = |s| gamma(theta) - p sin(phi) - Y cos(phi)
 
