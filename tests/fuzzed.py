@@ -319,6 +319,7 @@ def valid():
         },
         "catalogue": {},
         "cite": {},
+        "cohesion_bounds": {"body": body},
         "critical": passage | {"quantity": "periapsis", "phases": 1},
         "density_intervals": {"body": body},
         "disruption_rates": {"population": population, "planets": ["earth"], "samples": 20},
@@ -332,6 +333,7 @@ def valid():
         "flyby": passage,
         "flyby_many": {"bodies": s["Body"], "encounters": s["Encounter"]},
         "flyby_margin": passage,
+        "fresh_fraction": {"population": population, "radii": {"earth": 5.0}},
         "freshness": {"asteroid": asteroid, "distances": {"earth": 1e5 * u.km}},
         "impact_energy": {"mass": 1e10 * u.kg, "speed": 20 * u.km / u.s},
         "infer": {

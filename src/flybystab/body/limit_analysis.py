@@ -24,6 +24,7 @@ from scipy.linalg import null_space
 from scipy.optimize import minimize
 from scipy.special import logsumexp, softmax
 
+from flybystab.arguments import check_arguments
 from flybystab.body.body import Body, Material, check_body
 from flybystab.body.elastic_stress import DIRECTIONS, ball_quadrature, sphere_directions
 from flybystab.body.equilibrium import tide_components
@@ -64,6 +65,7 @@ class CohesionBounds(Record):
         return f"<CohesionBounds {brief(self.necessary)} to {brief(self.sufficient)}>"
 
 
+@check_arguments
 def cohesion_bounds(
     body: Body, tide: Quantity | None = None, *, material: Material | None = None
 ) -> CohesionBounds:

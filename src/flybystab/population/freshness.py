@@ -192,4 +192,6 @@ def fresh_fraction(
         found = encounter_rates(population, name, workers=workers)
         found = found.within(limit * found.planet.radius * u.m)
         rate, weight = rate + found.rate.to_value(1 / u.yr), found.weight
+    if not np.sum(weight) > 0.0:
+        raise InvalidInput("population", population, "a population with orbits")
     return float(np.average(-np.expm1(-rate * aged), weights=weight))
