@@ -2,6 +2,7 @@
 
 import gzip
 import re
+import sys
 
 import astropy.units as u
 import numpy as np
@@ -11,7 +12,7 @@ import flybystab as fs
 from flybystab.body.mesh import mass_properties
 from flybystab.constants import G
 from flybystab.core.ellipsoid.potential import gravity_coefficients
-from flybystab.errors import InvalidInput, UnitMismatch
+from flybystab.errors import InvalidInput, MissingExtra, UnitMismatch
 
 AXES = np.array([1400.0, 850.0, 750.0])
 
@@ -96,7 +97,7 @@ def test_body_of_a_shape():
     [
         # without facet 0 its neighbours 1, 5 and 11 are open: 0, 4 and 10 of those left
         (lambda v, f: (v, f[1:]), r"numbers 0, 4, 10 \(from 0\).*open edge"),
-        (lambda v, f: (v, np.vstack([f[:1, ::-1], f[1:]])), r"numbers 0.*turned over"),
+        (lambda v, f: (v, np.vstack([f[:1, ::-1], f[1:]])), r"numbers 0.*oriented opposite"),
         (lambda v, f: (v, np.vstack([f, f[:1]])), r"numbers 0.*more meet"),
         (lambda v, f: (v * [1, 1, 0], f), "a solid body"),
         (lambda v, f: (v, f + 1), "numbered from 0 to 7"),
@@ -226,6 +227,17 @@ def test_pyvista_reads_the_fields(tmp_path):
     mesh = pyvista.read(tmp_path / "box.vtk")
     assert mesh.cell_data["area_m2"] == pytest.approx(shape.facet_area.value, rel=1e-8)
     assert mesh.volume == pytest.approx(6.0, rel=1e-6)
+    direct = shape.to_pyvista({"area": shape.facet_area})
+    assert direct.cell_data["area_m2"] == pytest.approx(shape.facet_area.value)
+    assert direct.volume == pytest.approx(6.0)
+    with pytest.raises(InvalidInput, match="one for each facet"):
+        shape.to_pyvista({"area": shape.facet_area[:5]})
+
+
+def test_pyvista_is_an_extra(monkeypatch):
+    monkeypatch.setitem(sys.modules, "pyvista", None)
+    with pytest.raises(MissingExtra, match="pyvista"):
+        box().to_pyvista()
 
 
 @pytest.mark.parametrize("text", ["", "hello world\n", "4 4\n0 0 0\n1 0 0\n", "v 0 0 0\nv 1 0 0\nf 1 2 3\n"])

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import astropy.units as u
 import numpy as np
@@ -15,11 +15,11 @@ from numpy.typing import NDArray
 
 from flybystab.arguments import check_arguments
 from flybystab.body.mesh import MassProperties, edges_of, mass_properties, self_intersections
-from flybystab.body.shape_files import read_mesh, write_mesh
+from flybystab.body.shape_files import facet_fields, read_mesh, write_mesh
 from flybystab.constants import G
 from flybystab.core.polyhedron.gravity import polyhedron_gravity
 from flybystab.core.polyhedron.moments import third_moments
-from flybystab.errors import InvalidInput, UnitMismatch
+from flybystab.errors import InvalidInput, MissingExtra, UnitMismatch
 from flybystab.typing import Array
 from flybystab.units import brief, frozen, to_si, whole
 
@@ -324,6 +324,34 @@ class Shape:
             Names without spaces; the unit is appended to the name. Coordinates are in m, principal frame.
         """
         write_mesh(Path(path), self.vertices.value, self.facets, fields or {})
+
+    @check_arguments
+    def to_pyvista(self, fields: Mapping[str, Quantity] | None = None) -> Any:
+        """The mesh for pyvista, with quantities by facet: ``.plot(scalars=...)`` shows it in three dimensions.
+
+        Parameters
+        ----------
+        fields : mapping of str to Quantity, shape (f,), optional
+            As in `write`.
+
+        Returns
+        -------
+        pyvista.PolyData
+            Coordinates in m, principal frame.
+
+        Raises
+        ------
+        MissingExtra
+            pyvista is not installed.
+        """
+        try:
+            from pyvista import PolyData
+        except ImportError:
+            raise MissingExtra("pyvista", "pyvista", "a mesh in three dimensions") from None
+        mesh = PolyData.from_regular_faces(self.vertices.value, self.facets.tolist())
+        for name, values in facet_fields(fields or {}, len(self.facets)).items():
+            mesh.cell_data[name] = values
+        return mesh
 
     def __repr__(self) -> str:
         return f"<Shape {len(self.facets)} facets, {brief(self.ellipsoid())} (equivalent semi-axes)>"

@@ -64,16 +64,28 @@ def write_mesh(path: Path, vertices: Array, facets: Integers, fields: Mapping[st
     writer = MESHES.get(path.suffix.lower())
     if writer is None:
         raise InvalidInput("path", path, f"a name that ends in {' or '.join(MESHES)}")
+    lines = writer(vertices, facets, facet_fields(fields, len(facets)))
+    path.write_text("\n".join(lines) + "\n", encoding="ascii")
+
+
+def facet_fields(fields: Mapping[str, Quantity], facets: int) -> dict[str, Array]:
+    """Numbers by facet, the unit appended to the name of each field.
+
+    Raises
+    ------
+    InvalidInput
+        For a name with spaces, or a field of another length.
+    """
     values = {}
     for name, field in fields.items():
         quantity = Quantity(field)
-        if len(name.split()) != 1 or quantity.shape != (len(facets),):
+        if len(name.split()) != 1 or quantity.shape != (facets,):
             raise InvalidInput(
-                "fields", name, f"a name without spaces and {len(facets)} values, one for each facet"
+                "fields", name, f"a name without spaces and {facets} values, one for each facet"
             )
         unit = quantity.unit.to_string().replace(" ", "")
         values[f"{name}_{unit}" if unit else name] = np.asarray(quantity.value)
-    path.write_text("\n".join(writer(vertices, facets, values)) + "\n", encoding="ascii")
+    return values
 
 
 def _vtk(vertices: Array, facets: Integers, fields: Mapping[str, Array]) -> list[str]:
