@@ -113,6 +113,26 @@ def _compile(at_t: int, at_p: int, at_model: int, x: int, v: int, a: int) -> tup
     return force, log
 
 
+def simulation(t: float, states: Array, epsilon: float, memory: Array, force: Any) -> Any:
+    """A simulation of test particles at `t` (s) with states (n, 6), m and m/s, moved by a compiled force alone.
+
+    The force reads `memory`, which has to live as long as the simulation.
+    """
+    sim = rebound.Simulation()
+    for x, y, z, vx, vy, vz in states:
+        sim.add(x=x, y=y, z=z, vx=vx, vy=vy, vz=vz)
+    sim.t = t
+    sim.integrator = "ias15"
+    sim.gravity = "none"
+    sim.force_is_velocity_dependent = 1
+    sim.dt = 3600.0
+    # Far below any step of a path outside a planet: no integration can stall.
+    set_step_control(sim, epsilon).min_dt = 0.1
+    sim.extras = memory.ctypes.data
+    sim.additional_forces = force.ctypes
+    return sim
+
+
 class Flight:
     """One asteroid under way in rebound.
 
@@ -131,19 +151,8 @@ class Flight:
     def __init__(self, model: Array, t: float, state: Array, epsilon: float = EPSILON) -> None:
         self._model = np.array(model)
         self._epsilon = epsilon
-        force, log = _callbacks()
-        sim = rebound.Simulation()
-        sim.add(x=state[0], y=state[1], z=state[2], vx=state[3], vy=state[4], vz=state[5])
-        sim.t = t
-        sim.integrator = "ias15"
-        sim.gravity = "none"
-        sim.force_is_velocity_dependent = 1
-        sim.dt = 3600.0
-        # Far below any step of a path outside a planet: no integration can stall.
-        set_step_control(sim, epsilon).min_dt = 0.1
-        sim.extras = self._model.ctypes.data
-        sim.additional_forces = force.ctypes
-        self._sim, self._log = sim, log
+        force, self._log = _callbacks()
+        self._sim = simulation(t, state[None], epsilon, self._model, force)
 
     @property
     def t(self) -> float:

@@ -34,7 +34,7 @@ from flybystab.orbit.forces import (
     bodies,
     push,
 )
-from flybystab.orbit.ias15 import EPSILON, TIGHT, _address, _pointer, set_step_control
+from flybystab.orbit.ias15 import EPSILON, TIGHT, _address, _pointer, simulation
 from flybystab.tabular import Record
 from flybystab.typing import Array
 
@@ -203,17 +203,7 @@ def _carried(
     ways = size[:, None] * np.block([[eye, eye], [eye, -eye]])
     begin = np.hstack([ways, np.zeros((6, len(PUSHES)))])
     memory = np.concatenate([own, scale])
-    sim = rebound.Simulation()
-    for x in (state, *begin.T):
-        sim.add(x=x[0], y=x[1], z=x[2], vx=x[3], vy=x[4], vz=x[5])
-    sim.t = start
-    sim.integrator = "ias15"
-    sim.gravity = "none"
-    sim.force_is_velocity_dependent = 1
-    sim.dt = 3600.0
-    set_step_control(sim, epsilon).min_dt = 0.1
-    sim.extras = memory.ctypes.data
-    sim.additional_forces = _callback().ctypes
+    sim = simulation(start, np.vstack([state, begin.T]), epsilon, memory, _callback())
     sim.integrate(stop)
     end = np.array([[p.x, p.y, p.z, p.vx, p.vy, p.vz] for p in sim.particles])[1:].T
     if not np.isfinite(end).all():
