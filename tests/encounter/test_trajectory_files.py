@@ -8,7 +8,7 @@ from astropy.time import Time
 import flybystab as fs
 from flybystab.catalogues.catalogue import catalogue
 from flybystab.constants import DAY
-from flybystab.errors import InvalidInput, NoEncounter, OutOfSpan
+from flybystab.errors import InvalidInput, NoEncounter, OutOfSpan, UnitMismatch
 from flybystab.orbit.ephemeris import BODIES, ephemeris
 
 spice = pytest.importorskip("spiceypy")
@@ -135,3 +135,19 @@ def test_messages_that_are_refused(tmp_path, track, old, new, match):
     path.write_text(message(track).replace(old, new))
     with pytest.raises(InvalidInput, match=match):
         fs.Encounter.from_oem(path, "earth")
+
+
+def test_a_start_distance_below_zero_is_an_error_on_every_way_in():
+    t = np.array([-1.0, 0.0, 1.0]) * u.h
+    x = np.ones((3, 3)) * u.km
+    orbit = fs.Asteroid.from_catalogue("Apophis").orbit
+    for way in (
+        lambda d: fs.Encounter.from_trajectory(t, x, x / u.s, "earth", start_distance=d),
+        lambda d: fs.Encounter.from_spk("sb.bsp", None, "earth", MIDDLE, start_distance=d),
+        lambda d: fs.Encounter.from_oem("sb.oem", "earth", start_distance=d),
+        lambda d: fs.Encounter.from_orbit(orbit, "earth", MIDDLE, start_distance=d),
+    ):
+        with pytest.raises(InvalidInput, match="start_distance"):
+            way(-1.0 * u.km)
+        with pytest.raises(UnitMismatch, match="start_distance"):
+            way(1.0 * u.s)

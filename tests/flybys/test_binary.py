@@ -25,6 +25,22 @@ def test_far_from_the_planet_nothing_changes():
     assert np.all(out.closest.to_value(u.km) >= 1.6 * 0.9 * (1 - 1e-3))
 
 
+@pytest.mark.parametrize("e", [0.0, 1e-9, 0.3, 0.95])
+def test_the_states_before_the_encounter_obey_the_equation_of_kepler(e):
+    rng = np.random.default_rng(3)
+    mean_anomaly = 2.0 * np.pi * rng.random(200)
+    frames = module._frames(None, 200, rng)
+    state = module._states(e, mean_anomaly, frames)
+    x, v = (np.einsum("nji,nj->ni", frames, part) for part in (state[:, :3], state[:, 3:]))
+    anomaly = np.arctan2(x[:, 1] / np.sqrt(1.0 - e * e), x[:, 0] + e)  # eccentric
+    turn = anomaly - e * np.sin(anomaly) - mean_anomaly
+    assert np.abs(np.angle(np.exp(1j * turn))).max() < 1e-13
+    assert 0.5 * np.sum(v * v, axis=1) - 1.0 / np.linalg.norm(x, axis=1) == pytest.approx(-0.5, abs=1e-12)
+    momentum = np.cross(x, v)
+    assert momentum[:, 2] == pytest.approx(np.sqrt(1.0 - e * e), rel=1e-12)
+    assert np.abs(x[:, 2]).max() < 1e-14
+
+
 def test_fast_passages_give_the_impulse_of_a_straight_line():
     """``dv = 2 GM/(b^2 V) (x, 0, -z)``: x on the line to the planet, y along the motion, z normal to both."""
     speed, q, a = 400e3, 3e7, 5000.0

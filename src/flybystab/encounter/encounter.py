@@ -345,7 +345,7 @@ class Encounter:
         """
         body = _planet(planet)
         wait = to_si(settle, u.s, "settle", low=0.0)
-        start = None if start_distance is None else to_si(start_distance, u.m, "start_distance", low=0.0)
+        start = _start(start_distance)
         axis = _unit_vector(pole)
         from flybystab.encounter.from_trajectory import sampled, samples
 
@@ -397,7 +397,7 @@ class Encounter:
         """
         time = checked_time(time, "time")
         body = _planet(planet)
-        start = None if start_distance is None else to_si(start_distance, u.m, "start_distance", low=0.0)
+        start = _start(start_distance)
         reach = to_si(search, u.s, "search", low=0.0, open_low=True)
         from flybystab.encounter.trajectory_files import spk_samples
 
@@ -436,7 +436,7 @@ class Encounter:
         NoEncounter, OutOfSpan, UnitMismatch, InvalidInput, UnknownName
         """
         body = _planet(planet)
-        start = None if start_distance is None else to_si(start_distance, u.m, "start_distance", low=0.0)
+        start = _start(start_distance)
         from flybystab.encounter.trajectory_files import oem_samples
 
         return cls._along(oem_samples(path, body, ephemeris), body, start, settle, j2, pole)
@@ -526,7 +526,7 @@ class Encounter:
         largest = far_enough(body) if within is None else to_si(within, u.m, "within", low=0.0, open_low=True)
         accuracy = to_si(error, u.m, "error", low=0.0, open_low=True)
         wait = to_si(settle, u.s, "settle", low=0.0)
-        start = None if start_distance is None else to_si(start_distance, u.m, "start_distance", low=0.0)
+        start = _start(start_distance)
         from flybystab.encounter.from_orbit import followed
 
         return followed(cls, path, body, time.tdb, accuracy, start, wait, reach, largest, ephemeris, forces)
@@ -561,6 +561,11 @@ def _each(
 
 def _planet(name: str | Planet) -> Planet:
     return planet(name)
+
+
+def _start(distance: Quantity | None) -> float | None:
+    """Distance at which the encounter starts (m); None where it follows from the path."""
+    return None if distance is None else to_si(distance, u.m, "start_distance", low=0.0)
 
 
 def _unit_vector(pole: tuple[float, float, float]) -> Array:

@@ -26,6 +26,7 @@ from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput, NotConverged
 from flybystab.flybys.binary_figures import Figures, averaged, rotation_matrices, synchronous
 from flybystab.flybys.binary_figures import rates as figured
+from flybystab.orbit.kepler import states_at_times
 from flybystab.tabular import Tabular
 from flybystab.typing import Array
 from flybystab.units import counted, to_si, whole
@@ -255,17 +256,11 @@ def _frames(normal: Quantity | Array | None, n: int, rng: np.random.Generator) -
 
 def _states(e: float, mean_anomaly: Array, frames: Array) -> Array:
     """Positions and velocities ``(n, 6)`` of orbits with ``a = G m = 1``."""
-    anomaly = mean_anomaly + e * np.sin(mean_anomaly)
-    for _ in range(50):  # Newton; for e close to one the first steps are long
-        step = (anomaly - e * np.sin(anomaly) - mean_anomaly) / (1.0 - e * np.cos(anomaly))
-        anomaly = anomaly - np.clip(step, -1.0, 1.0)
-    b = np.sqrt(1.0 - e * e)
-    r = 1.0 - e * np.cos(anomaly)
-    position = np.column_stack([np.cos(anomaly) - e, b * np.sin(anomaly)])
-    velocity = np.column_stack([-np.sin(anomaly), b * np.cos(anomaly)]) / r[:, None]
+    # The solver divides by the eccentricity: a circle is an ellipse of the smallest eccentricity.
+    path = states_at_times(1.0, 1.0 - e, max(e - 1.0, np.finfo(float).eps - 1.0), mean_anomaly)
     plane = frames[:, :, :2]
     return np.concatenate(
-        [np.einsum("nij,nj->ni", plane, position), np.einsum("nij,nj->ni", plane, velocity)], axis=1
+        [np.einsum("nij,nj->ni", plane, path[:, :2]), np.einsum("nij,nj->ni", plane, path[:, 2:])], axis=1
     )
 
 
