@@ -18,6 +18,7 @@ from flybystab.cli import compile_notice as compiling
 from flybystab.cli.main import COMMANDS, main
 from flybystab.core.ellipsoid import yield_bound as quick
 from flybystab.screening.priors import Population
+from flybystab.screening.results import read_results
 
 EXAMPLES = Path(__file__).resolve().parents[2] / "examples"
 
@@ -161,6 +162,15 @@ def test_cite(capsys):
         (["encounters", "Apophis", "--clones", "-1"], 2, "--clones = -1"),
         (["encounters", "Apophis", "--from", "soon"], 2, "a date such as"),
         (["encounters", "Apophis", "--from", "1500-01-01"], 1, "span"),
+        *(
+            ([*command, "--from", "2999-01-01", "--to", "3000-01-01"], 1, "TDB is outside the span of DE4")
+            for command in (
+                ["encounters", "Apophis"],
+                ["screen"],
+                ["ephemeris", "Apophis"],
+                ["impacts", "Apophis"],
+            )
+        ),
         (["infer", "Toutatis", "--surface", "mohr"], 2, "did you mean mohr-coulomb"),
         (["stability"], 2, "--all"),
         (["stability", "Anteros", "--output", "x.ecsv"], 2, "--all"),
@@ -471,11 +481,27 @@ def test_an_asteroid_of_my_own_file(capsys, tmp_path):
     assert found["encounter"]["time_tdb"].startswith("2029-04-13")
     assert found["verdict"] == "INTACT"
     assert found["catalogue"] == str(file)
+    assert "embedded" not in out
     status, _, err = run(capsys, "stability", "yours", "--catalogue", str(file))
     assert status == 1
     assert f"unknown asteroid 'yours' ({file} has 1)" in err
     status, _, err = run(capsys, "stability", "yours")
     assert "others are read from a file" in err
+    table, page = tmp_path / "table.ecsv", tmp_path / "page.html"
+    span = ("--from", "2029-04-01", "--to", "2029-05-01")
+    assert run(capsys, "screen", str(file), *span, "--output", str(table))[0] == 0
+    assert read_results(table).meta["catalogue"] == str(file)
+    assert list(read_results(table)["catalogue"]) == [str(file)]
+    assert run(capsys, "report", str(file), "--attitudes", "2", "--output", str(page))[0] == 0
+    for written in (table, page):
+        assert str(file) in written.read_text()
+        assert "embedded catalogue" not in written.read_text()
+
+
+def test_a_row_of_the_user_is_not_from_the_embedded_catalogue():
+    embedded = Asteroid.from_catalogue("Apophis")
+    assert embedded.file.startswith("embedded catalogue")
+    assert Asteroid(dict(embedded.row) | {"density_kg_m3": "1800"}).file == "given values"
 
 
 def test_a_screening_of_a_body_that_cannot_be_says_so(capsys, tmp_path):

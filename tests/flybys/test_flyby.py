@@ -6,11 +6,13 @@ import pytest
 from scenes import PILE, earth, material
 from scipy.spatial.transform import Rotation
 
+import flybystab as fs
 from flybystab.body.body import YIELD_SURFACES, Body, Material
 from flybystab.constants import R_EARTH, G
 from flybystab.encounter.attitude import periapsis_axes
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput, UnitMismatch, UnknownName
+from flybystab.flybys.document import flyby_document
 from flybystab.flybys.flyby import flyby
 from flybystab.flybys.flyby_many import flyby_many
 from flybystab.flybys.spin_sample import spin_sample
@@ -91,6 +93,23 @@ def test_not_in_equilibrium_says_what_would_help():
     assert r.required_cohesion > 0 * u.Pa
     cured = fast.with_(material=material(35, cohesion=1.0001 * r.required_cohesion))
     assert flyby(cured, earth(50.0, start=100.0)).verdict == "INTACT"
+
+
+def test_no_cohesion_of_zero_is_stated_for_a_body_that_yields_in_the_encounter():
+    e = earth(2.0)
+    r = flyby(PILE, e, error=False)
+    assert r.onset_time is not None
+    assert r.margin < 0 * u.deg
+    assert np.isnan(r.required_cohesion)
+    document = flyby_document(r)
+    assert document["required_cohesion_Pa"] is None
+    assert "flybystab.critical" in document["required_cohesion_Pa_reason"]
+    # the value that the reason refers to is larger than zero, and with more than it the body stays rigid
+    needed = fs.critical(PILE, e, "cohesion", phases=1).largest
+    assert needed > 0 * u.Pa
+    held = flyby(PILE.with_(material=PILE.material.with_(cohesion=10 * needed)), e, error=False)
+    assert held.verdict == "INTACT"
+    assert held.required_cohesion == 0 * u.Pa
 
 
 def test_cohesive_body_in_tension_that_cannot_hold():

@@ -51,7 +51,7 @@ class Asteroid(Record):
     material : Material, optional
         Material of the body, which catalogues do not give. By default that of `body`, otherwise 35 degrees of friction.
     file : str
-        File from which the row was read.
+        File from which the row was read; "given values" by default.
     covariance : Covariance, optional
         Covariance of the orbit, if a file gives one; otherwise see :attr:`orbit`.
     orbit : Orbit, optional
@@ -85,7 +85,7 @@ class Asteroid(Record):
 
     row: Mapping[str, str]
     material: Material = field(default_factory=Material)
-    file: str = f"embedded catalogue {CATALOGUE_DATE}"
+    file: str = "given values"
     covariance: Covariance | None = field(default=None, repr=False)
     own_orbit: Orbit | None = field(default=None, repr=False)
 
@@ -122,12 +122,10 @@ class Asteroid(Record):
 
             given |= columns.pole_columns(pole) if pole is not None else {}
             given |= columns.error_columns(sigmas or {}) | columns.source_columns(sources or {})
-        if file is None:
-            file = f"embedded catalogue {CATALOGUE_DATE}" if row is not None else "given values"
         for key, value in (
             ("row", given if row is None or given != row else row),
             ("material", material or Material()),
-            ("file", file),
+            ("file", "given values" if file is None else file),
             ("covariance", covariance),
             ("own_orbit", own_orbit),
         ):

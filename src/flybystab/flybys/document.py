@@ -48,9 +48,14 @@ def plain(value: Any, name: str = "") -> Any:
 def _reason(key: str, value: float) -> str:
     """Why a number is infinite or undefined."""
     if math.isnan(value):
-        return "not defined or not computed"
+        return next((text for part, text in _UNKNOWN.items() if part in key), "not defined or not computed")
     return next((text for part, text in _INFINITE.items() if part in key), "infinite")
 
+
+#: Reasons for undefined values, by part of the key.
+_UNKNOWN = {
+    "required_cohesion": "the body yields in the encounter: flybystab.critical finds the cohesion that prevents it",
+}
 
 #: Reasons for infinite values, by part of the key.
 _INFINITE = {

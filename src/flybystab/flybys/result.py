@@ -213,8 +213,13 @@ class FlybyResult(Record):
 
     @cached_property
     def required_cohesion(self) -> Quantity:
-        """NOT IN EQUILIBRIUM: the cohesion that holds the body at its friction angle, Pa. Zero otherwise."""
-        return self._run.lacking * u.Pa
+        """Cohesion that keeps the body rigid at its friction angle, Pa; nan for a body that yields in the encounter.
+
+        NOT IN EQUILIBRIUM: the cohesion that holds the body at rest. Zero where the material is sufficient. For a
+        body that yields during the encounter the value takes further flybys: :func:`flybystab.critical`.
+        """
+        lacking = self._run.lacking
+        return (np.nan if lacking == 0.0 and self.margin < 0.0 * u.deg else lacking) * u.Pa
 
     @cached_property
     def lode_angle(self) -> Quantity | None:

@@ -75,8 +75,14 @@ def sky_positions(
         the time when the light left; ``ra_rate`` (times cos dec) and ``dec_rate`` (arcsec/min): rates of the apparent
         place; ``phase`` (deg, Sun-asteroid-observer), ``elongation`` (deg, Sun-observer-asteroid); ``V`` (mag);
         ``altitude``, ``azimuth`` (deg, from north through east; without refraction) of an observer on the ground.
+
+    Raises
+    ------
+    OutOfSpan
+        A time that the ephemeris does not cover.
     """
     chosen = eph if isinstance(eph, Ephemeris) else ephemeris(eph)
+    chosen.check(times.min() - _HALF * u.d, times.max() + _HALF * u.d)
     file = ephemeris_file(chosen)
     place = file["earth"]
     if observer is not None:
