@@ -1,14 +1,19 @@
 """The report page: complete, self-contained, readable on a phone and in print."""
 
 import base64
+import io
 import re
 import shutil
 import subprocess
 from html.parser import HTMLParser
 from pathlib import Path
 
+import astropy.units as u
+import numpy as np
 import pytest
+from PIL import Image
 
+import flybystab as fs
 from flybystab.cli.main import main
 
 CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
@@ -137,11 +142,22 @@ def test_grains_have_a_section(tmp_path, monkeypatch):
     encounter = Encounter.from_orbit(apophis.orbit, "earth", Time("2029-04-13", scale="tdb"))
     result = flyby(apophis.body, encounter, grains=100, seeds=1, model="grains")
     sample = spin_sample(apophis, encounter, n=2)
+    size = np.asarray(apophis.body.axes) * u.m
+    shape = fs.Shape.perturbed(size, amplitude=0.05, seed=2, facets=320)
+    solid = fs.Body.from_shape(shape, density=2000 * u.kg / u.m**3, spin_period=30 * u.h)
+    surface = fs.surface_history(solid, encounter, shape=shape, instants=5)
     said = {}
     for name, r in (("with", result), ("without", flyby(apophis.body, encounter))):
-        parsed = Page(report(apophis, r, sample, tmp_path / f"{name}.html").read_text())
+        page = report(apophis, r, sample, tmp_path / f"{name}.html", surface=surface if r is result else None)
+        parsed = Page(page.read_text())
         assert parsed.open == []
         said[name] = " ".join(parsed.words), len(parsed.images)
     assert "1 pile: INTACT 100%" in said["with"][0]
     assert "Grains" not in said["without"][0]
-    assert said["with"][1] == said["without"][1] + 2
+    assert said["with"][1] == said["without"][1] + 3  # slopes, piles, path
+    text = (tmp_path / "with.html").read_text()
+    narrow = re.findall(r'<source media="\(max-width: 640px\)" srcset="data:image/([^"]+)"', text)
+    assert len(narrow) == said["with"][1]
+    bitmaps = [Image.open(io.BytesIO(base64.b64decode(n.split(",")[1]))) for n in narrow if n[:3] == "png"]
+    assert len(bitmaps) == 4
+    assert all(picture.width == pytest.approx(4.0 * 130, abs=2) for picture in bitmaps)

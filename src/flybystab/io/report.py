@@ -103,7 +103,7 @@ def report(
             "sample": _sample_picture(sample),
             "scene": _scene_picture(result),
             "surface": None if surface is None else _surface_picture(surface),
-            "grains": None if result.grains is None else (_bitmap(grains_figure(result)), None),
+            "grains": None if result.grains is None else _grains_picture(result),
             "grains_scene": None if result.grains is None else _grains_scene(result),
         },
     )
@@ -305,8 +305,8 @@ def _embedded(figure: Any) -> str:
     return "data:image/svg+xml;base64," + base64.b64encode(stream.getvalue()).decode()
 
 
-#: A figure as a data URL, and the same drawn anew for a narrow screen; None where it has too many panels for one.
-_Pictures = tuple[str, str | None]
+#: A figure as a data URL, and the same drawn anew for a narrow screen.
+_Pictures = tuple[str, str]
 #: Width of a figure on a phone, inches: 390 px with text of its full size.
 _PHONE = 4.0
 
@@ -320,7 +320,9 @@ def _blank(width: float, height: float) -> Any:
     return figure
 
 
-def _twice(draw: Callable[[Any], Any], wide: tuple[float, float], narrow: float, encode: Any) -> _Pictures:
+def _twice(
+    draw: Callable[[Any], Any], wide: tuple[float, float], narrow: float, encode: Callable[[Any], str]
+) -> _Pictures:
     """A figure in its size, and as wide as a phone with the height `narrow`."""
     out = []
     for width, height in (wide, (_PHONE, narrow)):
@@ -343,12 +345,18 @@ def _bitmap(figure: Any) -> str:
     return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()
 
 
+def _grains_picture(r: FlybyResult) -> _Pictures:
+    return _twice(lambda figure: grains_figure(r, figure=figure), (11.0, 5.6), 8.4, _bitmap)
+
+
 def _grains_scene(r: FlybyResult) -> _Pictures:
     return _twice(lambda figure: grains_scene_plot(figure.subplots(), r), (7.2, 4.2), 3.0, _bitmap)
 
 
 def _surface_picture(surface: SurfaceHistory) -> _Pictures:
-    return _bitmap(surface_history_figure(surface, REPOSE, figure=_blank(8.0, 9.0))), None
+    return _twice(
+        lambda figure: surface_history_figure(surface, REPOSE, figure=figure), (8.0, 9.0), 8.8, _bitmap
+    )
 
 
 def _scene_picture(r: FlybyResult) -> _Pictures:

@@ -20,7 +20,7 @@ from flybystab.flybys.batch import span_of
 from flybystab.flybys.grains_outcome import GrainsOutcome, GrainsRun
 from flybystab.flybys.result import FlybyResult
 from flybystab.plots.flyby import BLACK
-from flybystab.plots.style import new_figure, save, styled
+from flybystab.plots.style import NARROW, new_figure, save, styled
 from flybystab.progress import Progressing, progress_bar
 from flybystab.typing import Array
 
@@ -127,21 +127,45 @@ def grains_scene_plot(
 
 
 @styled
-def grains_figure(result: FlybyResult, title: str = "", path: str | Path | None = None) -> Any:
-    """Four stills of the pile with the median outcome, and the largest clump of all piles against time."""
+def grains_figure(
+    result: FlybyResult, title: str = "", path: str | Path | None = None, *, figure: Any = None
+) -> Any:
+    """Four stills of the pile with the median outcome, and the largest clump of all piles against time.
+
+    Parameters
+    ----------
+    result : FlybyResult
+        Of grains.
+    title : str
+    path : str or Path, optional
+        File to write.
+    figure : matplotlib Figure, optional
+        To draw on; in one narrower than 6 inches the panels are in two columns.
+
+    Returns
+    -------
+    matplotlib Figure
+    """
     outcome = _outcome(result)
     run, turn = outcome.median, periapsis_axes(result.encounter)
     hours = run.course.time.to_value(u.h)
     rows = [0, *(int(np.abs(hours - h).argmin()) for h in (0.7, 1.8)), len(hours) - 1]
-    figure = new_figure(11.0, 5.6)
-    grid = figure.add_gridspec(2, 4, height_ratios=(1.4, 1.0))
+    figure = new_figure(11.0, 5.6) if figure is None else figure
+    narrow = figure.get_figwidth() < NARROW
+    if narrow:
+        grid = figure.add_gridspec(4, 2, height_ratios=(1.4, 1.4, 1.0, 1.0))
+        stills = [grid[0, 0], grid[0, 1], grid[1, 0], grid[1, 1]]
+        share, spin = figure.add_subplot(grid[2, :]), figure.add_subplot(grid[3, :])
+    else:
+        grid = figure.add_gridspec(2, 4, height_ratios=(1.4, 1.0))
+        stills = [grid[0, k] for k in range(4)]
+        share, spin = figure.add_subplot(grid[1, :2]), figure.add_subplot(grid[1, 2:])
     for k, row in enumerate(rows):
-        axes = figure.add_subplot(grid[0, k])
+        axes = figure.add_subplot(stills[k])
         grains_plot(axes, run, row, turn)
         axes.set_title(f"{hours[row]:+.2f} h")
-        if k == 0:
+        if k == 0 or (narrow and k == 2):
             axes.set_ylabel("y (km)")
-    share, spin = figure.add_subplot(grid[1, :2]), figure.add_subplot(grid[1, 2:])
     for one in outcome.runs:
         t = one.course.time.to_value(u.h)
         own: dict[str, Any] = {"color": COLOURS[0] if one is run else "0.7", "lw": 1.5 if one is run else 0.8}
@@ -150,7 +174,10 @@ def grains_figure(result: FlybyResult, title: str = "", path: str | Path | None 
     share.set(xlabel="time from closest approach (h)", ylabel="largest clump / mass", ylim=(0.0, 1.05))
     spin.set(xlabel="time from closest approach (h)", ylabel="its long semi-axis (m)")
     figure.suptitle(
-        f"{title + ': ' if title else ''}{result.verdict}, {len(outcome.runs)} piles, blue: the median one",
+        fill(
+            f"{title + ': ' if title else ''}{result.verdict}, {len(outcome.runs)} piles, blue: the median one",
+            int(11.0 * figure.get_figwidth()),
+        )
     )
     if path is not None:
         save(figure, path)

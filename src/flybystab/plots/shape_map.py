@@ -14,7 +14,7 @@ from flybystab.body.shape import Shape
 from flybystab.body.surface_history import SurfaceHistory
 from flybystab.body.surface_slope import SlopeChange
 from flybystab.errors import InvalidInput
-from flybystab.plots.style import new_figure, styled
+from flybystab.plots.style import NARROW, new_figure, styled
 
 #: Directions of view, with the image's right and up: from +x, +y and +z of the principal frame.
 VIEWS = (("+x", 0, (1, 2)), ("+y", 1, (0, 2)), ("+z", 2, (0, 1)))
@@ -133,14 +133,17 @@ def surface_history_figure(
     repose : Quantity
         Angle of repose, for the share of the area that is steeper.
     figure : matplotlib Figure, optional
-        To draw on.
+        To draw on; in one narrower than 6 inches the colour bars are below the maps, and the curves below each other.
 
     Returns
     -------
     matplotlib Figure
     """
     figure = new_figure(9.0, 9.5) if figure is None else figure
-    grid = figure.add_gridspec(4, 3, height_ratios=(1.0, 1.0, 1.0, 0.8))
+    narrow = figure.get_figwidth() < NARROW
+    grid = figure.add_gridspec(
+        5 if narrow else 4, 3, height_ratios=(1.0, 1.0, 1.0, 1.1, 1.1) if narrow else (1.0, 1.0, 1.0, 0.8)
+    )
     slope, change = history.slope.to_value(u.deg), history.change.to_value(u.deg)
     largest = float(max(np.abs(change).max(), 1e-3))
     rows = (
@@ -152,17 +155,24 @@ def surface_history_figure(
         places = [figure.add_subplot(grid[i, j]) for j in range(3)]
         for axes, (view, _, _) in zip(places, VIEWS, strict=True):
             drawn = shape_map(axes, history.shape, values, view, limits=limits, cmap=cmap)
-        figure.colorbar(drawn, ax=places, label=label)
+            if narrow:  # the scale is the same on both axes
+                axes.set(title=view, xticks=[])
+                axes.locator_params(axis="y", nbins=2)
+        figure.colorbar(drawn, ax=places, label=label, location="bottom" if narrow else "right")
     hours = history.time.to_value(u.h)
-    left, right = figure.add_subplot(grid[3, :2]), figure.add_subplot(grid[3, 2])
+    curves = (grid[3, :], grid[4, :]) if narrow else (grid[3, :2], grid[3, 2])
+    left, right = figure.add_subplot(curves[0]), figure.add_subplot(curves[1])
     for percent in (1, 50, 99):
         left.plot(hours, np.percentile(change, percent, axis=1), label=f"{percent} %")
     left.axvline(0.0, color="0.5", lw=0.8, ls="--")
     left.set_xlabel("time from closest approach (h)")
-    left.set_ylabel("change of slope (deg)")
-    left.legend(title="percentile of the facets", loc="lower right")
+    left.set_ylabel("change of\nslope (deg)" if narrow else "change of slope (deg)")
+    if narrow:
+        left.legend(title="percentile of the facets", loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
+    else:
+        left.legend(title="percentile of the facets", loc="lower right")
     right.plot(hours, 100.0 * history.share_past(repose))
     right.set_xlabel("time (h)")
-    right.set_ylabel(f"area above {repose.to_value(u.deg):g} deg (%)")
+    right.set_ylabel(f"area above{chr(10) if narrow else ' '}{repose.to_value(u.deg):g} deg (%)")
     right.set_ylim(bottom=0.0, top=None if np.any(history.share_past(repose)) else 1.0)
     return figure

@@ -75,6 +75,10 @@ def styled(function: Callable[P, R]) -> Callable[P, R]:
     return wrapped
 
 
+#: Width (inches) below which the panels of a figure are arranged for the screen of a phone.
+NARROW = 6.0
+
+
 def new_figure(width: float, height: float, **options: Any) -> Any:
     """A figure of a size in inches, scaled by the style, that is drawn without a window."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
