@@ -10,6 +10,7 @@ from matplotlib.patches import Circle, Ellipse
 import flybystab as fs
 from flybystab.constants import GM_EARTH
 from flybystab.plots.grains import grains_plot
+from flybystab.plots.style import figure_style
 
 IMAGES = Path(__file__).resolve().parent / "images"
 BLUE, ORANGE, RED, GREEN = "#0072B2", "#E69F00", "#D55E00", "#009E73"
@@ -23,7 +24,7 @@ def save(name, figure):
 
 def tide():
     """Tidal acceleration on the surface of a body at two Earth radii: stretched along the line, squeezed across."""
-    figure = Figure(figsize=(7.2, 3.4), layout="constrained")
+    figure = Figure(figsize=(7.2, 3.6), layout="constrained")
     axes = figure.subplots()
     axes.add_patch(Circle((0, 0), 1.0, color="0.85"))
     axes.add_patch(Circle((0, 0), 1.0, fill=False, ec="0.4"))
@@ -34,20 +35,20 @@ def tide():
     k = np.diag([2.0, -1.0]) * scale
     ax, ay = k @ np.stack([x, y]) / scale
     axes.quiver(x, y, ax, ay, color=BLUE, angles="xy", scale_units="xy", scale=4.5, width=0.005)
-    axes.annotate("to the planet", (3.3, 0.0), (2.0, 0.0), va="center", arrowprops={"arrowstyle": "->"})
+    axes.annotate("to the planet", (2.75, 0.0), (1.7, 0.0), va="center", arrowprops={"arrowstyle": "->"})
     stretch = 1.12
     axes.add_patch(Ellipse((0, 0), 2 * stretch, 2 / stretch, fill=False, ec=RED, ls="--"))
-    axes.set(xlim=(-2.2, 3.5), ylim=(-1.55, 1.55), aspect="equal")
+    axes.plot([], [], color=BLUE, marker=r"$\rightarrow$", markersize=14, ls="", label="tidal acceleration")
+    axes.plot([], [], color=RED, ls="--", label="shape that the tide tends to give (exaggerated)")
+    axes.set(xlim=(-2.0, 2.8), ylim=(-1.1, 1.1), aspect="equal")
     axes.axis("off")
-    figure.suptitle(
-        "Tidal acceleration: away from the centre along the line to the planet, inwards across it", fontsize=9
-    )
+    figure.legend(loc="outside upper center", ncols=2, frameon=False)
     save("why_tide.png", figure)
 
 
 def friction():
     """Principal stresses of the pile far away and at closest approach, as Mohr circles with the mobilised friction."""
-    figure = Figure(figsize=(7.2, 3.6), layout="constrained")
+    figure = Figure(figsize=(7.2, 4.6), layout="constrained")
     axes = figure.subplots()
     alone = fs.equilibrium(PILE)
     distance = 2.6 * fs.R_earth.to_value(u.m)
@@ -64,15 +65,19 @@ def friction():
         turn = np.linspace(0, np.pi, 200)
         axes.plot(centre + radius * np.cos(turn), radius * np.sin(turn), color=colour, ls=style)
         x = np.array([0.0, 1.15 * high])
-        label = f"{name}: mobilised friction {np.degrees(phi):.0f}°"
+        label = f"{name}: mobilised friction angle {np.degrees(phi):.0f}°"
         axes.plot(x, np.tan(phi) * x, color=colour, ls=style, lw=0.9, label=label)
-    x = np.array([0.0, 235.0])
+    x = np.array([0.0, 240.0])
     axes.fill_between(x, np.tan(np.radians(35)) * x, 1e9, color="0.9", lw=0)
-    axes.plot(x, np.tan(np.radians(35)) * x, color="black", lw=1.4, label="friction of the material, 35°")
-    top = max(line.get_ydata().max() for line in axes.get_lines()[::2])
+    axes.text(94, 88, "not admissible", ha="center", color="0.3", fontsize=8)
+    axes.plot(
+        x, np.tan(np.radians(35)) * x, color="black", lw=1.4, label="friction angle of the material, 35°"
+    )
+    # Equal scales, so that the circles of Mohr are circles.
     axes.set(
-        xlim=(0, x[-1] / 0.75),
-        ylim=(0, 2.2 * top),
+        xlim=x,
+        ylim=(0, 140),
+        aspect="equal",
         xlabel="compressive stress (Pa)",
         ylabel="shear stress (Pa)",
     )
@@ -92,9 +97,12 @@ def margin():
         angle = history.required_friction_angle.to_value(u.deg)
         axes.plot(t, angle, color=colour, ls=style, label=f"{q:g} Earth radii: {result.verdict}")
     axes.axhline(35, color="black", lw=1.2)
-    axes.annotate("friction of the material", (-1.9, 35.6), fontsize=8)
+    axes.annotate("friction angle of the material", (-1.9, 36), fontsize=8)
     axes.set(
-        xlim=(-2, 2), ylim=(0, 42), xlabel="time from closest approach (h)", ylabel="mobilised friction (deg)"
+        xlim=(-2, 2),
+        ylim=(0, 42),
+        xlabel="time from closest approach (h)",
+        ylabel="mobilised friction angle (deg)",
     )
     axes.legend(frameon=False, fontsize=8, loc="center left")
     save("why_margin.png", figure)
@@ -111,10 +119,12 @@ def grains():
     rows = (0, int(np.abs(hours - 0.6).argmin()), int(np.abs(hours - 3.0).argmin()))
     for axes, row, reach in zip(figure.subplots(1, 3), rows, (2.2, 4.0, 14.0), strict=True):
         grains_plot(axes, run, row, turn, reach)
-        axes.set_title(f"{hours[row]:+.1f} h", fontsize=9)
+        axes.set_title(f"{hours[row]:+.1f} h from closest approach", fontsize=9)
+    figure.axes[0].set_ylabel("y (km)")
     save("why_grains.png", figure)
 
 
 if __name__ == "__main__":
-    for picture in (tide, friction, margin, grains):
-        picture()
+    with figure_style():
+        for picture in (tide, friction, margin, grains):
+            picture()

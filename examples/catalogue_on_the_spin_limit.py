@@ -35,10 +35,10 @@ for phi, style in ((20, ":"), (35, "--"), (50, "-")):
         prolate = fs.Body(semi_axes=[1.0, c, c] * u.km, density=2000 * u.kg / u.m**3)
         edges.append(spin_limits(prolate, phi * u.deg).to_value(u.rad / u.s) * prolate.dynamical_time)
     low, high = np.transpose(edges)
-    axes.plot(ratio, high, "k", ls=style, lw=1, label=f"limits for a2 = a3, {phi} deg")
+    axes.plot(ratio, high, "k", ls=style, lw=1, label=f"spin limits for $a_2 = a_3$, {phi}°")
     axes.plot(ratio, np.where(low > 0, low, np.nan), "k", ls=style, lw=1)
-axes.plot(flat[holds], rate[holds], "o", ms=3, color="#0072B2", label="holds with 35 deg")
-axes.plot(flat[~holds], rate[~holds], "^", ms=4, color="#D55E00", label="does not")
+axes.plot(flat[holds], rate[holds], "o", ms=3, color="#0072B2", label="in equilibrium at 35°")
+axes.plot(flat[~holds], rate[~holds], "^", ms=4, color="#D55E00", label="not in equilibrium at 35°")
 axes.set(
     xlabel="axis ratio $a_3/a_1$",
     ylabel=r"spin rate $\omega/\sqrt{\pi G\rho}$",

@@ -74,7 +74,7 @@ for axes, values, label in (
     axes.set_xlabel(label)
 middle.set_ylabel("probability of INTACT")
 right.set_ylabel("fraction of the clones below")
-right.legend(title="drawn", loc="upper left")
+right.legend(title="sampled", loc="upper left")
 figure.suptitle(f"Apophis on 13 April 2029: {N} clones of {clones.source.split(' (')[0]}")
 Path("out").mkdir(exist_ok=True)
 figure.savefig("out/real_clones.png", dpi=150)

@@ -121,7 +121,7 @@ def grains_scene_plot(
         )  # fmt: skip
     axes.set(aspect="equal", xlabel="y (1000 km)", ylabel="x (1000 km)")
     axes.margins(0.08)
-    text = f"{encounter.planet.name.capitalize()} to scale, pile {magnification:,.0f} times larger; "
+    text = f"{encounter.planet.name.capitalize()} to scale, pile enlarged {magnification:,.0f} times; "
     axes.set_title(fill(f"{text}colours: clumps at the end", int(13.0 * axes.figure.get_figwidth())))
     return axes
 

@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+from matplotlib.patheffects import withStroke
 
 from flybystab.typing import Array
 
@@ -41,6 +42,8 @@ def label_points(
     -------
     matplotlib Axes
     """
+    # A white outline keeps a label legible on a line.
+    text = {"path_effects": [withStroke(linewidth=2.0, foreground="w")], **text}
     figure = axes.figure
     figure.draw_without_rendering()
     if figure.get_layout_engine() is not None:

@@ -50,7 +50,9 @@ def rate_plot(axes: Any, rates: Sequence[EncounterRates]) -> Any:
             continue
         colour, style = _line(one.planet.name)
         axes.loglog(q, total, color=colour, ls=style, label=one.planet.name.capitalize())
-    axes.set(xlabel="periapsis distance (radii of the planet)", ylabel="encounters within it (1/Myr)")
+    axes.set(
+        xlabel="periapsis distance (radii of the planet)", ylabel="encounters within the distance (1/Myr)"
+    )
     axes.set_title("Encounters of the population")
     axes.legend()
     return axes

@@ -85,7 +85,7 @@ def scene_plot(
     axes.set_ylabel("y (1000 km)", labelpad=8)
     axes.set_zticks([])
     name = encounter.planet.name.capitalize()
-    text = f"{name} to scale, body {magnification:,.0f} times larger; grey rigid, orange flowing"
+    text = f"{name} to scale, body enlarged {magnification:,.0f} times; grey: rigid, orange: flowing"
     title = fill(text, int(13.0 * axes.figure.get_figwidth()))
     # The axes fill the figure: further lines go into them.
     axes.set_title(title, pad=6.0 - 12.0 * title.count("\n"))
@@ -175,20 +175,21 @@ def animation(
     moments = scale * np.sinh(np.linspace(np.arcsinh(t[0] / scale), np.arcsinh(t[-1] / scale), frames))
     rows = np.searchsorted(t, moments).clip(0, len(t) - 1)
     inside = np.clip(moments, encounter.t_start, encounter.t_stop)
-    places = encounter.positions(inside) @ turn.T / 1e3
+    places = encounter.positions(inside) @ turn.T / 1e6
     reach = float(history.semi_axes[:, 0].to_value(u.km).max())
 
     figure = new_figure(8.0, 4.2, dpi=80)
     left: Any = figure.add_subplot(1, 2, 1)
     right: Any = figure.add_subplot(1, 2, 2, projection="3d")
-    left.add_patch(Circle((0, 0), encounter.planet.radius / 1e3, color=BLUE))
+    left.add_patch(Circle((0, 0), encounter.planet.radius / 1e6, color=BLUE))
     left.plot(places[:, 0], places[:, 1], color="0.6", lw=0.8)
     (dot,) = left.plot([], [], "o", color=BLACK, ms=5)
-    left.set(aspect="equal", xlabel="x, towards periapsis (km)", ylabel="y (km)")
+    left.set(aspect="equal", xlabel="x, towards periapsis (1000 km)", ylabel="y (1000 km)")
     # The motion far from the planet, while the body settles, is outside this panel.
-    far = encounter.start_distance.to_value(u.km)
+    far = encounter.start_distance.to_value(u.km) / 1e3
     near = np.linalg.norm(places, axis=1) <= far
     left.set_ylim(1.1 * places[near, 1].min(), 1.1 * places[near, 1].max())
+    left.locator_params(axis="x", nbins=3)
 
     def draw(k: int) -> list[Any]:
         dot.set_data([places[k, 0]], [places[k, 1]])
@@ -204,7 +205,8 @@ def animation(
     film = FuncAnimation(figure, draw, frames=frames)
     writer = PillowWriter(fps=rate) if kind == ".gif" else FFMpegWriter(fps=rate)
     with progress_bar(progress, frames, "pictures", target.name) as tick:
-        film.save(target, writer=writer, progress_callback=lambda k, _: tick(k + 1))
+        # The style has a higher resolution for pictures, which would make films large.
+        film.save(target, writer=writer, dpi=figure.dpi, progress_callback=lambda k, _: tick(k + 1))
     return target
 
 

@@ -51,16 +51,15 @@ def inference_figure(table: QTable, path: str | Path) -> Path:
     # On the logarithmic axis zero cohesion is placed below the smallest other value.
     height = np.arange(len(cohesion))
     known = table.meta.get("catalogue_density_kg_m3") or []
-    filled = None
+    filled = lines = None
     colours = matplotlib.colormaps["viridis_r"].with_extremes(over="0.85")
     for panel, name in zip(panels, names, strict=True):
         need = table[name].to_value(u.deg).reshape(len(density), len(cohesion)).T
         capped = np.where(np.isfinite(need), np.minimum(need, 90.0), 90.0)
         if min(capped.shape) > 1:
             filled = panel.contourf(density, height, capped, _LEVELS, cmap=colours, extend="max")
-
+            # The levels of the lines are marked in the colour bar: labels on crowded lines would overlap.
             lines = panel.contour(density, height, capped, [15, 25, 35, 45], colors="k", linewidths=0.7)
-            panel.clabel(lines, fmt="%g deg", fontsize="x-small")
             panel.contourf(density, height, capped, [60, 91], colors="none", hatches=["///"])
         if len(known) == 2:
             panel.axvspan(known[0] - known[1], known[0] + known[1], color="w", alpha=0.35, lw=0)
@@ -70,8 +69,11 @@ def inference_figure(table: QTable, path: str | Path) -> Path:
         panel.locator_params(axis="x", nbins=4)
     panels[0].set_yticks(height, [f"{c:g}" for c in cohesion])
     panels[0].set_ylabel("cohesion (Pa)")
-    if filled is not None:
-        figure.colorbar(filled, ax=list(panels), label="least friction (deg); hatched: none")
+    if filled is not None and lines is not None:
+        bar = figure.colorbar(
+            filled, ax=list(panels), label="minimum friction angle (deg);\nhatched: none suffices"
+        )
+        bar.add_lines(lines)
     axes = " x ".join(f"{2 * a:.0f}" for a in table.meta.get("semi_axes_m", []))
     title = f"{table.meta.get('asteroid', '')}: {axes} m, {table.meta.get('spin_period_h', np.nan):.4g} h"
     strongest = strongest_passage(table)
@@ -129,7 +131,7 @@ def results_figure(results: QTable | str | Path, path: str | Path, names: int = 
     hidden = f"{out} of bodies that are not in equilibrium" + (
         f", {rest} without a finite margin" if rest else ""
     )
-    least = f"; {NOTHING:g} deg: that or less" if np.any(rise[stands] == NOTHING) else ""
+    least = f"; points at {NOTHING:g} deg: {NOTHING:g} deg or less" if np.any(rise[stands] == NOTHING) else ""
     figure.suptitle(
         f"{len(table)} encounters, ephemeris {table.meta.get('ephemeris', '-')}; not shown: {hidden}{least}",
     )

@@ -116,7 +116,7 @@ def slope_change_figure(shape: Shape, change: SlopeChange, repose: Quantity = 35
             drawn = shape_map(axes, shape, number, view, limits=span, cmap=cmap)
         figure.colorbar(drawn, ax=list(row), label=label)
     share = 100.0 * change.share_passing(repose)
-    figure.suptitle(f"{share:.2g} % of the area passes {repose.to_value(u.deg):g} deg")
+    figure.suptitle(f"slope rises above {repose.to_value(u.deg):g} deg on {share:.2g} % of the area")
     return figure
 
 

@@ -139,7 +139,9 @@ def spin_plot(
     }
     axes.set_xlabel("axis ratio $a_3/a_1$" + (" (prolate)" if prolate else " (oblate)"))
     axes.set_ylabel(r"$\omega^2/\pi G\rho$")
-    axes.legend(fontsize="x-small")
+    if marks:
+        axes.plot([], [], "o", ms=2, color=BLACK, label="asteroids")
+    axes.legend(fontsize="x-small", title="friction angle", title_fontsize="x-small")
     _mark(axes, marks, named)
     return axes
 
