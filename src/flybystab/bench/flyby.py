@@ -28,7 +28,7 @@ from flybystab.core.dynamics.workspace import Limits
 from flybystab.core.ellipsoid.tide import TidePanels, tensor
 from flybystab.encounter.encounter import Encounter
 from flybystab.flybys.batch import MAX_STEPS, one_row, output_buffers, verdict_rows
-from flybystab.plots.style import save
+from flybystab.plots.style import new_figure, save, styled
 from flybystab.units import R_earth
 
 PHI = np.deg2rad(35.0)
@@ -246,18 +246,38 @@ def lines(rows: list[dict[str, Any]]) -> list[str]:
     return out
 
 
+@styled
 def _plot(rows: list[dict[str, Any]], path: str | Path) -> None:
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(7.4, 4.2), layout="constrained")
-    FigureCanvasAgg(figure)
+    """Error against time; bars are the least and the most time over the initial states."""
+    figure = new_figure(7.4, 4.2)
     panel: Any = figure.subplots()
-    for method, marker in zip(dict.fromkeys(r["method"] for r in rows), "oxs^Dv*", strict=False):
-        points = [(r["cpu_s"] * 1e3, r["error_relative"]) for r in rows if r["method"] == method]
-        panel.loglog(*zip(*points, strict=True), marker=marker, label=method)
+    colours = [
+        "#0072B2",
+        "#E69F00",
+        "#000000",
+        "#009E73",
+        "#56B4E9",
+        "#D55E00",
+        "#CC79A7",
+    ]  # Okabe & Ito (2008)
+    methods = dict.fromkeys(r["method"] for r in rows)
+    for method, marker, colour in zip(methods, "oxs^Dv*", colours, strict=False):
+        chosen = [r for r in rows if r["method"] == method]
+        time = np.array(
+            [[r.get(f"cpu{end}_s", r["cpu_s"]) for r in chosen] for end in ("_least", "", "_most")]
+        )
+        spread = 1e3 * np.abs(time[[0, 2]] - time[1])
+        error = [r["error_relative"] for r in chosen]
+        panel.errorbar(
+            1e3 * time[1], error, xerr=spread, marker=marker, color=colour, ms=5, lw=1, elinewidth=0.7, capsize=2,
+            label=method,
+        )  # fmt: skip
     panel.set(
-        xlabel="processor time (ms)", ylabel="relative error of the semi-axes", title="Flyby P1, with flow"
+        xscale="log",
+        yscale="log",
+        xlabel="processor time (ms)",
+        ylabel="relative error of the semi-axes",
+        title="Flyby P1, with flow",
     )
     figure.legend(loc="outside right upper", frameon=False)
     save(figure, path)
