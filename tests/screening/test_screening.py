@@ -553,6 +553,8 @@ def test_an_unexpected_error_and_a_time_limit_are_rows(tmp_path):
             raise ZeroDivisionError("no reason")
         while asteroid.name == "Toutatis":
             pass
+        # The others get more time than the limit, which a busy machine may exceed.
+        assert 0.0 < signal.setitimer(signal.ITIMER_REAL, 300.0)[0] <= 0.2
         return three(asteroid, settings)
 
     run = screening(4, finder, time_limit=0.2)
