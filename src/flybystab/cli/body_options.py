@@ -4,9 +4,13 @@ from __future__ import annotations
 
 import argparse
 import re
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from flybystab.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from flybystab.catalogues.asteroid import Asteroid
+    from flybystab.screening.priors import Population
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _VALUE = re.compile(rf"\s*({_NUMBER})\s*(?:(?:\+-|\+/-|±)\s*({_NUMBER}))?\s*(.*?)\s*")
@@ -169,7 +173,7 @@ def _given(options: argparse.Namespace) -> tuple[dict[str, str], list[str]]:
     return row, names
 
 
-def with_body_options(asteroid: Any, options: argparse.Namespace) -> Any:
+def with_body_options(asteroid: Asteroid, options: argparse.Namespace) -> Asteroid:
     """The asteroid with the values of the options."""
     from dataclasses import replace
 
@@ -189,7 +193,7 @@ def with_body_options(asteroid: Any, options: argparse.Namespace) -> Any:
     return replace(asteroid, row=columns)
 
 
-def population_of(options: argparse.Namespace) -> Any:
+def population_of(options: argparse.Namespace) -> Population | None:
     """The population of a screening, with the errors of --friction and --cohesion; None without errors."""
     from flybystab.screening.distributions import Distribution
     from flybystab.screening.priors import Population

@@ -9,13 +9,20 @@ import re
 import sys
 import unicodedata
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from flybystab._version import __version__
 from flybystab.cli.body_options import cohesion, friction, with_body_options
 from flybystab.core.material.surfaces import DEFAULT, NAMES
 from flybystab.errors import InvalidInput, NothingComputed, WrongUsage
 from flybystab.plots.formats import FIGURES, FILMS
+
+if TYPE_CHECKING:
+    from astropy.time import Time
+
+    from flybystab.body.body import Material
+    from flybystab.catalogues.asteroid import Asteroid
+    from flybystab.flybys.result import FlybyResult
 
 #: Yield surfaces, the default first.
 SURFACES = (DEFAULT, *(name for name in NAMES if name != DEFAULT))
@@ -117,14 +124,14 @@ def _coloured(line: str) -> str:
     return f"\033[1m{line}\033[0m"
 
 
-def tdb(text: str, name: str) -> Any:
+def tdb(text: str, name: str) -> Time:
     """Parse a date, TDB, into an astropy Time; `name` is the argument in the error message."""
     from flybystab.units import checked_time
 
     return checked_time(text, name)
 
 
-def material_of(options: argparse.Namespace) -> Any:
+def material_of(options: argparse.Namespace) -> Material:
     """Material given by the options."""
     import astropy.units as u
 
@@ -170,7 +177,7 @@ def catalogue_argument(sub: argparse.ArgumentParser) -> None:
     )
 
 
-def asteroid_named(options: argparse.Namespace) -> Any:
+def asteroid_named(options: argparse.Namespace) -> Asteroid:
     """The asteroid, from the embedded catalogue, from --catalogue, or the only one of a file of orbits."""
     from pathlib import Path
 
@@ -194,7 +201,7 @@ def asteroid_named(options: argparse.Namespace) -> Any:
     )
 
 
-def asteroid_of(options: argparse.Namespace, *, assume: bool = True) -> Any:
+def asteroid_of(options: argparse.Namespace, *, assume: bool = True) -> Asteroid:
     """The asteroid with the body and the material of the options; `assume` allows --assume to complete it."""
     from flybystab.cli.shape_options import shaped
 
@@ -240,7 +247,7 @@ def grains_arguments(sub: argparse.ArgumentParser) -> None:
     sub.add_argument("--piles", type=int, default=8, metavar="N", help="piles of grains (8)")
 
 
-def write_picture(result: Any, title: str, path: str) -> None:
+def write_picture(result: FlybyResult, title: str, path: str) -> None:
     """Write the panels of a flyby or of its grains, or the animation, depending on the suffix."""
     if result.grains is not None:
         from flybystab.plots.grains import grains_animation, grains_figure

@@ -3,10 +3,15 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from flybystab.cli.common import catalogue_argument, check_table, names_a_file, show, span_arguments, tdb
 from flybystab.errors import WrongUsage
+
+if TYPE_CHECKING:
+    from astropy.table import QTable, Row
+
+    from flybystab.catalogues.asteroid import Asteroid
 
 HELP = "close approaches of an asteroid or of a catalogue"
 #: Number of encounters printed at most: the closest ones.
@@ -88,7 +93,7 @@ def run(options: argparse.Namespace) -> None:
     )
 
 
-def _asteroids(words: list[str], file: str | None) -> list[Any]:
+def _asteroids(words: list[str], file: str | None) -> list[Asteroid]:
     """Asteroids of names and files; without any, all of a catalogue file or of the embedded catalogue."""
     from pathlib import Path
 
@@ -98,7 +103,7 @@ def _asteroids(words: list[str], file: str | None) -> list[Any]:
     rows = catalogue() if file is None else catalogue(Path(file))
     if not words:
         return list(rows)
-    found: list[Any] = []
+    found: list[Asteroid] = []
     for word in words:
         if file is not None:
             found.append(find(rows, word, file))
@@ -109,7 +114,7 @@ def _asteroids(words: list[str], file: str | None) -> list[Any]:
     return found
 
 
-def _with_clones(table: Any, asteroids: list[Any], clones: int, seed: int) -> Any:
+def _with_clones(table: QTable, asteroids: list[Asteroid], clones: int, seed: int) -> QTable:
     """Add the columns of the clones to the table."""
     import numpy as np
 
@@ -126,7 +131,7 @@ def _with_clones(table: Any, asteroids: list[Any], clones: int, seed: int) -> An
     return table
 
 
-def _lines(table: Any, many: bool) -> list[str]:
+def _lines(table: QTable, many: bool) -> list[str]:
     """The table as text: distances, then predictability."""
     import astropy.units as u
     import numpy as np
@@ -190,12 +195,12 @@ def _lines(table: Any, many: bool) -> list[str]:
     return out
 
 
-def _time(row: Any) -> str:
+def _time(row: Row) -> str:
     """Time of closest approach, or of the entry of an impact."""
     return str(row["entry_time"][:19].replace("T", " ") if row["impact"] else row["time"].tdb.iso[:19])
 
 
-def _place(row: Any) -> str:
+def _place(row: Row) -> str:
     """Where on the Earth an impact enters the atmosphere."""
     import astropy.units as u
     import numpy as np

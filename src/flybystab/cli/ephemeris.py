@@ -3,10 +3,14 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from typing import TYPE_CHECKING
 
 from flybystab.cli.common import asteroid_named, dates_arguments, show, tdb
 from flybystab.errors import InvalidInput, WrongUsage
+
+if TYPE_CHECKING:
+    from astropy.table import QTable
+    from astropy.time import Time
 
 HELP = "positions of an asteroid in the sky"
 EXAMPLE = "flybystab ephemeris Apophis --from 2029-04-10 --to 2029-04-15 --step 6h --observer 568"
@@ -62,7 +66,7 @@ def _seconds(text: str) -> float:
     return value
 
 
-def _times(start: Any, stop: Any, step: float) -> Any:
+def _times(start: Time, stop: Time, step: float) -> Time:
     import numpy as np
     from astropy.time import TimeDelta
 
@@ -79,7 +83,7 @@ def _number(text: str | None) -> float | None:
     return float(text) if text else None
 
 
-def _lines(label: str, table: Any, output: str | None) -> list[str]:
+def _lines(label: str, table: QTable, output: str | None) -> list[str]:
     """The table as text, with sexagesimal positions."""
     import astropy.units as u
     from astropy.coordinates import Angle

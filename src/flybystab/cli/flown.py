@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from typing import TYPE_CHECKING
 
 from flybystab.cli.body_options import body_arguments
 from flybystab.cli.common import (
@@ -14,6 +14,11 @@ from flybystab.cli.common import (
     tdb,
 )
 from flybystab.cli.shape_options import shape_arguments
+
+if TYPE_CHECKING:
+    from flybystab.catalogues.asteroid import Asteroid
+    from flybystab.flybys.result import FlybyResult
+    from flybystab.flybys.spin_sample import SpinSample
 
 #: Dates searched for the closest encounter if none is given; all supported ephemerides cover them.
 SPAN = ("2000-01-01", "2050-01-01")
@@ -40,14 +45,14 @@ def passage_arguments(sub: argparse.ArgumentParser) -> None:
     sub.add_argument("--seed", type=int, default=0, help="random seed (0)")
 
 
-def attitude_words(asteroid: Any) -> str:
+def attitude_words(asteroid: Asteroid) -> str:
     """Description of the nominal attitude; the sampled attitudes show how far the result depends on it."""
     if asteroid.pole is None:
         return "nominal: pole unknown, spin axis along the orbital angular momentum"
     return "nominal: catalogued pole, arbitrary rotation phase"
 
 
-def flown(options: argparse.Namespace) -> tuple[Any, Any, Any]:
+def flown(options: argparse.Namespace) -> tuple[Asteroid, FlybyResult, SpinSample]:
     """Asteroid, flyby at the nominal attitude, and sampled attitudes, for --date or the closest encounter."""
     from flybystab.encounter.attitude import periapsis_axes
     from flybystab.encounter.encounter import Encounter

@@ -45,7 +45,8 @@ def run(options: argparse.Namespace) -> None:
     encounter = result.encounter
     for target in filter(None, (options.output, options.movie)):
         where = encounter.planet.name.capitalize()
-        write_picture(result, f"{asteroid.label} at {where}, {encounter.time.tdb.iso[:10]}", target)
+        when = "" if encounter.time is None else f", {encounter.time.tdb.iso[:10]}"
+        write_picture(result, f"{asteroid.label} at {where}{when}", target)
     show(
         options,
         lambda: document.flyby_document(

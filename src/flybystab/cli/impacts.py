@@ -3,9 +3,14 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from flybystab.cli.common import catalogue_argument, check_table, dates_arguments, show, tdb
+
+if TYPE_CHECKING:
+    from astropy.table import QTable
+
+    from flybystab.catalogues.asteroid import Asteroid
 
 HELP = "possible impacts of an asteroid whose orbit is uncertain"
 EXAMPLE = "flybystab impacts 2024YR4.ke1 --planet moon --from 2032-12-15 --to 2032-12-30"
@@ -82,7 +87,7 @@ def run(options: argparse.Namespace) -> None:
     )
 
 
-def _mass(asteroid: Any, mass: float | None) -> Any:
+def _mass(asteroid: Asteroid, mass: float | None) -> Any:
     """Mass of the option or of the body in the catalogue; None where it is not known."""
     import astropy.units as u
 
@@ -98,7 +103,7 @@ def _mass(asteroid: Any, mass: float | None) -> Any:
         return None
 
 
-def _add_scales(table: Any, mass: Any, date: Any) -> None:
+def _add_scales(table: QTable, mass: Any, date: Any) -> None:
     """Add the energy (megatons of TNT) and the Palermo and Torino scales; the time counts from `date`."""
     import astropy.units as u
     import numpy as np
@@ -118,7 +123,7 @@ def _add_scales(table: Any, mass: Any, date: Any) -> None:
     table["torino"] = np.array([torino_scale(float(p), e) for p, e, _ in rows], dtype=int)
 
 
-def _lines(table: Any) -> list[str]:
+def _lines(table: QTable) -> list[str]:
     """The table as text."""
     import astropy.units as u
 

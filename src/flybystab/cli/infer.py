@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from flybystab.cli.body_options import body_arguments
 from flybystab.cli.common import (
@@ -17,6 +17,11 @@ from flybystab.cli.common import (
     tdb,
 )
 from flybystab.cli.shape_options import shape_arguments
+
+if TYPE_CHECKING:
+    from astropy.table import QTable
+
+    from flybystab.catalogues.asteroid import Asteroid
 
 HELP = "bounds on friction, cohesion and density from the encounters that an asteroid survived"
 EXAMPLE = "flybystab infer Toutatis --output toutatis.png"
@@ -70,7 +75,7 @@ def run(options: argparse.Namespace) -> None:
     show(options, lambda: table_document(table), lambda: _lines(asteroid, table))
 
 
-def _lines(asteroid: Any, table: Any) -> list[str]:
+def _lines(asteroid: Asteroid, table: QTable) -> list[str]:
     """Bounds from shape and spin, the effect of each encounter, and the table over density and cohesion."""
     import astropy.units as u
     import numpy as np

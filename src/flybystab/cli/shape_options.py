@@ -4,10 +4,18 @@ from __future__ import annotations
 
 import argparse
 from functools import lru_cache
-from typing import Any
+from typing import TYPE_CHECKING
 
 from flybystab.errors import WrongUsage
 from flybystab.plots.formats import FIGURES
+
+if TYPE_CHECKING:
+    from flybystab.body.body import Body
+    from flybystab.body.shape import Shape
+    from flybystab.body.shape_slope import SurfaceSlopes
+    from flybystab.body.surface_history import SurfaceHistory
+    from flybystab.catalogues.asteroid import Asteroid
+    from flybystab.flybys.result import FlybyResult
 
 #: Value of --shape-unit for shape models without a size: the volume of the catalogue.
 CATALOGUE = "catalogue"
@@ -37,14 +45,14 @@ def map_argument(sub: argparse.ArgumentParser) -> None:
     )
 
 
-def shaped(asteroid: Any, options: argparse.Namespace) -> Any:
+def shaped(asteroid: Asteroid, options: argparse.Namespace) -> Asteroid:
     """The asteroid with the shape of the options, if there is one."""
     if getattr(options, "shape", None) is None:
         return asteroid
     return asteroid.with_shape(shape_of(options, asteroid.body))
 
 
-def shape_of(options: argparse.Namespace, body: Any) -> Any:
+def shape_of(options: argparse.Namespace, body: Body) -> Shape:
     """The shape of the options; ``--shape-unit catalogue`` gives it the volume of the body."""
     if options.shape_unit != CATALOGUE:
         return _read(options.shape, options.shape_unit)
@@ -52,7 +60,7 @@ def shape_of(options: argparse.Namespace, body: Any) -> Any:
 
 
 @lru_cache(maxsize=2)
-def _read(path: str, unit: str) -> Any:
+def _read(path: str, unit: str) -> Shape:
     from flybystab.body.shape import Shape, length_unit
 
     return Shape.read(path, unit=length_unit(unit, "--shape-unit"))
@@ -67,7 +75,7 @@ def check_map(options: argparse.Namespace) -> None:
     check_picture(options.map, (*FIGURES, ".vtk", ".ply"))
 
 
-def surface_of(options: argparse.Namespace, result: Any) -> Any:
+def surface_of(options: argparse.Namespace, result: FlybyResult) -> SurfaceHistory | None:
     """Surface of the shape through a computed flyby; None without a shape."""
     if options.shape is None:
         return None
@@ -76,9 +84,9 @@ def surface_of(options: argparse.Namespace, result: Any) -> Any:
     return history_of(result.inputs, shape_of(options, result.inputs.body))
 
 
-def write_map(options: argparse.Namespace, surface: Any) -> None:
+def write_map(options: argparse.Namespace, surface: SurfaceHistory | None) -> None:
     """Write the map of ``--map``."""
-    if options.map is None:
+    if options.map is None or surface is None:
         return
     if options.map.lower().endswith((".vtk", ".ply")):
         surface.shape.write(options.map, surface.fields())
@@ -89,7 +97,7 @@ def write_map(options: argparse.Namespace, surface: Any) -> None:
         surface_history_figure(surface, REPOSE).savefig(options.map, dpi=130)
 
 
-def rest_slopes(options: argparse.Namespace, body: Any) -> Any:
+def rest_slopes(options: argparse.Namespace, body: Body) -> SurfaceSlopes | None:
     """Slopes of the shape at the spin of the body, without a tide; None without a shape."""
     if options.shape is None:
         return None

@@ -18,7 +18,7 @@ from typing import Any
 import astropy.units as u
 import jinja2
 import numpy as np
-from astropy.table import QTable
+from astropy.table import QTable, Row
 
 from flybystab._version import __version__
 from flybystab.arguments import check_arguments
@@ -213,7 +213,7 @@ def _plain_text(value: Any) -> str:
     return value if isinstance(value, str) else json.dumps(plain(value), ensure_ascii=False)
 
 
-def _entry(row: Any, position: int) -> dict[str, Any]:
+def _entry(row: Row, position: int) -> dict[str, Any]:
     """All values of one encounter that the pages show."""
     name, verdict = str(row["asteroid"]), str(row["verdict"])
     when = str(row["time_tdb"])[:16].replace("T", " ")
@@ -267,7 +267,7 @@ def _number(value: Any, unit: u.UnitBase | None = None) -> float | None:
     return number if math.isfinite(number) else None
 
 
-def _margin_text(row: Any, margin: float | None, verdict: str) -> str:
+def _margin_text(row: Row, margin: float | None, verdict: str) -> str:
     if margin is None:
         return "none suffices" if verdict and float(row["margin"].value) == -np.inf else ""
     if verdict == Verdict.NOT_IN_EQUILIBRIUM:  # the body has none before the encounter
@@ -275,7 +275,7 @@ def _margin_text(row: Any, margin: float | None, verdict: str) -> str:
     return ("≥ " if str(row["decided_by"]) == "bound" else "") + f"{margin:.2f}"
 
 
-def _headline(row: Any, verdict: str, probability: float | None) -> tuple[str, str]:
+def _headline(row: Row, verdict: str, probability: float | None) -> tuple[str, str]:
     """The probability first where the inputs are uncertain, and the verdict for the nominal values."""
     if not verdict:
         return "not computed", str(row["error"])
@@ -295,7 +295,7 @@ def _headline(row: Any, verdict: str, probability: float | None) -> tuple[str, s
 
 
 def _sections(
-    row: Any, distance: float | None, speed: float | None
+    row: Row, distance: float | None, speed: float | None
 ) -> list[tuple[str, list[tuple[str, str]]]]:
     """Facts by heading; unknown ones are left out."""
 

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from datetime import UTC, datetime
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import astropy.units as u
 import jinja2
@@ -44,6 +44,10 @@ from flybystab.plots.grains import grains_figure, grains_scene_plot
 from flybystab.plots.scene import scene_plot
 from flybystab.plots.shape_map import surface_history_figure
 from flybystab.plots.style import styled
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 #: Rows of a table: label and text.
 Rows = list[tuple[str, str]]
@@ -299,7 +303,7 @@ def _provenance_rows(a: Asteroid, s: SpinSample, command: str) -> Rows:
     return rows
 
 
-def _embedded(figure: Any) -> str:
+def _embedded(figure: Figure) -> str:
     stream = io.BytesIO()
     figure.savefig(stream, format="svg")
     return "data:image/svg+xml;base64," + base64.b64encode(stream.getvalue()).decode()
@@ -311,7 +315,7 @@ _Pictures = tuple[str, str]
 _PHONE = 4.0
 
 
-def _blank(width: float, height: float) -> Any:
+def _blank(width: float, height: float) -> Figure:
     from matplotlib.backends.backend_svg import FigureCanvasSVG
     from matplotlib.figure import Figure
 
@@ -321,7 +325,10 @@ def _blank(width: float, height: float) -> Any:
 
 
 def _twice(
-    draw: Callable[[Any], Any], wide: tuple[float, float], narrow: float, encode: Callable[[Any], str]
+    draw: Callable[[Figure], object],
+    wide: tuple[float, float],
+    narrow: float,
+    encode: Callable[[Figure], str],
 ) -> _Pictures:
     """A figure in its size, and as wide as a phone with the height `narrow`."""
     out = []
@@ -338,7 +345,7 @@ def _history_picture(r: FlybyResult) -> _Pictures:
     )
 
 
-def _bitmap(figure: Any) -> str:
+def _bitmap(figure: Figure) -> str:
     """A figure of many small parts, for which a bitmap is smaller than vectors."""
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=130)
@@ -360,7 +367,7 @@ def _surface_picture(surface: SurfaceHistory) -> _Pictures:
 
 
 def _scene_picture(r: FlybyResult) -> _Pictures:
-    def draw(figure: Any) -> None:
+    def draw(figure: Figure) -> None:
         scene_plot(figure.add_subplot(projection="3d"), r)
 
     return _twice(draw, (7.2, 3.2), 2.4, _bitmap)
@@ -370,7 +377,7 @@ def _sample_picture(s: SpinSample) -> _Pictures:
     return _twice(lambda figure: sample_plot(figure.subplots(), s), (6.4, 3.6), 3.2, _embedded)
 
 
-def sample_plot(axes: Any, sample: SpinSample) -> Any:
+def sample_plot(axes: Axes, sample: SpinSample) -> Axes:
     """Plot the rotation of the spin axis against the change of the spin rate, one point for each attitude."""
     axes.plot(
         sample.spin_ratio, sample.pole_change.to_value(u.deg), "o", ms=4, color=BLUE, mec="white", mew=0.4
