@@ -132,11 +132,17 @@ class Bar:
     def _text(self) -> str:
         return self.text(self._done, self._note, time.monotonic() - self._begun)
 
-    def close(self) -> None:
-        """Draw the last state and end the line, so that other text can follow."""
-        if self._outer:
+    def __del__(self) -> None:
+        self._release()  # a bar that was never closed must not hide those of later calculations
+
+    def _release(self) -> None:
+        if getattr(self, "_outer", False):
             _busy.release()
             self._outer = False
+
+    def close(self) -> None:
+        """Draw the last state and end the line, so that other text can follow."""
+        self._release()
         with self._lock:
             if self._bar is not None:
                 self._update()

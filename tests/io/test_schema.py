@@ -49,6 +49,7 @@ DOCUMENTS = [
     ["stability", "1950 DA"],
     ["stability", "TWO", "--all"],
     ["encounters", "Apophis", *SPAN],
+    ["impacts", "Apophis", "--from", "2029-01-01", "--to", "2030-01-01", "--orbits", "21"],
     ["ephemeris", "Apophis", "--from", "2029-04-12", "--to", "2029-04-14"],
     ["figure", "barrier", "Apophis", "--output", "OUT.png"],
     ["screen", "Apophis", "YORP", *SPAN, "--output", "OUT.ecsv"],

@@ -151,7 +151,7 @@ def test_body_from_absolute_magnitude_alone(tmp_path):
     assert np.median(2 * np.cbrt(np.prod(d.axes, axis=1))) == pytest.approx(141, rel=0.05)
     assert {"diameter (from H and albedo)", "density", "spin period", "elongation"} <= set(d.drawn)
     assert np.median(d.period) / 3600 == pytest.approx(np.median(periods_like(22.0)), rel=0.15)
-    with pytest.raises(InvalidInput, match="H_mag"):
+    with pytest.raises(InvalidInput, match="--H"):
         draws(nothing, 1, 0)
 
 

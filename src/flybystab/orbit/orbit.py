@@ -12,7 +12,7 @@ import numpy as np
 from astropy.time import Time
 from astropy.units import Quantity
 
-from flybystab.arguments import check_arguments
+from flybystab.arguments import check_arguments, check_kinds
 from flybystab.constants import AU, DAY
 from flybystab.errors import FlybystabWarning, Impact, InaccurateOrbit, InvalidInput, UnknownName
 from flybystab.orbit.barycentre import barycentre_in, barycentre_of_de440
@@ -78,6 +78,9 @@ class Orbit:
     nongrav: NonGravitational = field(default_factory=NonGravitational)
     name: str = ""
     covariance: Covariance | None = None
+
+    def __post_init__(self) -> None:
+        check_kinds(self, "epoch", "position", "velocity", "centre", "name", "covariance")
 
     @classmethod
     def from_elements(
@@ -271,6 +274,10 @@ class Orbit:
         self, window: Window, forces: tuple[str, ...] | None = None, epsilon: float = EPSILON
     ) -> Flight:
         """The asteroid in rebound at the epoch of the orbit; times are seconds from ``window.epoch``."""
+        if forces is not None and not (
+            isinstance(forces, list | tuple) and all(isinstance(f, str) for f in forces)
+        ):
+            raise InvalidInput("forces", forces, "names of forces")
         chosen = forces if forces is not None else without_itself(default_forces(self, *BODIES), self, window)
         return Flight(
             model(window, chosen, self.nongrav),

@@ -157,6 +157,7 @@ def freshness(
     return Freshness(probability, total / u.yr, years * u.yr, table, share, count)
 
 
+@check_arguments
 def fresh_fraction(
     population: Any,
     radii: Mapping[str, float],

@@ -45,7 +45,7 @@ def installed():
 
 
 def answer(place, home):
-    environment = {k: v for k, v in os.environ.items() if not k.startswith(("NUMBA", "XDG"))}
+    environment = {k: v for k, v in os.environ.items() if not k.startswith(("NUMBA", "XDG", "FLYBYSTAB"))}
     environment |= {"HOME": str(home), "PYTHONPATH": str(place)}
     return subprocess.run(
         [*USER, sys.executable, "-c", SCRIPT], capture_output=True, text=True, env=environment, cwd="/"

@@ -106,6 +106,9 @@ def read_table(text: str, file: str) -> list[Entry]:
     """
     lines = list(_lines(text))
     columns = _cells(lines[0])
+    if "\t" in lines[0] and "" in columns:  # several tabs between two columns
+        lines = [re.sub(r"\t+", "\t", line.strip()) for line in lines]
+        columns = _cells(lines[0])
     if "FORMAT" not in columns:  # OpenOrb reads tables without a header
         kind = columns[1] if len(columns) > 1 else ""
         if kind not in FORMATS:
