@@ -78,6 +78,11 @@ save("surface_history.png", surface_history_figure(history, 20 * u.deg))
 orbits = fs.known_population()
 planets = ("mercury", "venus", "earth", "mars")
 verdicts = fs.disruption_rates(orbits, planets, diameter=None, samples=2400, seed=1)
-save("population.png", population_figure(verdicts, [fs.encounter_rates(orbits, name) for name in planets]))
+save(
+    "population.png",
+    population_figure(
+        verdicts, [fs.encounter_rates(orbits, name) for name in planets], orbits["designation"]
+    ),
+)
 
 runpy.run_path(str(DOCS / "why_pictures.py"), run_name="__main__")

@@ -7,7 +7,14 @@ from astropy.table import QTable
 from matplotlib.figure import Figure
 
 import flybystab as fs
-from flybystab.plots.population import population_figure, probability_plot, rate_plot, size_plot, verdict_plot
+from flybystab.plots.population import (
+    contributor_plot,
+    population_figure,
+    probability_plot,
+    rate_plot,
+    size_plot,
+    verdict_plot,
+)
 
 ORBITS = QTable({"a": [1.3, 2.0] * u.au, "e": [0.4, 0.6], "i": [10.0, 3.0] * u.deg, "H": [17.0, 19.0]})
 
@@ -48,8 +55,17 @@ def test_a_planet_without_encounters_has_an_empty_map(result):
     assert "no encounters" in probability_plot(axes(), result, "venus").get_title()
 
 
-def test_the_page_has_four_panels_and_a_scale(result, tmp_path):
+def test_bars_of_the_largest_contributors(result):
+    drawn = contributor_plot(axes(), result, ["inner", "outer"])
+    most = result.contributors()
+    bars = [p.get_width() for p in drawn.patches]
+    assert bars == pytest.approx(most["rate"].to_value(1 / u.Myr)[::-1])
+    names = [t.get_text() for t in drawn.get_yticklabels()]
+    assert names == [["inner", "outer"][k] for k in most["orbit"]][::-1]
+
+
+def test_the_page_has_five_panels_and_a_scale(result, tmp_path):
     rates = [fs.encounter_rates(ORBITS, name) for name in ("earth", "mars")]
     figure = population_figure(result, rates)
-    assert len(figure.axes) == 5
+    assert len(figure.axes) == 6
     figure.savefig(tmp_path / "x.png")

@@ -144,7 +144,8 @@ def _verdicts(
         from flybystab.plots.population import population_figure
         from flybystab.plots.style import save
 
-        save(population_figure(result, [encounter_rates(orbits, name) for name in planets]), output)
+        names = orbits["designation"] if "designation" in orbits.colnames else None
+        save(population_figure(result, [encounter_rates(orbits, name) for name in planets], names), output)
     elif output is not None:
         from flybystab.screening.tables import write_table
 

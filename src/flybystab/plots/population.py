@@ -135,17 +135,53 @@ def size_plot(axes: Any, result: DisruptionRates) -> Any:
     return axes
 
 
+def contributor_plot(axes: Any, result: DisruptionRates, names: Sequence[str] | None = None) -> Any:
+    """Plot the rates of the orbits that contribute most to the changes, with 1-sigma sampling errors.
+
+    Parameters
+    ----------
+    axes : matplotlib Axes
+    result : DisruptionRates
+    names : sequence of str, optional
+        Of the rows of the population; their numbers by default.
+    """
+    most = result.contributors()[::-1]
+    rate = most["rate"].to_value(1 / u.Myr)
+    label = [f"row {k}" if names is None else str(names[int(k)]) for k in most["orbit"]]
+    axes.barh(
+        label,
+        rate,
+        xerr=rate / np.sqrt(np.maximum(most["samples"], 1)),
+        color="#56B4E9",
+        edgecolor="black",
+        linewidth=0.6,
+        ecolor="0.2",
+        capsize=2,
+    )
+    axes.set(xlabel="rate of changes (1/Myr)", xlim=(0.0, None))
+    axes.set_title("Largest contributors: reshaped, shedding or disrupted")
+    return axes
+
+
 @check_arguments
 @styled
-def population_figure(result: DisruptionRates, rates: Sequence[EncounterRates]) -> Figure:
-    """Encounters, verdicts by planet, probability over periapsis and speed, and rates against size, on one page."""
+def population_figure(
+    result: DisruptionRates, rates: Sequence[EncounterRates], names: Sequence[str] | None = None
+) -> Figure:
+    """Encounters, verdicts by planet, probability over periapsis and speed, rates against size, largest contributors.
+
+    `names` are those of the rows of the population, as in `contributor_plot`.
+    """
     if not isinstance(rates, list | tuple) or not all(hasattr(one, "within") for one in rates) or not rates:
         raise InvalidInput("rates", rates, "EncounterRates, one a planet")
-    figure = new_figure(9.6, 7.6)
-    (first, second), (third, fourth) = figure.subplots(2, 2)
-    rate_plot(first, rates)
-    verdict_plot(second, result)
+    figure = new_figure(9.6, 10.6)
+    panels = figure.subplot_mosaic([["rates", "verdicts"], ["probability", "size"], ["most", "most"]])
+    rate_plot(panels["rates"], rates)
+    verdict_plot(panels["verdicts"], result)
     total = {one.planet.name: one.total.value for one in rates}
-    probability_plot(third, result, max(total, key=total.__getitem__) if "earth" not in total else "earth")
-    size_plot(fourth, result)
+    probability_plot(
+        panels["probability"], result, max(total, key=total.__getitem__) if "earth" not in total else "earth"
+    )
+    size_plot(panels["size"], result)
+    contributor_plot(panels["most"], result, names)
     return figure
