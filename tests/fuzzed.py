@@ -306,6 +306,7 @@ def valid():
         "Shape.read": {"path": place / "shape.obj", "unit": u.m},
         "Shape.scaled": {"diameter": 1 * u.km},
         "Shape.write": {"path": "y.vtk"},
+        "Shape.to_pyvista": {},
         "SpinForecast.quantiles": {"name": "effective_period"},
         "Stability.other_surfaces": {},
         "Survival.probability": {},
