@@ -108,7 +108,7 @@ def _parameters(function: Callable[..., Any]) -> tuple[inspect.Signature, dict[s
 
 
 def check_arguments(function: Callable[P, R]) -> Callable[P, R]:
-    """Refuse arguments of another kind than that of the annotation.
+    """Decorator that raises `InvalidInput` for arguments whose type does not match the annotation.
 
     Parameters with other annotations than those of :data:`KINDS`, :data:`CLASSES` and None are not checked.
 
@@ -171,7 +171,7 @@ def levels(value: Any, name: str) -> np.ndarray:
 
 
 def check_kinds(instance: Any, *names: str) -> None:
-    """Refuse attributes of a dataclass that are of another kind than its constructor's annotation.
+    """Raise `InvalidInput` for attributes of a dataclass whose type does not match the annotation of its constructor.
 
     Raises
     ------

@@ -18,7 +18,7 @@ from typing import Any, TextIO
 
 from tqdm.std import tqdm
 
-#: What the argument ``progress`` may be.
+#: Types accepted by the argument ``progress``.
 Progressing = bool | Callable[[int, int], None] | None
 #: Seconds before a bar appears that was not asked for.
 DELAY = 2.0
@@ -28,7 +28,7 @@ QUIET = 30.0
 FRAME = 0.1
 _FORMAT = "{desc}[{bar:20}] {n_fmt}/{total_fmt}{unit}, {rate_fmt}, {remaining} left{postfix}"
 _LINE = "{desc}{n_fmt}/{total_fmt}{unit}, {rate_fmt}, {remaining} left{postfix}"
-#: Whether a bar is shown; calculations inside of it show none.
+#: Held while a bar is shown; calculations nested in that one show none.
 _busy = threading.Lock()
 
 
@@ -40,7 +40,7 @@ class Bar:
     total : int
         Number of parts.
     unit : str
-        What they are, such as "asteroids".
+        Name of the parts, such as "asteroids".
     title : str
     stream : text file, optional
         The standard error by default.
@@ -163,9 +163,9 @@ def progress_bar(asked: Any, total: int, unit: str, title: str = "") -> Iterator
         The argument ``progress``.
     total : int
     unit : str
-        What the parts are, in the plural.
+        Name of the parts, in the plural.
     title : str
-        What is computed.
+        Name of the calculation.
 
     Raises
     ------

@@ -35,7 +35,7 @@ def on_disk(kernel: Any) -> bool:
 
 
 def start() -> bool:
-    """Begin to compile the kernels that are not on disk; False where there is nothing to gain."""
+    """Start to compile the kernels that are not cached; returns False if that would save no time."""
     global _running
     if _running is None and CACHE and (os.cpu_count() or 1) > 1 and not on_disk(verdict_row.rigid_rows):
         _running = subprocess.Popen(

@@ -265,7 +265,7 @@ class Covariance:
         return found
 
     def _in_frame(self, parameters: Array) -> Array:
-        """States with the axes of the covariance."""
+        """States in the frame of the covariance, shape (m, 6)."""
         if self.elements == "cartesian":
             order = [self.names.index(n) for n in SETS["cartesian"]]
             return np.array(parameters[:, order])

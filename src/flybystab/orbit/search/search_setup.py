@@ -190,7 +190,7 @@ def initial_states(rows: list[tuple[str, Orbit]], window: Window, epochs: Array)
 
 
 def _twins(window: Window, epochs: Array, states: Array) -> dict[int, str]:
-    """Numbers and names of the orbits that are those of massive asteroids."""
+    """Indices and names of the orbits that belong to massive asteroids."""
     out = {}
     for k, name in enumerate(BELT, N_BODIES):
         away = states - window.states(k, epochs)
