@@ -18,10 +18,102 @@ from __future__ import annotations
 
 import numpy as np
 
-from flybystab.core.grains.neighbours import Pairs
+from flybystab.core.grains.neighbours import N_SPRING, Pairs
 from flybystab.core.grains.state import Contact, Grains
-from flybystab.core.numerics.jit import kernel
+from flybystab.core.numerics.jit import inlined, kernel
 from flybystab.typing import Array
+
+Vector = tuple[float, float, float]
+
+
+@inlined
+def _dot(a: Vector, b: Vector) -> float:
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+@inlined
+def _cross(a: Vector, b: Vector) -> Vector:
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+@inlined
+def _tangential(a: Vector, n: Vector) -> Vector:
+    """Part of a vector normal to the unit vector `n`."""
+    along = _dot(a, n)
+    return a[0] - along * n[0], a[1] - along * n[1], a[2] - along * n[2]
+
+
+@inlined
+def _elongated(spring: Vector, rate: Vector, n: Vector, turn: float, dt: float) -> Vector:
+    """Spring after a step: turned by `turn` about `n`, elongated at `rate`, its part along `n` removed."""
+    c = _cross(n, spring)
+    longer = (
+        spring[0] + turn * c[0] + dt * rate[0],
+        spring[1] + turn * c[1] + dt * rate[1],
+        spring[2] + turn * c[2] + dt * rate[2],
+    )
+    return _tangential(longer, n)
+
+
+@inlined
+def _resistance(
+    spring: Vector, rate: Vector, stiffness: float, damping: float, most: float
+) -> tuple[Vector, Vector]:
+    """Force (or moment) of a spring and a dashpot of at most the size `most`, and the spring.
+
+    Where the limit is exceeded the contact slides (or rolls), and the spring is shortened to the limit.
+    """
+    force = (
+        stiffness * spring[0] + damping * rate[0],
+        stiffness * spring[1] + damping * rate[1],
+        stiffness * spring[2] + damping * rate[2],
+    )
+    size = _dot(force, force)
+    if size > most * most:
+        share = most / np.sqrt(size)
+        force = (force[0] * share, force[1] * share, force[2] * share)
+        spring = (force[0] / stiffness, force[1] / stiffness, force[2] / stiffness)
+    return force, spring
+
+
+@inlined
+def _twisting(
+    twist: float, rate: float, stiffness: float, damping: float, most: float, dt: float
+) -> tuple[float, float]:
+    """Moment about the normal of at most `most`, and the angle of the spring after a step."""
+    angle = twist + dt * rate
+    moment = stiffness * angle + damping * rate
+    if abs(moment) > most:
+        moment = most if moment > 0.0 else -most
+        angle = moment / stiffness
+    return moment, angle
+
+
+@inlined
+def _slip(u: Vector, un: float, n: Vector, arm: Vector) -> Vector:
+    """Relative velocity of the contact points across the normal.
+
+    `u` is that of the centres, `un` its part along the normal `n`, `arm` the sum ``l_i w_i + l_j w_j``.
+    """
+    return (
+        u[0] - (un * n[0] + arm[1] * n[2] - arm[2] * n[1]),
+        u[1] - (un * n[1] + arm[2] * n[0] - arm[0] * n[2]),
+        u[2] - (un * n[2] + arm[0] * n[1] - arm[1] * n[0]),
+    )
+
+
+@kernel
+def _released(c: Contact, p: Pairs, at: int) -> float:
+    """Clear the history of a contact that has opened; returns the energy of its springs."""
+    p.touching[at] = False
+    h = p.spring[at]
+    patch = p.constant[at, 0]
+    lost = 0.5 * c.k_s * (h[0] * h[0] + h[1] * h[1] + h[2] * h[2])
+    lost += 0.5 * c.k_n * patch * patch * (h[3] * h[3] + h[4] * h[4] + h[5] * h[5])
+    lost += c.k_s * patch * patch * h[6] * h[6]
+    for k in range(N_SPRING):
+        p.spring[at, k] = 0.0
+    return lost
 
 
 @kernel
@@ -39,145 +131,80 @@ def contact_forces(
     ledger : ndarray (2,) or (0,)
         If given: energy stored in the springs (overwritten), energy dissipated (added to).
     """
-    x = g.x
-    radius = g.radius
-    n = radius.shape[0]
+    x, radius = g.x, g.radius
     account = ledger.shape[0] > 0
-    stored = 0.0
-    lost = 0.0
-    for i in range(n):
+    stored = lost = 0.0
+    for i in range(radius.shape[0]):
         xi, yi, zi, ri = x[i, 0], x[i, 1], x[i, 2], radius[i]
         fx = fy = fz = tx = ty = tz = 0.0
         for at in range(np.uint64(p.first[i]), np.uint64(p.first[i + 1])):
             j = np.uint64(p.other[at])
-            nx, ny, nz = x[j, 0] - xi, x[j, 1] - yi, x[j, 2] - zi
+            dx, dy, dz = x[j, 0] - xi, x[j, 1] - yi, x[j, 2] - zi
             rj = radius[j]
             reach = ri + rj
-            d2 = nx * nx + ny * ny + nz * nz
+            d2 = dx * dx + dy * dy + dz * dz
             if d2 >= reach * reach:
                 if p.touching[at]:
-                    p.touching[at] = False
-                    if account:
-                        h = p.spring[at]
-                        patch = p.constant[at, 0]
-                        lost += 0.5 * c.k_s * (h[0] * h[0] + h[1] * h[1] + h[2] * h[2])
-                        lost += 0.5 * c.k_n * patch * patch * (h[3] * h[3] + h[4] * h[4] + h[5] * h[5])
-                        lost += c.k_s * patch * patch * h[6] * h[6]
-                    for k in range(7):
-                        p.spring[at, k] = 0.0
+                    lost += _released(c, p, at)
                 continue
             p.touching[at] = True
             dist = np.sqrt(d2)
             inverse = 1.0 / dist
-            nx *= inverse
-            ny *= inverse
-            nz *= inverse
+            n = (dx * inverse, dy * inverse, dz * inverse)
             d = reach - dist
             li, lj = ri - 0.5 * d, rj - 0.5 * d
             patch, root = p.constant[at, 0], p.constant[at, 1]
-            ux, uy, uz = u[j, 0] - u[i, 0], u[j, 1] - u[i, 1], u[j, 2] - u[i, 2]
-            un = ux * nx + uy * ny + uz * nz
-            c_n = c.damping_n * root
-            normal = c.k_n * d - c_n * un
-            push = max(normal, 0.0)
-            area = 4.0 * patch * patch
-            # slip of the contact points
-            six, siy, siz = s[i, 0], s[i, 1], s[i, 2]
-            sjx, sjy, sjz = s[j, 0], s[j, 1], s[j, 2]
-            ax, ay, az = li * six + lj * sjx, li * siy + lj * sjy, li * siz + lj * sjz
-            ux -= un * nx + ay * nz - az * ny
-            uy -= un * ny + az * nx - ax * nz
-            uz -= un * nz + ax * ny - ay * nx
-            # tangential spring: turned with the pair, lengthened by the slip, kept normal to n
-            turn = 0.5 * dt * ((six + sjx) * nx + (siy + sjy) * ny + (siz + sjz) * nz)
-            qx, qy, qz = p.spring[at, 0], p.spring[at, 1], p.spring[at, 2]
-            ax = qx + turn * (ny * qz - nz * qy) + dt * ux
-            ay = qy + turn * (nz * qx - nx * qz) + dt * uy
-            az = qz + turn * (nx * qy - ny * qx) + dt * uz
-            along = ax * nx + ay * ny + az * nz
-            ax -= along * nx
-            ay -= along * ny
-            az -= along * nz
-            c_s = c.damping_s * root
-            px, py, pz = c.k_s * ax + c_s * ux, c.k_s * ay + c_s * uy, c.k_s * az + c_s * uz
-            most = c.mu_s * push
-            size = px * px + py * py + pz * pz
-            if size > most * most:
-                share = most / np.sqrt(size)
-                px *= share
-                py *= share
-                pz *= share
-                ax, ay, az = px / c.k_s, py / c.k_s, pz / c.k_s
+            si, sj = (s[i, 0], s[i, 1], s[i, 2]), (s[j, 0], s[j, 1], s[j, 2])
+            v = (u[j, 0] - u[i, 0], u[j, 1] - u[i, 1], u[j, 2] - u[i, 2])
+            # normal
+            vn = _dot(v, n)
+            c_n, c_s = c.damping_n * root, c.damping_s * root
+            repulsion = c.k_n * d - c_n * vn
+            load = max(repulsion, 0.0)
+            attraction = c.cohesion * (4.0 * patch * patch)
+            # sliding
+            arm = (li * si[0] + lj * sj[0], li * si[1] + lj * sj[1], li * si[2] + lj * sj[2])
+            v = _slip(v, vn, n, arm)
+            turn = 0.5 * dt * _dot((si[0] + sj[0], si[1] + sj[1], si[2] + sj[2]), n)
+            old = (p.spring[at, 0], p.spring[at, 1], p.spring[at, 2])
+            f, new = _resistance(_elongated(old, v, n, turn, dt), v, c.k_s, c_s, c.mu_s * load)
+            p.spring[at, 0], p.spring[at, 1], p.spring[at, 2] = new
             if account:
-                before = 0.5 * c.k_s * (qx * qx + qy * qy + qz * qz)
-                after = 0.5 * c.k_s * (ax * ax + ay * ay + az * az)
-                lost += c_n * un * un * dt + dt * (px * ux + py * uy + pz * uz) - (after - before)
-                stored += 0.5 * c.k_n * d * d - c.cohesion * area * d + after
-            p.spring[at, 0], p.spring[at, 1], p.spring[at, 2] = ax, ay, az
-            normal -= c.cohesion * area
-            px -= normal * nx
-            py -= normal * ny
-            pz -= normal * nz
-            fx += px
-            fy += py
-            fz += pz
-            force[j, 0] -= px
-            force[j, 1] -= py
-            force[j, 2] -= pz
-            ax, ay, az = ny * pz - nz * py, nz * px - nx * pz, nx * py - ny * px
-            mx, my, mz = lj * ax, lj * ay, lj * az
-            tx += li * ax
-            ty += li * ay
-            tz += li * az
+                before, after = 0.5 * c.k_s * _dot(old, old), 0.5 * c.k_s * _dot(new, new)
+                lost += c_n * vn * vn * dt + dt * _dot(f, v) - (after - before)
+                stored += 0.5 * c.k_n * d * d - attraction * d + after
+            push = repulsion - attraction
+            f = (f[0] - push * n[0], f[1] - push * n[1], f[2] - push * n[2])
+            fx, fy, fz = fx + f[0], fy + f[1], fz + f[2]
+            force[j, 0] -= f[0]
+            force[j, 1] -= f[1]
+            force[j, 2] -= f[2]
+            moment = _cross(n, f)
+            tx, ty, tz = tx + li * moment[0], ty + li * moment[1], tz + li * moment[2]
+            mx, my, mz = lj * moment[0], lj * moment[1], lj * moment[2]
             if patch > 0.0:
-                # rolling: rotation of j relative to i without its part along n
-                wx, wy, wz = sjx - six, sjy - siy, sjz - siz
-                wn = wx * nx + wy * ny + wz * nz
-                wx -= wn * nx
-                wy -= wn * ny
-                wz -= wn * nz
-                qx, qy, qz = p.spring[at, 3], p.spring[at, 4], p.spring[at, 5]
-                ax = qx + turn * (ny * qz - nz * qy) + dt * wx
-                ay = qy + turn * (nz * qx - nx * qz) + dt * wy
-                az = qz + turn * (nx * qy - ny * qx) + dt * wz
-                along = ax * nx + ay * ny + az * nz
-                ax -= along * nx
-                ay -= along * ny
-                az -= along * nz
+                # rolling and twisting
+                w = (sj[0] - si[0], sj[1] - si[1], sj[2] - si[2])
+                wn = _dot(w, n)
+                w = _tangential(w, n)
                 k_r, c_r = c.k_n * patch * patch, c_n * patch * patch
-                px, py, pz = k_r * ax + c_r * wx, k_r * ay + c_r * wy, k_r * az + c_r * wz
-                most = c.mu_r * patch * push
-                size = px * px + py * py + pz * pz
-                if size > most * most:
-                    share = most / np.sqrt(size)
-                    px *= share
-                    py *= share
-                    pz *= share
-                    ax, ay, az = px / k_r, py / k_r, pz / k_r
-                # twisting
+                most = c.mu_r * patch * load
+                old = (p.spring[at, 3], p.spring[at, 4], p.spring[at, 5])
+                moment, new = _resistance(_elongated(old, w, n, turn, dt), w, k_r, c_r, most)
                 k_t, c_t = 2.0 * c.k_s * patch * patch, 2.0 * c_s * patch * patch
-                twist = p.spring[at, 6]
-                angle = twist + dt * wn
-                moment = k_t * angle + c_t * wn
                 most *= c.mu_t * c.mu_s / c.mu_r if c.mu_r > 0.0 else 0.0
-                if abs(moment) > most:
-                    moment = most if moment > 0.0 else -most
-                    angle = moment / k_t
+                twist = p.spring[at, 6]
+                axial, angle = _twisting(twist, wn, k_t, c_t, most, dt)
+                p.spring[at, 3], p.spring[at, 4], p.spring[at, 5] = new
+                p.spring[at, 6] = angle
                 if account:
-                    after = 0.5 * k_r * (ax * ax + ay * ay + az * az) + 0.5 * k_t * angle * angle
-                    before = 0.5 * k_r * (qx * qx + qy * qy + qz * qz) + 0.5 * k_t * twist * twist
-                    lost += dt * (px * wx + py * wy + pz * wz + moment * wn) - (after - before)
+                    after = 0.5 * k_r * _dot(new, new) + 0.5 * k_t * angle * angle
+                    before = 0.5 * k_r * _dot(old, old) + 0.5 * k_t * twist * twist
+                    lost += dt * (_dot(moment, w) + axial * wn) - (after - before)
                     stored += after
-                p.spring[at, 3], p.spring[at, 4], p.spring[at, 5], p.spring[at, 6] = ax, ay, az, angle
-                px += moment * nx
-                py += moment * ny
-                pz += moment * nz
-                tx += px
-                ty += py
-                tz += pz
-                mx -= px
-                my -= py
-                mz -= pz
+                moment = (moment[0] + axial * n[0], moment[1] + axial * n[1], moment[2] + axial * n[2])
+                tx, ty, tz = tx + moment[0], ty + moment[1], tz + moment[2]
+                mx, my, mz = mx - moment[0], my - moment[1], mz - moment[2]
             torque[j, 0] += mx
             torque[j, 1] += my
             torque[j, 2] += mz

@@ -1,11 +1,14 @@
-"""Leapfrog of grains under contacts, gravity, a tide and a drag.
+"""Leapfrog integration of grains under contact forces, gravity, a tide and a drag.
 
-Velocities live half a step before the positions; contacts see them predicted to the time of the positions, which makes
-the dissipation of second order. Gravity is evaluated every few steps, at positions predicted to the middle of that
-interval (otherwise its lag exerts a torque), and kept constant in between; the tide is evaluated at every step.
+Velocities are those of half a step before the positions. Contact forces use velocities predicted to the time of the
+positions, so that the dissipation is of second order in the step. Gravity is evaluated every few steps, at positions
+predicted to the middle of that interval (otherwise its lag exerts a torque), and kept constant in between; the tide is
+evaluated at every step.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +25,57 @@ from flybystab.typing import Array
 
 #: Outcome of :func:`advance`.
 DONE, NO_ROOM, NOT_FINITE = 0, 1, 2
+
+
+class Loads(NamedTuple):
+    """What acts on the grains besides their contacts and their gravity.
+
+    Attributes
+    ----------
+    tide : TidePanels
+    ground : Ground
+        Surface of the planet, which takes grains out; no panels for none.
+    pull : ndarray (4,)
+        Strength of a central field and ``1/a_i^2`` of its level surfaces; strength zero for none.
+    drag : float
+        Rate at which velocities decay.
+    """
+
+    tide: TidePanels
+    ground: Ground
+    pull: Array
+    drag: float
+
+
+class Scheme(NamedTuple):
+    """Numerical choices of :func:`advance`.
+
+    Attributes
+    ----------
+    dt : float
+        Time step.
+    every : int
+        Steps between evaluations of gravity.
+    skin : float
+        Skin of the neighbour list.
+    gravity : bool
+        Whether the grains attract each other.
+    theta : float
+        Opening of the tree that sums gravity (:mod:`flybystab.core.grains.tree`); zero for the direct sum.
+    """
+
+    dt: float
+    every: int
+    skin: float
+    gravity: bool
+    theta: float
+
+
+class Predicted(NamedTuple):
+    """Velocities and angular velocities, ``(n, 3)``, predicted to the time of the positions; kept between calls."""
+
+    u: Array
+    s: Array
 
 
 @kernel
@@ -118,10 +172,21 @@ def _land(g: Grains, t: float, ground: Ground, where: Array) -> int:
 
 @kernel
 def _kick_and_drift(
-    g: Grains, tide: Array, field: Array, pull: Array, drag: float, dt: float, force: Array, torque: Array,
-    u: Array, s: Array,
-) -> float:  # fmt: skip
-    """One leapfrog step from forces and torques, which are then zero; writes the predicted velocities ``u, s``."""
+    g: Grains,
+    predicted: Predicted,
+    loads: Loads,
+    tide: Array,
+    field: Array,
+    dt: float,
+    force: Array,
+    torque: Array,
+) -> float:
+    """One leapfrog step from forces and torques, which are then zero; writes the predicted velocities.
+
+    `tide` is the tidal tensor at this time, `field` the gravity of the grains, ``(3, n)``. Returns the square of the
+    largest speed.
+    """
+    u, s, pull, drag = predicted.u, predicted.s, loads.pull, loads.drag
     kxx, kyy, kzz, kxy, kxz, kyz = tide[0], tide[1], tide[2], tide[3], tide[4], tide[5]
     fastest = 0.0
     for i in range(g.mass.shape[0]):
@@ -165,40 +230,27 @@ def _kick_and_drift(
 
 @kernel
 def advance(
-    g: Grains, contact: Contact, p: Pairs, tide: TidePanels, ground: Ground, t: float, dt: float, steps: int,
-    every: int, skin: float, gravity: bool, theta: float, pull: Array, drag: float, u: Array, s: Array,
+    g: Grains, contact: Contact, p: Pairs, predicted: Predicted, loads: Loads, scheme: Scheme, t: float, steps: int,
     ledger: Array, count: NDArray[np.int64],
 ) -> int:  # fmt: skip
     """Advance grains by a number of steps.
 
     Parameters
     ----------
-    t, dt : float
-        Time of the positions and step, on the scaled clock of the tide.
-    every : int
-        Steps between evaluations of gravity.
-    skin : float
-        Skin of the neighbour list.
-    gravity : bool
-        Whether the grains attract each other.
-    theta : float
-        Opening of the tree that sums gravity (:mod:`flybystab.core.grains.tree`); zero for the direct sum.
-    pull : ndarray (4,)
-        Strength of a central field and ``1/a_i^2`` of its level surfaces; strength zero for none.
-    drag : float
-        Rate at which velocities decay.
-    u, s : ndarray (n, 3)
-        Velocities and angular velocities predicted to the time of the positions; kept between calls.
+    t : float
+        Time of the positions, on the scaled clock of the tide.
     ledger : ndarray (2,) or (0,)
         See :func:`flybystab.core.grains.contact.contact_forces`.
     count : ndarray (2,)
-        Added to: lists made, grains lost on the ground.
+        Added to: neighbour lists made, grains lost on the ground.
 
     Returns
     -------
     int
         ``DONE``, ``NO_ROOM`` in the neighbour list, or ``NOT_FINITE``.
     """
+    u, s, tide, ground = predicted.u, predicted.s, loads.tide, loads.ground
+    dt, every, skin, theta = scheme.dt, scheme.every, scheme.skin, scheme.theta
     n = g.mass.shape[0]
     force, torque = np.zeros((n, 3)), np.zeros((n, 3))
     field, place = np.zeros((3, n)), np.zeros((3, n))
@@ -215,7 +267,7 @@ def advance(
             _mean_spin(g, spin)
             made = step
             count[0] += 1
-        if gravity and step % every == 0:
+        if scheme.gravity and step % every == 0:
             ahead = 0.5 * dt * min(every, steps - step) - 0.5 * dt
             for i in range(n):
                 for k in range(3):
@@ -226,7 +278,7 @@ def advance(
                 direct_sum(place, g.mass, field)
         tide_at(tide.tau, tide.start, tide.width, tide.coefficients, now, k_t)
         contact_forces(g, u, s, contact, p, dt, force, torque, ledger)
-        fastest = _kick_and_drift(g, k_t, field, pull, drag, dt, force, torque, u, s)
+        fastest = _kick_and_drift(g, predicted, loads, k_t, field, dt, force, torque)
         if not np.isfinite(fastest):
             return NOT_FINITE
         if ground.coefficients.shape[0] > 0:

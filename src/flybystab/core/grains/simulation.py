@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from flybystab.core.dynamics.ground import Ground, no_ground
 from flybystab.core.ellipsoid.tide import TidePanels, no_tide
 from flybystab.core.grains.gravity import potential_energy
-from flybystab.core.grains.motion import DONE, NO_ROOM, advance
+from flybystab.core.grains.motion import DONE, NO_ROOM, Loads, Predicted, Scheme, advance
 from flybystab.core.grains.neighbours import SKIN, Pairs, empty_pairs
 from flybystab.core.grains.state import STEPS_PER_CONTACT, Contact, Grains, time_step
 from flybystab.core.grains.tree import opening
@@ -87,16 +87,17 @@ class Simulation:
         steps = max(1, round(duration / self.dt))
         every = max(1, round(self.gravity_interval / self.dt))
         theta = opening(self.gravity_error) if len(self.grains.mass) >= self.tree_from else 0.0
-        while True:
-            outcome = advance(
-                self.grains, self.contact, self.pairs, self.tide, self.ground, self.time, self.dt, steps, every,
-                self.reach, gravity, theta, pull, drag, self.u, self.s, self.ledger, self.counts,
-            )  # fmt: skip
-            if outcome == DONE:
-                break
-            if outcome == NO_ROOM:
-                raise NotConverged("a pile with so many neighbours of a grain: its sizes differ too much")
-            raise NotConverged(f"grains left finite numbers after {self.steps} steps")
+        outcome = advance(
+            self.grains, self.contact, self.pairs, Predicted(self.u, self.s),
+            Loads(self.tide, self.ground, pull, drag), Scheme(self.dt, every, self.reach, gravity, theta),
+            self.time, steps, self.ledger, self.counts,
+        )  # fmt: skip
+        if outcome == NO_ROOM:
+            raise NotConverged("neighbour list full: the sizes of the grains differ too much")
+        if outcome != DONE:
+            raise NotConverged(
+                f"finite positions and velocities of the grains: they diverged after {self.steps} steps"
+            )
         self.steps += steps
         self.time += steps * self.dt
 
