@@ -16,7 +16,8 @@ import numpy as np
 from astropy.time import Time
 
 from flybystab.orbit.ephemeris import ephemeris
-from flybystab.orbit.orbit import Orbit, later, seconds
+from flybystab.orbit.epochs import later, seconds
+from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.search.encounter_finder import find_encounters
 
 DATA = Path(os.environ.get("FLYBYSTAB_SHARED", Path(__file__).resolve().parents[1] / "../shared")) / "data"

@@ -25,8 +25,9 @@ from flybystab.catalogues.orbit_errors import runoff as sigma_of_code
 from flybystab.constants import AU, YEAR
 from flybystab.encounter.encounter import Encounter
 from flybystab.orbit.ephemeris import Window, ephemeris
+from flybystab.orbit.epochs import later, seconds
 from flybystab.orbit.forces import FORCES, LAW_SIZE
-from flybystab.orbit.orbit import Orbit, later, seconds
+from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.predictability import deviations_of
 from flybystab.orbit.search import neighbours
 from flybystab.orbit.search.acceleration import field

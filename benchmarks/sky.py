@@ -18,8 +18,9 @@ from astropy.time import Time
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import MissingExtra
 from flybystab.orbit.ephemeris import ephemeris
+from flybystab.orbit.epochs import seconds
 from flybystab.orbit.forces import FORCES
-from flybystab.orbit.orbit import Orbit, seconds
+from flybystab.orbit.orbit import Orbit
 
 DATA = Path(os.environ.get("FLYBYSTAB_SHARED", Path(__file__).resolve().parents[1] / "../shared")) / "data"
 UNIT = u.au / u.d**2

@@ -12,8 +12,9 @@ from flybystab.catalogues.orbit_errors import error_of, runoff
 from flybystab.catalogues.readers.mpc import from_mpc
 from flybystab.constants import AU, YEAR
 from flybystab.orbit.elements import GM_SUN
+from flybystab.orbit.epochs import later
 from flybystab.orbit.kepler import two_body
-from flybystab.orbit.orbit import heliocentric, later
+from flybystab.orbit.osculating_state import heliocentric
 from flybystab.screening.clones import orbit_sampling
 from flybystab.screening.encounters import Passage
 

@@ -11,7 +11,7 @@ from flybystab.catalogues.catalogue import catalogue
 from flybystab.encounter.linear_target_plane import disc_probability, ellipse
 from flybystab.errors import InvalidInput, NoEncounter
 from flybystab.orbit.covariance import SETS, Covariance
-from flybystab.orbit.orbit import later
+from flybystab.orbit.epochs import later
 from flybystab.orbit.planets import planet
 from flybystab.orbit.target_plane import capture_radius
 

@@ -11,7 +11,7 @@ from flybystab.catalogues.catalogue import catalogue
 from flybystab.constants import DAY
 from flybystab.errors import InvalidInput
 from flybystab.orbit.covariance import SETS, Covariance
-from flybystab.orbit.orbit import later
+from flybystab.orbit.epochs import later
 from flybystab.orbit.planets import planet
 from flybystab.orbit.target_plane import capture_radius
 

@@ -12,7 +12,7 @@ from flybystab.errors import InvalidInput
 from flybystab.flybys.survival import Survival
 from flybystab.flybys.verdict import Verdict
 from flybystab.orbit.covariance import SETS, Covariance
-from flybystab.orbit.orbit import later
+from flybystab.orbit.epochs import later
 
 EPOCH = Time("2027-03-01", scale="tdb")
 PILE = fs.Body(semi_axes=[140, 85, 75] * u.m, density=2000 * u.kg / u.m**3, spin_period=6 * u.h)

@@ -10,7 +10,7 @@ import flybystab as fs
 from flybystab.constants import DAY
 from flybystab.errors import InvalidInput, UnknownName
 from flybystab.orbit.elements import GM_SUN, GM_TOTAL, ecliptic_to_icrf, elements_from_state
-from flybystab.orbit.orbit import heliocentric
+from flybystab.orbit.osculating_state import heliocentric
 from flybystab.orbit.planets import PLANETS
 
 EPOCH = Time(2461000.5, format="jd", scale="tdb")

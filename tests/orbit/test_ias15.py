@@ -14,8 +14,9 @@ from flybystab.encounter.encounter import Encounter
 from flybystab.errors import Impact, InaccurateOrbit
 from flybystab.orbit.barycentre import barycentre_in
 from flybystab.orbit.ephemeris import BELT, BODIES, body_state
+from flybystab.orbit.epochs import later
 from flybystab.orbit.ias15 import TIGHT
-from flybystab.orbit.orbit import Orbit, later
+from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.search.encounter_finder import find_encounters
 
 EPOCH = Time(2458849.5, format="jd", scale="tdb")

@@ -9,8 +9,10 @@ from reference import need_ephemeris
 import flybystab as fs
 from flybystab.constants import DAY
 from flybystab.errors import InaccurateOrbit
+from flybystab.orbit.default_forces import without_itself
 from flybystab.orbit.ephemeris import BELT, N_BODIES
-from flybystab.orbit.orbit import Orbit, later, without_itself
+from flybystab.orbit.epochs import later
+from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.search.encounter_finder import find_encounters
 
 EPOCH = Time(2460000.5, format="jd", scale="tdb")

@@ -11,9 +11,12 @@ from reference import need_ephemeris
 from flybystab.constants import AU, C_LIGHT, OBLIQUITY_J2000, YEAR
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput, NoEncounter, UnitMismatch, UnknownName
+from flybystab.orbit.default_forces import default_forces
+from flybystab.orbit.elements import GM_SUN
 from flybystab.orbit.ephemeris import BODIES, ephemeris
+from flybystab.orbit.epochs import later, seconds
 from flybystab.orbit.forces import FORCES, NonGravitational, acceleration, model
-from flybystab.orbit.orbit import GM_SUN, Orbit, default_forces, later, seconds
+from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.planets import PLANETS, planet
 from flybystab.orbit.relativity import of_source
 from flybystab.orbit.search.acceleration import empty_places, field, rate

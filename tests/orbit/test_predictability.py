@@ -11,9 +11,10 @@ from reference import need_ephemeris
 import flybystab as fs
 from flybystab.errors import NoEncounter, OutOfSpan
 from flybystab.orbit.elements import GM_SUN
+from flybystab.orbit.epochs import seconds
 from flybystab.orbit.forces import FORCES
 from flybystab.orbit.kepler import two_body
-from flybystab.orbit.orbit import heliocentric, seconds
+from flybystab.orbit.osculating_state import heliocentric
 from flybystab.orbit.predictability import (
     MODEL_ERROR,
     Predictability,

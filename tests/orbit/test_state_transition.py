@@ -12,12 +12,14 @@ import flybystab as fs
 from flybystab.constants import DAY, YEAR
 from flybystab.errors import InvalidInput
 from flybystab.orbit.covariance import PUSHES
+from flybystab.orbit.default_forces import default_forces
 from flybystab.orbit.elements import GM_SUN
 from flybystab.orbit.ephemeris import BODIES, SUN, ephemeris
+from flybystab.orbit.epochs import seconds
 from flybystab.orbit.forces import NonGravitational, model
 from flybystab.orbit.ias15 import TIGHT, Flight
 from flybystab.orbit.kepler import two_body
-from flybystab.orbit.orbit import Orbit, default_forces, seconds
+from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.state_transition import derivatives
 
 EPOCH = Time("2027-01-01", scale="tdb")

@@ -13,8 +13,8 @@ from flybystab.core.ellipsoid.tide import tensor, tide_at
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput, NoEncounter, OutOfSpan
 from flybystab.orbit.ephemeris import BODIES
+from flybystab.orbit.epochs import later, seconds
 from flybystab.orbit.forces import FORCES
-from flybystab.orbit.orbit import later, seconds
 from flybystab.orbit.planets import planet
 from flybystab.orbit.search.encounter_finder import find_encounters
 

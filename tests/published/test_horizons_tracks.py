@@ -6,7 +6,7 @@ import pytest
 from astropy.time import Time
 from reference import horizons_track, need_ephemeris
 
-from flybystab.orbit.orbit import later
+from flybystab.orbit.epochs import later
 
 J2000 = Time(2451545.0, format="jd", scale="tdb")
 

@@ -13,7 +13,8 @@ from flybystab.body.body import Body, check_body
 from flybystab.catalogues.readers.conversion import state_row
 from flybystab.catalogues.record import SHAPE
 from flybystab.errors import InvalidInput, UnknownName
-from flybystab.orbit.orbit import Orbit, heliocentric
+from flybystab.orbit.orbit import Orbit
+from flybystab.orbit.osculating_state import heliocentric
 from flybystab.units import to_si
 
 #: Quantities that can have an error or a source: unit, and stem of the column names.

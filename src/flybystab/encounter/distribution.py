@@ -25,7 +25,8 @@ from flybystab.encounter.linear_target_plane import LinearPlane, ellipse, linear
 from flybystab.encounter.reach import far_enough
 from flybystab.errors import InvalidInput, NoEncounter
 from flybystab.orbit.ephemeris import Ephemeris
-from flybystab.orbit.orbit import Orbit, later
+from flybystab.orbit.epochs import later
+from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.planets import Planet, planet
 from flybystab.orbit.search.encounter_finder import find_encounters
 from flybystab.progress import Progressing

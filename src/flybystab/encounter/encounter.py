@@ -19,8 +19,9 @@ from flybystab.core.ellipsoid.tide import TidePanels, tensor, tide_at, tide_pane
 from flybystab.encounter.reach import SETTLE, far_enough
 from flybystab.errors import InvalidInput
 from flybystab.orbit.ephemeris import BODIES, Ephemeris
+from flybystab.orbit.epochs import later
 from flybystab.orbit.observatories import geographic
-from flybystab.orbit.orbit import Orbit, later
+from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.planets import Planet, planet
 from flybystab.orbit.predictability import Predictability
 from flybystab.orbit.target_plane import NORTH, checked, target_plane

@@ -23,11 +23,14 @@ from flybystab.orbit.closest_approach import (
     periapsis_time,
     relative,
 )
+from flybystab.orbit.default_forces import without_itself
 from flybystab.orbit.ephemeris import BODIES, Ephemeris, Window
+from flybystab.orbit.epochs import later, seconds
 from flybystab.orbit.forces import FORCES, model, shares
 from flybystab.orbit.ias15 import EPSILON, TIGHT, Flight
 from flybystab.orbit.kepler import time_at_distance
-from flybystab.orbit.orbit import Orbit, _ephemeris, later, seconds, without_itself
+from flybystab.orbit.orbit import Orbit
+from flybystab.orbit.orbit_arguments import as_ephemeris
 from flybystab.orbit.planets import Planet
 from flybystab.orbit.predictability import (
     Deviations,
@@ -126,7 +129,7 @@ def followed(
     index = BODIES.index(body.name)
     epoch = seconds(orbit.epoch, near)
     epochs = (epoch, seconds(deviation_epoch(orbit), near))
-    window = _ephemeris(ephemeris).window(
+    window = as_ephemeris(ephemeris).window(
         near, min(*epochs, -reach), max(*epochs, reach + wait + TAIL + 10.0 * DAY)
     )
     away = orbit.barycentric(window) - window.states(index, np.array([epoch]))[0]

@@ -24,7 +24,7 @@ from flybystab.errors import InvalidInput, MissingExtra, NoEncounter, OutOfSpan
 from flybystab.files import read_bytes
 from flybystab.orbit.barycentre import barycentre_in
 from flybystab.orbit.ephemeris import BODIES, Ephemeris
-from flybystab.orbit.orbit import _ephemeris
+from flybystab.orbit.orbit_arguments import as_ephemeris
 from flybystab.orbit.planets import Planet
 from flybystab.typing import Array
 
@@ -168,7 +168,7 @@ def _origin(
         return lambda t: np.zeros((len(t), 6)), ""
     if planet.name not in BODIES or planet.name == "sun":
         raise InvalidInput("planet", planet.name, f"one of {', '.join(BODIES[1:])}")
-    window = _ephemeris(ephemeris).window(zero, low, high)
+    window = as_ephemeris(ephemeris).window(zero, low, high)
 
     def origin(t: Array) -> Array:
         there = window.states(BODIES.index(planet.name), t)

@@ -24,8 +24,10 @@ from flybystab.constants import DAY
 from flybystab.encounter.linear_target_plane import disc_probability
 from flybystab.errors import InaccurateOrbit, InvalidInput
 from flybystab.orbit.covariance import PUSHES, Covariance
+from flybystab.orbit.deviations import deviated
 from flybystab.orbit.ephemeris import Ephemeris
-from flybystab.orbit.orbit import Orbit, deviated, later, seconds
+from flybystab.orbit.epochs import later, seconds
+from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.planets import Planet, planet
 from flybystab.orbit.search.encounter_finder import find_encounters
 from flybystab.orbit.target_plane import capture_radius

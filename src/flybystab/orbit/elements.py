@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -65,48 +65,71 @@ def state_in_plane(
     return np.concatenate([x * p + y * w, vx * p + vy * w])
 
 
-def perihelion_of(
-    given: Mapping[str, float | None], gm: float
-) -> tuple[float, float, float, float, float, float]:
-    """q, e, i, node, peri and the time since periapsis (m, rad, s) of any set of elements that defines an orbit.
+@dataclass(frozen=True)
+class GivenElements:
+    """Elements as they were given: any set that defines an orbit, with None for those that were not given.
 
-    Parameters
+    Attributes
     ----------
-    given : mapping of str to float or None
-        ``a`` or ``q`` (m), ``e``, ``i``, ``node``, ``peri`` (rad), ``M`` (rad) or ``since`` (s); None if not given.
-    gm : float
-        m3/s2.
-
-    Raises
-    ------
-    InvalidInput
-        Elements are missing, given twice, or contradict each other.
+    a, q : float or None
+        Semi-major axis and perihelion distance, m.
+    e : float or None
+        Eccentricity.
+    i, node, peri, M : float or None
+        Inclination, longitude of the node, argument of perihelion and mean anomaly, rad.
+    Tp : float or None
+        Time since perihelion, s.
     """
-    at = {name: value for name, value in given.items() if value is not None}
-    named = ", ".join("Tp" if n == "since" else n for n in at)
-    missing = [n for n in ("e", "i", "node", "peri") if n not in at]
-    if missing:
-        raise InvalidInput("elements", named or "none", f"also {', '.join(missing)}")
-    for one, other, shown in (("a", "q", "q"), ("M", "since", "Tp")):
-        if one in at and other in at:
-            raise InvalidInput("elements", named, f"{one} or {shown}, not both")
-        if one not in at and other not in at:
-            raise InvalidInput("elements", named, f"also {one} or {shown}")
-    e = at["e"]
-    if e == 1.0 and not ("q" in at and "since" in at):
-        raise InvalidInput("elements", named, "q and Tp for a parabola (e = 1), which has neither a nor M")
-    if "a" in at:
-        a = at["a"]
-        if a == 0.0 or e < 0.0 or (a > 0.0) != (e < 1.0):
-            raise InvalidInput("e", e, f"below 1 for a > 0, above 1 for a < 0 (a = {a:g} m)")
-        q = a * (1.0 - e)
-    else:
-        q = at["q"]
-        if q <= 0.0 or e < 0.0:
-            raise InvalidInput("q, e", f"{q:g} m, {e:g}", "q above 0 and e of 0 or more")
-        a = q / (1.0 - e) if e != 1.0 else np.inf
-    since = at["since"] if "since" in at else at["M"] * np.sqrt(abs(a) ** 3 / gm)
-    return q, e, at["i"], at["node"], at["peri"], float(since)
+
+    a: float | None = None
+    q: float | None = None
+    e: float | None = None
+    i: float | None = None
+    node: float | None = None
+    peri: float | None = None
+    M: float | None = None
+    Tp: float | None = None
+
+    def perihelion(self, gm: float) -> tuple[float, float, float, float, float, float]:
+        """q, e, i, node, peri and the time since perihelion (m, rad, s).
+
+        Parameters
+        ----------
+        gm : float
+            m3/s2.
+
+        Raises
+        ------
+        InvalidInput
+            Elements are missing, given twice, or contradict each other.
+        """
+        at = {name: value for name, value in vars(self).items() if value is not None}
+        named = ", ".join(at)
+        missing = [n for n in ("e", "i", "node", "peri") if n not in at]
+        if missing:
+            raise InvalidInput("elements", named or "none", f"also {', '.join(missing)}")
+        for one, other in (("a", "q"), ("M", "Tp")):
+            if one in at and other in at:
+                raise InvalidInput("elements", named, f"{one} or {other}, not both")
+            if one not in at and other not in at:
+                raise InvalidInput("elements", named, f"also {one} or {other}")
+        e = at["e"]
+        if e == 1.0 and not ("q" in at and "Tp" in at):
+            raise InvalidInput(
+                "elements", named, "q and Tp for a parabola (e = 1), which has neither a nor M"
+            )
+        if "a" in at:
+            a = at["a"]
+            if a == 0.0 or e < 0.0 or (a > 0.0) != (e < 1.0):
+                raise InvalidInput("e", e, f"below 1 for a > 0, above 1 for a < 0 (a = {a:g} m)")
+            q = a * (1.0 - e)
+        else:
+            q = at["q"]
+            if q <= 0.0 or e < 0.0:
+                raise InvalidInput("q, e", f"{q:g} m, {e:g}", "q above 0 and e of 0 or more")
+            a = q / (1.0 - e) if e != 1.0 else np.inf
+        since = at["Tp"] if "Tp" in at else at["M"] * np.sqrt(abs(a) ** 3 / gm)
+        return q, e, at["i"], at["node"], at["peri"], float(since)
 
 
 def elements_from_state(state: Array, gm: float = GM_SUN) -> tuple[float, float, float, float, float, float]:

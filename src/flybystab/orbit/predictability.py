@@ -16,8 +16,9 @@ from astropy.time import Time
 
 from flybystab.constants import YEAR
 from flybystab.orbit.covariance import PUSHES, Covariance
+from flybystab.orbit.deviations import deviated
 from flybystab.orbit.ephemeris import Ephemeris
-from flybystab.orbit.orbit import Orbit, deviated
+from flybystab.orbit.orbit import Orbit
 from flybystab.typing import Array
 
 #: Error of the model before any encounter, m: the median against JPL's approaches of 2020 (``flybystab bench sky``),

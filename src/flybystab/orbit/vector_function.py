@@ -15,10 +15,11 @@ from skyfield.vectorlib import VectorFunction
 
 from flybystab.constants import AU, DAY
 from flybystab.errors import InvalidInput
+from flybystab.orbit.default_forces import default_forces, without_itself
 from flybystab.orbit.ephemeris import BODIES, SUN, Ephemeris, Window, ephemeris
 from flybystab.orbit.forces import model
 from flybystab.orbit.ias15 import TIGHT, Flight
-from flybystab.orbit.orbit import Orbit, default_forces, without_itself
+from flybystab.orbit.orbit import Orbit
 from flybystab.typing import Array
 
 #: NAIF numbers of the centres that a path can be given from.

@@ -284,7 +284,7 @@ def _of_orbit(orbit: Any, number: int) -> tuple[float, float, float]:
         raise InvalidInput(
             f"orbits[{number}]", orbit, "an Orbit, an Asteroid with one, or a table with a, e, i"
         )
-    from flybystab.orbit.orbit import heliocentric
+    from flybystab.orbit.osculating_state import heliocentric
 
     state = heliocentric(orbit)
     return elements_of(state[:3], state[3:])

@@ -18,7 +18,7 @@ from flybystab.catalogues.asteroid import identity
 from flybystab.encounter.distribution import clone_passages, encounter_distribution
 from flybystab.encounter.reach import far_enough
 from flybystab.errors import FlybystabError
-from flybystab.orbit.orbit import later
+from flybystab.orbit.epochs import later
 from flybystab.orbit.planets import planet
 from flybystab.screening.draws import stream
 from flybystab.screening.encounters import Passage

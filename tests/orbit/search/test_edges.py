@@ -9,7 +9,8 @@ from reference import need_ephemeris
 import flybystab as fs
 from flybystab.constants import AU, DAY
 from flybystab.errors import Impact
-from flybystab.orbit.orbit import Orbit, later, seconds
+from flybystab.orbit.epochs import later, seconds
+from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.planets import PLANETS
 from flybystab.orbit.search.encounter_finder import find_encounters
 

@@ -9,9 +9,11 @@ from astropy.time import Time
 from reference import need_ephemeris
 
 import flybystab as fs
+from flybystab.orbit.default_forces import default_forces
 from flybystab.orbit.ephemeris import BODIES, ephemeris
+from flybystab.orbit.epochs import seconds
 from flybystab.orbit.forces import NonGravitational
-from flybystab.orbit.orbit import default_forces, heliocentric, seconds
+from flybystab.orbit.osculating_state import heliocentric
 from flybystab.orbit.search import neighbours
 from flybystab.orbit.search.acceleration import field
 from flybystab.orbit.search.dop853 import empty_room

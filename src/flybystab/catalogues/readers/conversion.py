@@ -157,7 +157,8 @@ def _centre_offset(jd: float, centre: str, barycentre: str) -> tuple[float, ...]
     import astropy.units as u
     from astropy.time import Time
 
-    from flybystab.orbit.orbit import Orbit, heliocentric
+    from flybystab.orbit.orbit import Orbit
+    from flybystab.orbit.osculating_state import heliocentric
 
     one = np.array([AU, 0.0, 0.0, 0.0, 0.0, 0.0])
     whole = np.floor(jd)

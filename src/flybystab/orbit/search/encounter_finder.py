@@ -20,7 +20,9 @@ from flybystab.arguments import check_arguments
 from flybystab.core.numerics.threads import in_order, worker_count
 from flybystab.errors import Impact, InvalidInput, NotConverged
 from flybystab.orbit.ephemeris import BODIES, SUN, Ephemeris
-from flybystab.orbit.orbit import Orbit, _ephemeris, later
+from flybystab.orbit.epochs import later
+from flybystab.orbit.orbit import Orbit
+from flybystab.orbit.orbit_arguments import as_ephemeris
 from flybystab.orbit.planets import PLANETS, Planet, planet
 from flybystab.orbit.predictability import deviations_of
 from flybystab.orbit.search.encounter_table import (
@@ -138,7 +140,7 @@ def find_encounters(
     check_progress(progress)
     found, reach = _planets_within(planets, within)
     accuracy = to_si(error, u.m, "error", low=0.0)
-    eph = _ephemeris(ephemeris)
+    eph = as_ephemeris(ephemeris)
     span, epochs = search_span(rows, start, stop, eph, growth)
     states = initial_states(rows, span.window, epochs)
     # A tenth: several displacements add up, and passages enlarge them.

@@ -21,9 +21,9 @@ from flybystab.core.numerics.threads import in_order
 from flybystab.orbit.covariance import PUSHES
 from flybystab.orbit.elements import GM_SUN
 from flybystab.orbit.ephemeris import SUN, Window
+from flybystab.orbit.epochs import seconds
 from flybystab.orbit.forces import RADIATION_PRESSURE
 from flybystab.orbit.kepler import two_body
-from flybystab.orbit.orbit import seconds
 from flybystab.orbit.planets import planet
 from flybystab.orbit.predictability import Deviations, predictability, undisturbed_error
 from flybystab.orbit.search.acceleration import Field, borrowed_field, first_rate

@@ -12,9 +12,11 @@ from astropy.time import Time
 from flybystab.constants import DAY, YEAR
 from flybystab.orbit.almanac import GRID, N_FAST, N_SLOW, SLOT
 from flybystab.orbit.barycentre import barycentre_in
+from flybystab.orbit.default_forces import TWIN_DISTANCE, TWIN_SPEED, default_forces
 from flybystab.orbit.ephemeris import BELT, BODIES, N_BODIES, SUN, Ephemeris, Window
+from flybystab.orbit.epochs import later, seconds
 from flybystab.orbit.forces import FORCES, LAW_SIZE
-from flybystab.orbit.orbit import TWIN_DISTANCE, TWIN_SPEED, Orbit, default_forces, later, seconds
+from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.planets import PLANETS, Planet
 from flybystab.orbit.predictability import deviation_epoch
 from flybystab.orbit.search.acceleration import Field, field
