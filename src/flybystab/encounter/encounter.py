@@ -1,46 +1,32 @@
-"""A close encounter of an asteroid with a planet: the path and the tide along it."""
+"""A close encounter of an asteroid with a planet, and the inputs from which it is made."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
-from functools import cached_property
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import astropy.units as u
 import numpy as np
 from astropy.time import Time
 from astropy.units import Quantity
 
-from flybystab.arguments import check_arguments, vector
-from flybystab.core.dynamics.ground import Ground
-from flybystab.core.ellipsoid.tide import TidePanels, tensor, tide_at, tide_panels
+from flybystab.arguments import check_arguments
+from flybystab.encounter.encounter_arguments import checked_start, unit_vector
+from flybystab.encounter.encounter_path import EncounterPath
 from flybystab.encounter.reach import SETTLE, far_enough
 from flybystab.errors import InvalidInput
 from flybystab.orbit.ephemeris import BODIES, Ephemeris
-from flybystab.orbit.epochs import later
-from flybystab.orbit.observatories import geographic
 from flybystab.orbit.orbit import Orbit
-from flybystab.orbit.planets import Planet, planet
-from flybystab.orbit.predictability import Predictability
-from flybystab.orbit.target_plane import NORTH, checked, target_plane
-from flybystab.typing import Array
-from flybystab.units import brief, checked_time, to_si
+from flybystab.orbit.planets import Planet
+from flybystab.orbit.planets import planet as find_planet
+from flybystab.units import checked_time, to_si
 
 if TYPE_CHECKING:
     from flybystab.encounter.trajectory_files import Samples
 
 
-class Track(Protocol):
-    """Motion of the asteroid relative to the planet."""
-
-    def states(self, t: Array) -> Array:
-        """Position (m) and velocity (m/s), shape (n, 6), at ``t`` s from closest approach, shape (n,)."""
-
-
-@dataclass(frozen=True, eq=False)
-class Encounter:
+class Encounter(EncounterPath):
     """A close encounter with one planet.
 
     An encounter is built on a two-body hyperbola (:meth:`hyperbolic`: a scripted encounter, frame ``"periapsis"``),
@@ -104,149 +90,6 @@ class Encounter:
         many`` or ``unknown`` (:mod:`flybystab.orbit.predictability`).
     """
 
-    planet: Planet
-    time: Time | None
-    distance: Quantity
-    v_inf: Quantity
-    v_periapsis: Quantity
-    start_distance: Quantity
-    impact: bool
-    impact_level: str | None
-    impact_time: float | None
-    frame: str
-    forces: tuple[str, ...]
-    left_out: tuple[tuple[str, float], ...]
-    tide_error: float
-    t_start: float
-    t_stop: float
-    tide: TidePanels = field(repr=False)
-    track: Track = field(repr=False)
-    t_periapsis: float = 0.0
-    distance_error: Quantity | None = None
-    time_error: Quantity | None = None
-    displacement: Quantity | None = None
-    growth: float | None = None
-    neighbour: str = ""
-    predictability: Predictability | None = None
-    ephemeris: str | None = None
-
-    def position(self, t: Quantity) -> Quantity:
-        """Asteroid from the planet's centre.
-
-        Parameters
-        ----------
-        t : Quantity, any shape
-            Time from closest approach.
-
-        Returns
-        -------
-        Quantity, shape of `t` + (3,)
-            In `frame`, m.
-
-        Raises
-        ------
-        UnitMismatch
-            For a bare number or a unit that is not one of time.
-        """
-        return self._states(t)[..., :3] * u.m
-
-    def velocity(self, t: Quantity) -> Quantity:
-        """Velocity relative to the planet, m/s; as :meth:`position`."""
-        return self._states(t)[..., 3:] * u.m / u.s
-
-    def radius(self, t: Quantity) -> Quantity:
-        """Distance from the planet's centre, m, in the shape of `t` (see :meth:`position`)."""
-        return np.linalg.norm(self._states(t)[..., :3], axis=-1) * u.m
-
-    def _states(self, t: Quantity) -> Array:
-        """Position and velocity, SI, shape of `t` + (6,)."""
-        times = to_si(t, u.s, "t", shape=None)
-        return self.track.states(np.ravel(times)).reshape(*np.shape(times), 6)
-
-    @check_arguments
-    def positions(self, t: Array) -> Array:
-        """As :meth:`position` on floats: m, shape (n, 3), at `t` s from closest approach, shape (n,)."""
-        return self.track.states(np.atleast_1d(np.asarray(t, dtype=float)))[:, :3]
-
-    @check_arguments
-    def distances(self, t: Array) -> Array:
-        """As :meth:`radius` on floats: m, shape (n,), at `t` s from closest approach, shape (n,)."""
-        return np.sqrt(np.sum(self.positions(t) ** 2, axis=1))
-
-    @property
-    def bound(self) -> bool:
-        """Whether the two-body orbit at closest approach is an ellipse: there is no ``v_inf`` and no target plane."""
-        return self.v_inf.value == 0.0 and self.time is not None
-
-    @property
-    def entry_time(self) -> Time | None:
-        """First contact of an impact with the top of the atmosphere, or the surface without one (TDB)."""
-        return None if self.time is None or self.impact_time is None else later(self.time, self.impact_time)
-
-    @property
-    def entry_place(self) -> tuple[Quantity, Quantity] | None:
-        """East longitude and geodetic latitude of the entry into the atmosphere of the Earth; None elsewhere."""
-        if self.entry_time is None or self.impact_time is None or self.planet.name != "earth":
-            return None
-        point = self.positions(np.array([self.impact_time]))
-        longitude, latitude = geographic(point, self.entry_time)[0]
-        return longitude * u.deg, latitude * u.deg
-
-    @property
-    def height(self) -> float:
-        """Least height of the centre above atmosphere or surface, m; minus infinity on an impact of the centre."""
-        if self.impact:
-            return -np.inf
-        return float(self.distance.to_value(u.m)) - self.planet.impact_distance
-
-    @cached_property
-    def ground(self) -> Ground:
-        """Position of the planet's ground along the path: top of the atmosphere, or the surface if there is none."""
-        tide = self.tide
-        end = tide.tau * float(np.sinh(tide.start + tide.width * len(tide.coefficients)))
-        stop = self.t_stop if self.impact else end
-        way, _ = tide_panels(self.positions, self.t_start, stop, tide.tau, width=min(tide.width, 0.5))
-        return Ground(
-            way.tau, way.start, way.width, self.planet.impact_distance, self.height, 1.0, way.coefficients
-        )
-
-    @check_arguments
-    def tidal_tensor(self, t: float) -> Array:
-        """Tidal tensor, frame of the encounter, (3, 3), 1/s2, at `t` seconds from closest approach."""
-        six, panels = np.empty(6), self.tide
-        tide_at(panels.tau, panels.start, panels.width, panels.coefficients, t, six)
-        return tensor(six)
-
-    @cached_property
-    def periapsis_axes(self) -> Array:
-        """Rotation matrix, `frame` -> periapsis frame: x to the asteroid, z along the angular momentum."""
-        # A track that ends on the planet has no periapsis: use that of the two-body orbit at its end.
-        ended = self.impact and self.t_stop < 0.0
-        state = self.track.states(np.array([self.t_stop if ended else 0.0]))[0]
-        r, v = state[:3], state[3:]
-        h = np.cross(r, v)
-        x = np.cross(v, h) / self.planet.gm - r / np.linalg.norm(r) if ended else r
-        x, z = x / np.linalg.norm(x), h / np.linalg.norm(h)
-        return np.stack([x, np.cross(z, x), z])
-
-    @check_arguments
-    def b_plane(self, north: Sequence[float] = NORTH) -> Quantity:
-        """Target-plane coordinates ``(B.T, B.R)`` of the two-body hyperbola at closest approach, shape (2,).
-
-        Parameters
-        ----------
-        north : sequence of float
-            The direction N in `frame` (:mod:`flybystab.orbit.target_plane`): +z, in ICRF the Earth's equator.
-
-        Raises
-        ------
-        InvalidInput
-            For a bound orbit, which has no target plane, or if the asymptote points north.
-        """
-        when = 0.0 if self.impact_time is None else min(0.0, self.impact_time)
-        b, v_inf = target_plane(self.track.states(np.array([when])), self.planet.gm, vector(north, "north"))
-        return (checked(b[0], float(v_inf[0]), north) * u.m).to(u.km)
-
     @classmethod
     def hyperbolic(
         cls,
@@ -285,9 +128,9 @@ class Encounter:
         UnitMismatch, InvalidInput, UnknownName
             For a bad argument, with its value.
         """
-        body = _planet(planet)
+        body = find_planet(planet)
         if np.ndim(periapsis) or np.ndim(v_inf):
-            return _each(cls, planet, periapsis, v_inf, start_distance, settle, j2, pole)
+            return cls._array(periapsis, v_inf, planet, start_distance, settle, j2, pole)
         q = to_si(periapsis, u.m, "periapsis", low=1.0)
         v = to_si(v_inf, u.m / u.s, "v_inf", low=0.0)
         wait = to_si(settle, u.s, "settle", low=0.0)
@@ -297,11 +140,27 @@ class Encounter:
             start = to_si(start_distance, u.m, "start_distance")
             if start <= q:
                 raise InvalidInput("start_distance", start_distance, f"more than the periapsis, {periapsis}")
-        axis = _unit_vector(pole)
+        axis = unit_vector(pole)
 
         from flybystab.encounter.hyperbolic import scripted
 
         return scripted(cls, body, q, v, start, wait, j2, axis)
+
+    @classmethod
+    def _array(cls, periapsis: Quantity, v_inf: Quantity, planet: str | Planet, *options: Any) -> Any:
+        """Array of encounters, of the shape to which the arrays of periapsis and speed broadcast."""
+        q = to_si(periapsis, u.m, "periapsis", shape=None, low=1.0)
+        v = to_si(v_inf, u.m / u.s, "v_inf", shape=None, low=0.0)
+        try:
+            q, v = np.broadcast_arrays(q, v)
+        except ValueError:
+            raise InvalidInput(
+                "v_inf", f"shape {np.shape(v_inf)}", f"a shape that broadcasts with {np.shape(q)}"
+            ) from None
+        out = np.empty(q.shape, dtype=object)
+        for k in np.ndindex(q.shape):
+            out[k] = cls.hyperbolic(planet, float(q[k]) * u.m, float(v[k]) * u.m / u.s, *options)
+        return out
 
     @classmethod
     def from_trajectory(
@@ -344,10 +203,10 @@ class Encounter:
             Without a closest approach between the first and the last sample.
         UnitMismatch, InvalidInput, UnknownName
         """
-        body = _planet(planet)
+        body = find_planet(planet)
         wait = to_si(settle, u.s, "settle", low=0.0)
-        start = _start(start_distance)
-        axis = _unit_vector(pole)
+        start = checked_start(start_distance)
+        axis = unit_vector(pole)
         from flybystab.encounter.from_trajectory import sampled, samples
 
         return sampled(cls, body, *samples(times, positions, velocities), start, wait, j2, axis)
@@ -397,8 +256,8 @@ class Encounter:
         NoEncounter, OutOfSpan, UnitMismatch, InvalidInput, UnknownName
         """
         time = checked_time(time, "time")
-        body = _planet(planet)
-        start = _start(start_distance)
+        body = find_planet(planet)
+        start = checked_start(start_distance)
         reach = to_si(search, u.s, "search", low=0.0, open_low=True)
         from flybystab.encounter.trajectory_files import spk_samples
 
@@ -436,8 +295,8 @@ class Encounter:
         ------
         NoEncounter, OutOfSpan, UnitMismatch, InvalidInput, UnknownName
         """
-        body = _planet(planet)
-        start = _start(start_distance)
+        body = find_planet(planet)
+        start = checked_start(start_distance)
         from flybystab.encounter.trajectory_files import oem_samples
 
         return cls._along(oem_samples(path, body, ephemeris), body, start, settle, j2, pole)
@@ -456,7 +315,7 @@ class Encounter:
         from flybystab.encounter.from_trajectory import sampled
 
         wait = to_si(settle, u.s, "settle", low=0.0)
-        axis = _unit_vector(pole)
+        axis = unit_vector(pole)
         out = sampled(cls, body, found.t, found.states, found.epoch, start, wait, j2, axis)
         return replace(out, distance_error=(found.error * u.m).to(u.km), ephemeris=found.ephemeris or None)
 
@@ -516,7 +375,7 @@ class Encounter:
         if not isinstance(path, Orbit):
             raise InvalidInput("orbit", orbit, "an Orbit, or an object with one as its attribute 'orbit'")
         time = checked_time(time, "time")
-        body = _planet(planet)
+        body = find_planet(planet)
         if body.name not in BODIES or body.name == "sun":
             raise InvalidInput("planet", body.name, f"one of {', '.join(BODIES[1:])}")
         reach = to_si(search, u.s, "search", low=0.0, high=3.2e9, open_low=True)
@@ -527,54 +386,7 @@ class Encounter:
         largest = far_enough(body) if within is None else to_si(within, u.m, "within", low=0.0, open_low=True)
         accuracy = to_si(error, u.m, "error", low=0.0, open_low=True)
         wait = to_si(settle, u.s, "settle", low=0.0)
-        start = _start(start_distance)
+        start = checked_start(start_distance)
         from flybystab.encounter.from_orbit import followed
 
         return followed(cls, path, body, time.tdb, accuracy, start, wait, reach, largest, ephemeris, forces)
-
-    def __repr__(self) -> str:
-        when = "scripted" if self.time is None else f"{self.time.tdb.iso[:16]} TDB"
-        hit = f", reaches the {self.impact_level}" if self.impact_level else ""
-        radii = self.distance.to_value(u.m) / self.planet.radius
-        return (
-            f"<Encounter {self.planet.name}, {when}: {brief(self.distance, u.km)} ({radii:.4g} radii), "
-            f"v_inf {brief(self.v_inf, u.km / u.s)}{hit}>"
-        )
-
-
-def _each(
-    cls: type[Encounter], planet: str | Planet, periapsis: Quantity, v_inf: Quantity, *options: Any
-) -> Any:
-    """Array of encounters, of the shape to which the arrays of periapsis and speed broadcast."""
-    q = to_si(periapsis, u.m, "periapsis", shape=None, low=1.0)
-    v = to_si(v_inf, u.m / u.s, "v_inf", shape=None, low=0.0)
-    try:
-        q, v = np.broadcast_arrays(q, v)
-    except ValueError:
-        raise InvalidInput(
-            "v_inf", f"shape {np.shape(v_inf)}", f"a shape that broadcasts with {np.shape(q)}"
-        ) from None
-    out = np.empty(q.shape, dtype=object)
-    for k in np.ndindex(q.shape):
-        out[k] = cls.hyperbolic(planet, float(q[k]) * u.m, float(v[k]) * u.m / u.s, *options)
-    return out
-
-
-def _planet(name: str | Planet) -> Planet:
-    return planet(name)
-
-
-def _start(distance: Quantity | None) -> float | None:
-    """Distance at which the encounter starts (m); None where it follows from the path."""
-    return None if distance is None else to_si(distance, u.m, "start_distance", low=0.0)
-
-
-def _unit_vector(pole: tuple[float, float, float]) -> Array:
-    try:
-        axis = np.asarray(pole, dtype=float)
-        norm = float(np.linalg.norm(axis))
-    except (TypeError, ValueError):
-        norm = 0.0
-    if not (np.isfinite(norm) and norm > 0.0 and axis.shape == (3,)):
-        raise InvalidInput("pole", pole, "a direction: three finite numbers, not all zero")
-    return axis / norm
