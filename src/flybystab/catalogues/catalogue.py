@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from difflib import get_close_matches
 from functools import lru_cache
@@ -15,7 +16,7 @@ from astropy.table import QTable
 
 from flybystab.body.body import Material
 from flybystab.catalogues.asteroid import CATALOGUE_DATE, Asteroid
-from flybystab.catalogues.designations import name_columns
+from flybystab.catalogues.designations import name_columns, unpacked
 from flybystab.catalogues.objects import asteroids_of
 from flybystab.catalogues.readers import FRAME, reader_of, text_of
 from flybystab.catalogues.readers.native import read_native
@@ -32,8 +33,9 @@ def find(asteroids: Sequence[Asteroid], name: str | int, where: str) -> Asteroid
         for n in a.names:
             index.setdefault(key_of(n), a)
     wanted = key_of(name)
-    parts = name_columns(str(name)) if wanted not in index else {}
-    for other in (wanted, *(key_of(parts[c]) for c in ("number", "designation", "name") if parts.get(c))):
+    for other in (
+        (wanted, *(key_of(n) for n in _other_names(str(name)))) if wanted not in index else (wanted,)
+    ):
         if other in index:
             return index[other]
     near = get_close_matches(wanted, index, n=8, cutoff=0.6)
@@ -41,7 +43,20 @@ def find(asteroids: Sequence[Asteroid], name: str | int, where: str) -> Asteroid
     suggestions = list(dict.fromkeys(index[k].name for k in near))[:5]
     known = f"({where} has {len(asteroids)}"
     known += "; others are read from a file)" if where == "the embedded catalogue" else ")"
-    raise UnknownName("asteroid", str(name), suggestions, known)
+    plain = unpacked(str(name).strip())
+    shown = f"{name} ({plain})" if plain != str(name).strip() else str(name)
+    raise UnknownName("asteroid", shown, suggestions, known)
+
+
+def _other_names(text: str) -> list[str]:
+    """Names in a text of several, as ``Bennu (101955)``, and the number of an identifier of JPL, 20101955."""
+    parts = name_columns(text)
+    found = [parts[c] for c in ("number", "designation", "name") if parts.get(c)]
+    if after := re.fullmatch(r"(.*\S)\s*\((\d+)\)", text.strip()):
+        found += [after[2]]
+    if identifier := re.fullmatch(r"a?0*(20?)(\d{6,7})", text.strip()):
+        found += [str(int(identifier[2]))]
+    return found
 
 
 def _read(text: str, file: str, name: str) -> tuple[Asteroid, ...]:

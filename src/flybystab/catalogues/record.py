@@ -5,6 +5,7 @@ A value that was not measured is flagged as assumed. The columns are explained i
 
 from __future__ import annotations
 
+import unicodedata
 from collections.abc import Mapping
 from functools import cached_property
 from types import MappingProxyType
@@ -113,8 +114,12 @@ LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType(
 
 
 def key_of(name: object) -> str:
-    """A name for comparisons: without case, spaces and brackets."""
-    return "".join(c for c in str(name).casefold() if not c.isspace() and c not in "()_")
+    """A name for comparisons: without case, accents, spaces, brackets and apostrophes; every dash is a hyphen."""
+    text = unicodedata.normalize("NFKD", str(name).casefold())
+    kept = (
+        c for c in text if not unicodedata.combining(c) and not c.isspace() and c not in "()_'`\u2019\u02bb"
+    )
+    return "".join("-" if unicodedata.category(c) == "Pd" else c for c in kept)
 
 
 class Record:

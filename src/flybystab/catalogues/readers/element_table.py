@@ -7,6 +7,7 @@ motion or the period, where given, is compared with the semi-major axis.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -17,7 +18,7 @@ from flybystab.catalogues.readers import Contents, reader
 from flybystab.catalogues.readers.conversion import DEGREE, epoch_row, perihelion_row, since_perihelion
 from flybystab.catalogues.readers.parameters import check_parameters, looks_like_parameter
 from flybystab.constants import AU, DAY
-from flybystab.errors import InvalidInput
+from flybystab.errors import FlybystabWarning, InvalidInput
 
 if TYPE_CHECKING:
     from astropy.table import Table
@@ -82,7 +83,17 @@ def entries_of(table: Table, file: str) -> list[Entry]:
         raise InvalidInput("columns", ", ".join(table.colnames), "epoch, e, i, node, w and a, M or q, Tp")
     known = {*columns.values(), *_OTHER}
     check_parameters("table", [c for c in table.colnames if looks_like_parameter(c) and c not in known], file)
-    return [_entry({k: (row[c], table[c]) for k, c in columns.items() if c}, file) for row in table]
+    return [
+        _entry({k: (row[c], table[c]) for k, c in columns.items() if c and _known(row[c])}, file)
+        for row in table
+    ]
+
+
+def _known(value: Any) -> bool:
+    """Whether a cell has a value: it is neither masked nor not a number."""
+    return not (
+        value is None or bool(np.any(getattr(value, "mask", False))) or _text(value) in ("", "nan", "--")
+    )
 
 
 def _value(cells: Mapping[str, tuple[Any, Any]], name: str, unit: str) -> float:
@@ -106,16 +117,30 @@ def _day(cells: Mapping[str, tuple[Any, Any]], name: str) -> float:
     from astropy.time import Time
 
     value, _ = cells[name]
-    return float(value.tdb.jd) if isinstance(value, Time) else _value(cells, name, "d")
+    if not isinstance(value, Time):
+        return _value(cells, name, "d")
+    if value.scale == "utc" and float(value.jd) * 2.0 % 1.0 == 0.0:
+        warnings.warn(
+            f"{name} is in UTC; elements are published in TDB or TT, which is 69 s ahead in 2026: "
+            "Time(..., scale='tdb')",
+            FlybystabWarning,
+            stacklevel=2,
+        )
+    return float(value.tdb.jd)
 
 
 def _entry(cells: Mapping[str, tuple[Any, Any]], file: str) -> Entry:
     label = " ".join(_text(cells[k][0]) for k in ("number", "name", "designation") if k in cells)
+    missing = [k for k in ("epoch", "e", "i", "node", "peri") if k not in cells]
+    if missing:
+        raise InvalidInput(
+            "elements", f"without {', '.join(missing)}", f"values for {label or 'a row'} in {file}"
+        )
     jd = _day(cells, "epoch")
     e = _value(cells, "e", "")
     angles = [_value(cells, k, "deg") for k in ("i", "node", "peri")]
     row = name_columns(label or "unnamed") | {"orbit_source": f"table ({file})"}
-    if "H" in cells and np.isfinite(float(getattr(cells["H"][0], "value", cells["H"][0]))):
+    if "H" in cells:
         row["H_mag"] = str(getattr(cells["H"][0], "value", cells["H"][0]))
     if "a" in cells and "M" in cells and e != 1.0:
         a, mean = _value(cells, "a", "AU"), _value(cells, "M", "deg")

@@ -2,7 +2,9 @@
 
 Keys: ``elements_in_json_format`` and ``covar.json`` in https://github.com/Bill-Gray/find_orb (``elem_out.cpp``
 and ``orb_func.cpp``).
-Epochs are Julian dates (TT); a state is heliocentric with axes of the J2000 ecliptic, au and au/d.
+Epochs are Julian dates (TT); a state is heliocentric with axes of the J2000 ecliptic, au and au/d. Non-gravitational
+models are described in ``nongravs.txt``; the comet model has the constants of water ice unless ``environ.dat`` of
+the user has others, which the files do not list.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from flybystab.catalogues.readers.conversion import (
 )
 from flybystab.catalogues.readers.nongravitational import nongravitational_columns
 from flybystab.catalogues.readers.parameters import check_parameters, looks_like_parameter
+from flybystab.catalogues.readers.sigmas import sigmas_of
 from flybystab.errors import InvalidInput
 from flybystab.files import parse_json
 
@@ -31,8 +34,16 @@ if TYPE_CHECKING:
 
 _ELEMENTS = {"a": "a", "e": "e", "i": "i", "asc_node": "node", "arg_per": "peri", "M": "M"}
 _COMETARY = {"q": "q", "e": "e", "i": "i", "asc_node": "node", "arg_per": "peri", "Tp": "tp"}
-#: Parameters of the models with one parameter: Yarkovsky A2 (au/d2), and area over mass (m2/kg).
-_PARAMETERS = {"A2": "A2", "AMR": "AMRAT"}
+#: Sets of parameters that belong to one model alone (``FORCE_MODEL_...`` of ``mpc_obs.h``), and its law: Yarkovsky A2
+#: (au/d2), area over mass (m2/kg), and the comet model with a delay (d), which ``elem_out.cpp`` writes as T0.
+#: A1, A2 and A1, A2, A3 belong to a law of comets or to 1/r2.
+_MODELS: Mapping[frozenset[str], str] = {
+    frozenset({"A2"}): "asteroid",
+    frozenset({"AMR"}): "asteroid",
+    frozenset({"A1", "A2", "A3", "T0"}): "comet",
+}
+#: Names of these parameters here.
+_PARAMETERS = {"A1": "A1", "A2": "A2", "A3": "A3", "T0": "DT", "AMR": "AMRAT"}
 #: Keys in capitals that are not parameters of the force model.
 _OTHER = frozenset({"H", "G", "U", "P", "Q", "M", "MOIDs", "Tp", "Tp_iso", "p_NEO", "p_HZ"})
 
@@ -48,7 +59,13 @@ def _is_covariance(text: str) -> bool:
 @reader(
     "Find_Orb elements",
     _is_elements,
-    Contents("a and M, or q and Tp", "1-sigmas", "A2 or AMRAT", "H", files="`total.json`, `elements.json`"),
+    Contents(
+        "a and M, or q and Tp",
+        "1-sigmas",
+        "A2 or AMRAT; A1, A2, A3 with DT",
+        "H",
+        files="`total.json`, `elements.json`",
+    ),
 )
 def read_elements(text: str, file: str) -> list[Entry]:
     """Orbits of ``total.json`` or ``elements.json``.
@@ -71,8 +88,11 @@ def _entry(name: str, elements: Mapping[str, Any], file: str) -> Entry:
     if elements.get("central body") != "Sun" or not str(elements.get("frame", "")).startswith("J2000 ecl"):
         given = f"{elements.get('central body')}, {elements.get('frame')}"
         raise InvalidInput("central body, frame", given, f"Sun, J2000 ecliptic in {file}")
-    unknown = [k for k in elements if _is_parameter(k)]
-    check_parameters("find_orb", unknown, file)
+    parameters = sorted(k for k in elements if _is_parameter(k))
+    law = _MODELS.get(frozenset(parameters), "")
+    if parameters and not law:
+        check_parameters("find_orb", [k for k in parameters if k not in _PARAMETERS], file)
+        check_parameters("find_orb", [f"{', '.join(parameters)} without a law"], file)
     jd = number(elements["epoch"], "epoch", file)
     names = _ELEMENTS if all(k in elements for k in _ELEMENTS) else _COMETARY
     values = [number(elements[k], k, file) for k in names]
@@ -86,15 +106,17 @@ def _entry(name: str, elements: Mapping[str, Any], file: str) -> Entry:
         row["H_mag"] = str(elements["H"])
     keys = list(names)
     pushes = {mine: elements[k] for k, mine in _PARAMETERS.items() if k in elements}
-    if len(pushes) > 1:  # A2 with AMR is no model of Find_Orb that fits both
-        check_parameters("find_orb", [f"{' and '.join(pushes)} together"], file)
-    row |= nongravitational_columns(pushes, False, file, law="asteroid")
+    row |= nongravitational_columns(pushes, law == "comet", file, law=law)
     sigmas = [elements.get(f"{k} sigma") for k in keys]
     if any(s is None for s in sigmas):
         return row, None
-    sigma = [number(s, "sigma", file) for s in sigmas]
+    found = sigmas_of(sigmas, keys, file)
+    if found is None:
+        return row, None
+    sigma = found.tolist()
     for k, mine in _PARAMETERS.items():
         if k in elements and elements.get(f"sigma_{k}") is not None:
+            sigmas_of([elements[f"sigma_{k}"]], [k], file)
             labels, values = [*labels, mine], [*values, number(elements[k], k, file)]
             sigma.append(number(elements[f"sigma_{k}"], f"sigma_{k}", file))
     matrix = np.diag(np.square(sigma))

@@ -133,8 +133,10 @@ def _barycentre(header: str) -> str:
 
 def _axes(header: str, file: str) -> str:
     text = f"{_line(header, 'Reference frame')} {_line(header, 'Coordinate systm')}"
-    if re.search("equator of|body", text, re.IGNORECASE) or not text.strip():
-        raise InvalidInput("reference frame", text.strip() or "not given", f"ecliptic or ICRF in {file}")
+    if re.search("equator of|body|B1950|FK4", text, re.IGNORECASE) or not text.strip():
+        raise InvalidInput(
+            "reference frame", text.strip() or "not given", f"ecliptic of J2000 or ICRF in {file}"
+        )
     if "LT" in _line(header, "Output type").split():
         raise InvalidInput("output type", _line(header, "Output type"), f"GEOMETRIC states in {file}")
     return "ecliptic" if "ecliptic" in text.lower() else "equator"

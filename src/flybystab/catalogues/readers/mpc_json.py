@@ -46,11 +46,13 @@ _OTHER = frozenset({"H", "G", "U", "M", "NEO"})
 
 
 def _is_extended(text: str) -> bool:
-    return text.lstrip()[:1] == "[" and all(f'"{c}"' in text[:20000] for c in ("Epoch", "Peri", "Node"))
+    return text.lstrip()[:1] in ("[", "{") and all(
+        f'"{c}"' in text[:20000] for c in ("Epoch", "Peri", "Node")
+    )
 
 
 def _is_service(text: str) -> bool:
-    return text.lstrip()[:1] == "[" and '"argument_of_perihelion"' in text and '"epoch_jd"' in text
+    return text.lstrip()[:1] in ("[", "{") and '"argument_of_perihelion"' in text and '"epoch_jd"' in text
 
 
 @reader(
@@ -92,6 +94,7 @@ def read_service(text: str, file: str) -> list[Entry]:
 
 def _rows(text: str, file: str) -> list[Mapping[str, Any]]:
     rows = parse_json(text, "catalogue file", file)
+    rows = [rows] if isinstance(rows, Mapping) else rows
     if not all(isinstance(row, dict) for row in rows):
         raise InvalidInput("catalogue file", file, "a list of objects")
     return list(rows)
@@ -122,7 +125,7 @@ def _extended(row: Mapping[str, Any], file: str) -> Entry:
 def _service(row: Mapping[str, Any], file: str) -> Entry:
     given = [k for k in row if k.startswith("non_grav_a") and row[k] not in (None, "", "0", 0)]
     given += [k for k in row if looks_like_parameter(k) and k not in _OTHER]
-    check_parameters("MPC", [k.removeprefix("non_grav_").upper() for k in given], file)
+    check_parameters("MPC service", [k.removeprefix("non_grav_").upper() for k in given], file)
     if row.get("semimajor_axis") is None or row.get("mean_anomaly") is None:
         return _by_perihelion(row, file)
     out = _renamed(row, _SERVICE, file)

@@ -2,8 +2,9 @@
 
 Fields: https://github.com/Smithsonian/mpc-public/tree/main/mpc_orb (schema 0.1 to 0.7). ``CAR`` is a heliocentric
 state with axes of the ecliptic, ``COM`` q, e, i, node, argperi, peri_time (MJD); epoch in MJD, TT; ``covKL`` is row
-K, column L of the covariance in the same units; yarkovsky in 1e-10 au/d2 and srp in m2/ton (the units of OrbFit,
-which makes the orbits).
+K, column L of the covariance in the same units. ``non_grav_units``: yarkovsky in 1e-10 au/d2, srp in m2/ton (the units
+of OrbFit, which makes the orbits), A1, A2, A3 in au/d2, DT in days; ``non_grav_model`` names their law: ``marsden``, or
+``yc`` (Yeomans & Chodas 1989) with DT.
 """
 
 from __future__ import annotations
@@ -33,16 +34,29 @@ if TYPE_CHECKING:
 
 _COM = {"q": "q", "e": "e", "i": "i", "node": "node", "argperi": "peri", "peri_time": "tp"}
 _CAR = {c: c for c in CARTESIAN}
-#: Names and units of the parameters: 1e-10 au/d2, and m2/ton as in OrbFit.
-_PARAMETERS = {"yarkovsky": "A2", "yarkovski": "A2", "srp": "AMRAT"}
-_UNIT = {"A2": 1e-10, "AMRAT": ORBFIT_AREA}
+#: Name and unit of the parameters.
+_PARAMETERS = {
+    "yarkovsky": ("A2", 1e-10),
+    "yarkovski": ("A2", 1e-10),
+    "srp": ("AMRAT", ORBFIT_AREA),
+    "A1": ("A1", 1.0),
+    "A2": ("A2", 1.0),
+    "A3": ("A3", 1.0),
+    "DT": ("DT", 1.0),
+}
+#: Models whose A1, A2, A3 follow the water law of comets.
+_COMET_MODELS = ("marsden", "yc")
 
 
 def _is_mpc_orbit(text: str) -> bool:
     return text.lstrip()[:1] in "{[" and '"coefficient_names"' in text and '"epoch_data"' in text
 
 
-@reader("MPC orbit (JSON)", _is_mpc_orbit, Contents("cometary, cartesian", "full matrix", "A2 or AMRAT", "H"))
+@reader(
+    "MPC orbit (JSON)",
+    _is_mpc_orbit,
+    Contents("cometary, cartesian", "full matrix", "A2, AMRAT; A1, A2, A3, DT of comets", "H"),
+)
 def read_mpc_orbit(text: str, file: str) -> list[Entry]:
     """Orbits of a document, or of an answer of the API that holds documents (``mpc_orb``, ``orb``).
 
@@ -68,25 +82,26 @@ def _entry(document: Mapping[str, Any], file: str) -> Entry:
     try:
         epoch, system = document["epoch_data"], document.get("system_data", {})
         scale, form = str(epoch["timesystem"]), str(epoch["timeform"])
-        frame = str(system.get("refsys", "Ecliptic")), str(system.get("refframe", "ICRF"))
         day = number(epoch["epoch"], "epoch", file)
     except (KeyError, TypeError, AttributeError) as error:
         raise InvalidInput("orbit file", file, f"an MPC_ORB document ({error})") from None
     if scale not in ("TDT", "TT", "TDB") or form not in ("MJD", "JD"):
         raise InvalidInput("epoch", f"{form} {scale}", f"MJD or JD in TT or TDB in {file}")
-    if frame[0].lower() != "ecliptic":
-        raise InvalidInput("refsys", frame[0], f"Ecliptic in {file}")
+    planes = {str(system[k]) for k in ("refsys", "refplane") if system.get(k)}
+    if planes - {"Ecliptic", "ecliptic"}:
+        raise InvalidInput("reference plane", ", ".join(sorted(planes)), f"Ecliptic in {file}")
     jd = day + (MJD if form == "MJD" else 0.0)
     # Over long arcs the cometary elements are closer to a normal distribution; both describe the same orbit.
     kind = "COM" if document.get("COM") else "CAR"
-    names, values, matrix = _solution(document[kind], _COM if kind == "COM" else _CAR, file)
+    law = _law(document, file)
+    names, values, matrix = _solution(document[kind], _COM if kind == "COM" else _CAR, law, file)
     source = f"MPC orbit ({file})"
     row = _identity(document) | {"orbit_source": source}
     if kind == "COM":
         values[names.index("tp")] += MJD - jd
     row |= elements_row(jd, names[:6], (), values[:6])
     row |= nongravitational_columns(
-        dict(zip(names[6:], values[6:], strict=True)), False, file, law="asteroid"
+        dict(zip(names[6:], values[6:], strict=True)), law == "comet", file, law=law or "asteroid"
     )
     magnitude = document.get("magnitude_data") or {}
     if magnitude.get("H") is not None:
@@ -109,10 +124,32 @@ def _identity(document: Mapping[str, Any]) -> dict[str, str]:
     return row
 
 
+def _law(document: Mapping[str, Any], file: str) -> str:
+    """Law of A1, A2, A3 by the model of the solution; empty without such a model.
+
+    Raises
+    ------
+    InvalidInput
+        A model that is not known, or one of which the document has no parameter.
+    """
+    booleans = document.get("non_grav_booleans") or {}
+    used = [k for k, v in (booleans.get("non_grav_model") or {}).items() if v is True]
+    names = {
+        str(n) for c in ("COM", "CAR") if document.get(c) for n in document[c].get("coefficient_names", ())
+    }
+    known = {*_COMET_MODELS, *_PARAMETERS}
+    check_parameters("MPC", [k for k in used if k not in known], file)
+    if (used or booleans.get("non_gravs") is True) and not names & set(_PARAMETERS):
+        raise InvalidInput(
+            "non-gravitational parameters", ", ".join(used) or "non_gravs", f"their values in {file}"
+        )
+    return "comet" if set(used) & set(_COMET_MODELS) else ""
+
+
 def _solution(
-    part: Mapping[str, Any], known: Mapping[str, str], file: str
+    part: Mapping[str, Any], known: Mapping[str, str], law: str, file: str
 ) -> tuple[list[str], list[float], Array | None]:
-    """Names, values and covariance of a part of the document; A2 in au/d2, AMRAT in m2/kg.
+    """Names, values and covariance of a part of the document; A1, A2, A3 in au/d2, DT in d, AMRAT in m2/kg.
 
     Raises
     ------
@@ -130,9 +167,12 @@ def _solution(
     if sorted(theirs[:6]) != sorted(known):
         raise InvalidInput("coefficient_names", theirs[:6], f"{', '.join(known)} in {file}")
     check_parameters("MPC", theirs[6:], file)
-    extra = [_PARAMETERS[n] for n in theirs[6:]]
+    marsden = [n for n in theirs[6:] if n in ("A1", "A2", "A3", "DT")]
+    if marsden and law != "comet":
+        check_parameters("MPC", [f"{', '.join(marsden)} without a law"], file)
+    extra, units = [_PARAMETERS[n][0] for n in theirs[6:]], [_PARAMETERS[n][1] for n in theirs[6:]]
     names = [known[n] for n in theirs[:6]] + extra
-    values = given[:6] + [v * _UNIT[n] for v, n in zip(given[6:], extra, strict=True)]
+    values = given[:6] + [v * unit for v, unit in zip(given[6:], units, strict=True)]
     if not any(v is not None for v in cells.values()):
         return names, values, None
     n = len(names)
@@ -140,5 +180,5 @@ def _solution(
     for i in range(n):
         for j in range(i, n):
             matrix[i, j] = matrix[j, i] = number(cells.get(f"cov{i}{j}"), f"cov{i}{j}", file)
-    scale = np.array([1.0] * 6 + [_UNIT[x] for x in extra])
+    scale = np.array([1.0] * 6 + units)
     return names, values, matrix * np.outer(scale, scale)

@@ -5,7 +5,9 @@ from __future__ import annotations
 from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
+from flybystab.catalogues.designations import is_comet
 from flybystab.catalogues.readers import header_of, reader_names, rows_of
+from flybystab.catalogues.readers.sbdb import comet_orbit
 from flybystab.catalogues.record import TEXTS, UNITS
 from flybystab.errors import InvalidInput, UnknownName
 
@@ -35,4 +37,13 @@ def read_native(text: str, file: str) -> list[Entry]:
             raise UnknownName("column", c, get_close_matches(c, known, cutoff=0.6), f"(in {file})")
     if not {"name", "designation", "number"} & set(columns):
         raise InvalidInput("columns", columns, f"at least one of name, designation, number in {file}")
-    return [(row, None) for row in rows_of(text, file)]
+    return [(_with_law(row), None) for row in rows_of(text, file)]
+
+
+def _with_law(row: dict[str, str]) -> dict[str, str]:
+    """A row whose A1, A2, A3 follow the law of comets, if it is one by name or class and does not state a law."""
+    if row.get("nongrav_law") or not any(row.get(f"{n}_au_d2") for n in ("A1", "A2", "A3")):
+        return row
+    names = (row.get("designation", ""), row.get("name", ""))
+    comet = comet_orbit(row.get("orbit_class", ""), "") or any(is_comet(n) for n in names)
+    return row | {"nongrav_law": "comet"} if comet else row

@@ -223,7 +223,7 @@ def _row(line: str, file: str) -> Entry:
         check_parameters("OrbFit", ["parameters of the force model, which this file does not give"], file)
     jd = number(cells[1], "epoch", file) + MJD
     row = _identity(cells[0]) | elements_row(jd, KEPLERIAN, cells[2:8], ())
-    if len(cells) > 8:
+    if len(cells) > 8 and number(cells[8], "H", file) > -9.0:
         row["H_mag"] = cells[8]
     source = f"OrbFit ({file})"
     return row | {"frame": FRAME, "orbit_source": source}, printed_covariance(

@@ -19,12 +19,13 @@ MODELLED: Mapping[str, frozenset[str]] = MappingProxyType(
         "JPL": frozenset({"A1", "A2", "A3", "DT", "AMRAT", "ALN", "NK", "NM", "NN", "R0"}),
         # Parameters 1 and 2 of model 1 in the LSP and NGR lines of OrbFit: area-to-mass ratio and Yarkovsky A2.
         "OrbFit": frozenset({"A2", "AMRAT"}),
-        # non_grav_coefficients of https://github.com/Smithsonian/mpc-public/tree/main/mpc_orb (A2 in 1e-10 au/d2, srp
-        # in m2/ton).
-        "MPC": frozenset({"yarkovsky", "yarkovski", "srp"}),
-        # A2 alone is its Yarkovsky model, AMR its radiation pressure; A1 belongs to one of several laws, which the file
-        # does not name.
-        "find_orb": frozenset({"A2", "AMR"}),
+        # non_grav_coefficients and non_grav_units of https://github.com/Smithsonian/mpc-public/tree/main/mpc_orb.
+        "MPC": frozenset({"yarkovsky", "yarkovski", "srp", "A1", "A2", "A3", "DT"}),
+        # Its web service gives neither the law nor the unit of its parameters.
+        "MPC service": frozenset(),
+        # A2 alone is its Yarkovsky model, AMR its radiation pressure; A1, A2, A3, T0 (the delay) are its comet model.
+        # A1, A2 and A1, A2, A3 belong to one of two laws, which the file does not name.
+        "find_orb": frozenset({"A1", "A2", "A3", "T0", "AMR"}),
         # Non-gravitational terms of layup have constants g(r) of their own (https://github.com/Smithsonian/layup).
         "FORMAT": frozenset(),
         # Element tables of MPC and JPL have no columns for parameters.
@@ -41,12 +42,15 @@ NOT_MODELLED: Mapping[str, Mapping[str, str]] = MappingProxyType(
             "S0": "a solution without S0",
         },
         "OrbFit": {},
-        # The units of A1, A2, A3 and DT are not documented (the tables say m2/ton).
-        "MPC": dict.fromkeys(("A1", "A2", "A3", "DT", "yc"), "JPL's orbit (SBDB), which names the law"),
-        "find_orb": {
-            "A1": "fs.Orbit.from_elements with A1, A2, A3 and the law of the fit",
-            "A3": "fs.Orbit.from_elements with A1, A2, A3 and the law of the fit",
+        "MPC": {
+            "yabushita": "JPL's orbit (SBDB), which lists the constants of its law",
+            "A1, A2, A3 without a law": "JPL's orbit (SBDB), which names the law",
         },
+        "MPC service": dict.fromkeys(("A1", "A2", "A3", "DT"), "JPL's orbit (SBDB), which names the law"),
+        "find_orb": dict.fromkeys(
+            ("A1, A2 without a law", "A1, A2, A3 without a law"),
+            'fs.Orbit.from_elements(..., A1, A2, A3, law="comet") or law="asteroid", by the model of the fit',
+        ),
         "FORMAT": dict.fromkeys(("A1", "A2", "A3"), "fs.Orbit.from_elements or from_state with A1, A2, A3"),
         "table": {},
     }

@@ -28,6 +28,7 @@ from flybystab.catalogues.readers.conversion import (
 )
 from flybystab.catalogues.readers.nongravitational import nongravitational_columns
 from flybystab.catalogues.readers.parameters import check_parameters, looks_like_parameter
+from flybystab.catalogues.readers.sigmas import sigmas_of
 from flybystab.errors import InvalidInput
 from flybystab.files import parse_json
 from flybystab.orbit.covariance import DIGITS
@@ -60,6 +61,8 @@ _SBDB = {
 _NAMES = {"a": "a", "e": "e", "i": "i", "om": "node", "w": "peri", "ma": "M", "q": "q", "tp": "tp"}
 #: Columns in capitals that are not parameters of the force model.
 _OTHER = frozenset({"H", "G", "M1", "M2", "K1", "K2", "PC", "GM", "BV", "UB", "IR", "UV"})
+#: Texts of missing values, in lower case, as pandas and other programs write them.
+_NOTHING = frozenset({"null", "none", "nan", "n/a", "--"})
 #: Columns that identify a table of JPL.
 _JPL = frozenset(
     {"om", "w", "ma", "tp", "pdes", "full_name", "spkid", "epoch_mjd", "epoch_cal", "moid", "per_y"}
@@ -83,6 +86,7 @@ def from_sbdb(row: Mapping[str, str], file: str) -> dict[str, str]:
         Parameters of the force model that are not modelled, or elements that are no numbers.
     """
     row = completed(row, file)
+    check_frame(row.get("equinox"), file)
     out = {mine: row[theirs] for theirs, mine in _SBDB.items() if row.get(theirs) and theirs not in _ELEMENTS}
     _check(row, file)
     full = row.get("full_name", "").strip()
@@ -180,6 +184,10 @@ def completed(row: Mapping[str, str], file: str) -> dict[str, str]:
     def values(*names: str) -> list[float]:
         return [number(out[c], c, file) for c in names]
 
+    if given("epoch", "epoch_mjd") and abs(values("epoch")[0] - MJD - values("epoch_mjd")[0]) > 1e-6:
+        raise InvalidInput(
+            "epoch_mjd", out["epoch_mjd"], f"the same time as epoch = {out['epoch']} in {file}"
+        )
     if not given("epoch") and given("epoch_mjd"):
         fraction = out["epoch_mjd"].partition(".")[2]
         out["epoch"] = f"{values('epoch_mjd')[0] + MJD:.{max(len(fraction), 1)}f}"
@@ -235,31 +243,41 @@ def _covariance(row: Mapping[str, str], file: str) -> Covariance | None:
     """
     pushes = [c for c in _PARAMETERS if row.get(c) and row.get(f"{c}_sigma")]
     keplerian = _keplerian(row)
+    hyperbolic = keplerian and number(row["e"], "e", file) > 1.0
     columns = tuple(_ELEMENTS) if keplerian else _COMETARY
     if not all(row.get(c) for c in columns):
         return None
     jd = number(row["epoch"], "epoch", file)
     texts = [row[c] for c in columns]
     names = [_NAMES[c] for c in columns]
-    sigmas = [row.get(f"sigma_{c}", "") for c in columns]
+    given = [row.get(f"sigma_{c}", "") for c in columns]
+    known = all(given) and sigmas_of(given, columns, file) is not None
     source = f"JPL SBDB ({file})"
     digits = printed_covariance(jd, names, texts, jd, source)
-    if not all(sigmas) and not pushes:
-        return None if keplerian else digits
+    if not known and not pushes:  # U and digits of ellipses: flybystab.catalogues.orbit_errors
+        return None if keplerian and not hyperbolic else digits
     if keplerian and not pushes and digits is None:
         return None
     values = [number(t, c, file) - (jd if c == "tp" else 0.0) for c, t in zip(columns, texts, strict=True)]
-    sigma = np.array([number(s, "sigma", file) if s else 0.0 for s in sigmas])
-    if digits is not None or not all(sigmas):
+    sigma = np.array([number(s, "sigma", file) if s else 0.0 for s in given])
+    if digits is not None or not known:
         sigma = np.hypot(sigma, printed_sigmas(names, texts))
     values += [number(row[c], c, file) for c in pushes]
     sigma = np.array([*sigma, *(number(row[f"{c}_sigma"], f"{c}_sigma", file) for c in pushes)])
+    if np.any(sigma < 0.0):
+        raise InvalidInput("1-sigmas", sigma.tolist(), f"values of zero or more in {file}")
     what = "1-sigmas" if digits is None else "printed digits and 1-sigmas"
     label = f"{what} without correlations, {source}"
     found = covariance_of(jd, [*names, *pushes], values, np.diag(sigma**2), label, file, correlated=False)
-    if not all(sigmas):  # 1-sigmas of A1, A2, A3 say nothing of the elements
+    if not known:  # 1-sigmas of A1, A2, A3 say nothing of the elements
         return replace(found, caveat=DIGITS)
     return found if digits is None else replace(found, caveat="by the digits and 1-sigmas of its elements")
+
+
+def check_frame(equinox: object, file: str) -> None:
+    """Raise InvalidInput for elements that do not refer to J2000."""
+    if equinox not in (None, "", "J2000"):
+        raise InvalidInput("equinox", equinox, f"J2000 in {file}")
 
 
 def thousandfold(text: str, name: str, file: str) -> str:
@@ -293,6 +311,7 @@ def _entries(rows: list[dict[str, str]], columns: set[str], file: str) -> list[E
         raise InvalidInput(
             "columns", "a JPL query without " + ", ".join(missing), f"columns that define an orbit in {file}"
         )
+    rows = [{c: "" if v.lower() in _NOTHING else v for c, v in row.items()} for row in rows]
     whole = [completed(row, file) for row in rows]
     return [(from_sbdb(row, file), _covariance(row, file)) for row in whole]
 

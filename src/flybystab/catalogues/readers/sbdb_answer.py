@@ -27,7 +27,8 @@ from flybystab.catalogues.readers.conversion import (
 )
 from flybystab.catalogues.readers.nongravitational import COLUMN_OF_PARAMETER, nongravitational_columns
 from flybystab.catalogues.readers.parameters import check_parameters
-from flybystab.catalogues.readers.sbdb import comet_orbit, thousandfold
+from flybystab.catalogues.readers.sbdb import check_frame, comet_orbit, thousandfold
+from flybystab.catalogues.readers.sigmas import sigmas_of
 from flybystab.constants import G
 from flybystab.errors import InvalidInput
 from flybystab.files import parse_json
@@ -67,6 +68,7 @@ def from_sbdb_answer(text: str, file: str) -> tuple[dict[str, str], Covariance |
             "orbit file", file, f"an answer of the SBDB API with full precision ({error})"
         ) from None
     check_parameters("JPL", model, file)
+    check_frame(orbit.get("equinox"), file)
     comet = comet_orbit(orbit_class, key)
     row |= name_columns(full) if comet else _names(full, key)
     row["orbit_class"] = orbit_class
@@ -214,8 +216,11 @@ def _uncorrelated(
     labels = {"om": "node", "w": "peri", "ma": "M"}
     values = [number(elements[c]["value"], c, file) - (jd if c == "tp" else 0.0) for c in use]
     values += [number(pushes[n]["value"], n, file) for n in with_errors]
-    sigma = [number(elements[c]["sigma"], c, file) for c in use]
-    sigma += [number(pushes[n]["sigma"], n, file) for n in with_errors]
+    if sigmas_of([elements[c]["sigma"] for c in use], use, file) is None:
+        return None
+    texts = [elements[c]["sigma"] for c in use] + [pushes[n]["sigma"] for n in with_errors]
+    sigma = sigmas_of(texts, [*use, *with_errors], file)
+    assert sigma is not None
     names = [*(labels.get(c, c) for c in use), *with_errors]
     label = f"1-sigmas without correlations, {source}"
     return covariance_of(jd, names, values, np.diag(np.square(sigma)), label, file, correlated=False)
