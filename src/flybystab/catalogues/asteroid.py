@@ -324,7 +324,7 @@ class Asteroid(Record):
         if self.file.startswith("embedded") and (known := embedded_covariance(self.row.get("number", ""))):
             return known
         sigmas = tuple("sigma_" + c for c in ORBIT[1:])
-        if not self.knows(*sigmas):
+        if not self.knows(*sigmas) or not any(self._number(c) for c in sigmas):  # zeros: not given
             from flybystab.catalogues.orbit_errors import error_of
 
             return error_of(self.row, epoch)

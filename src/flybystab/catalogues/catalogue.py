@@ -49,13 +49,13 @@ def find(asteroids: Sequence[Asteroid], name: str | int, where: str) -> Asteroid
 
 
 def _other_names(text: str) -> list[str]:
-    """Names in a text of several, as ``Bennu (101955)``, and the number of an identifier of JPL, 20101955."""
+    """Names in a text of several, as ``Bennu (101955)``, and the number of an identifier of JPL, 20101955, a0101955."""
     parts = name_columns(text)
     found = [parts[c] for c in ("number", "designation", "name") if parts.get(c)]
     if after := re.fullmatch(r"(.*\S)\s*\((\d+)\)", text.strip()):
         found += [after[2]]
-    if identifier := re.fullmatch(r"a?0*(20?)(\d{6,7})", text.strip()):
-        found += [str(int(identifier[2]))]
+    if identifier := re.fullmatch(r"20?(\d{6})|a(\d{7})", text.strip()):
+        found += [str(int(identifier[1] or identifier[2]))]
     return found
 
 
