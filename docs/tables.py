@@ -11,6 +11,7 @@ from pathlib import Path
 ROOT = Path(__file__).resolve().parents[1]
 TABLES = {
     "apophis": "python benchmarks/sky.py apophis",
+    "apophis_after": "python benchmarks/apophis_after.py",
     "completeness": "python benchmarks/completeness.py out/whole.ecsv",
     "coverage": "python benchmarks/campaign.py coverage",
     "extremes": "python benchmarks/campaign.py extremes",
