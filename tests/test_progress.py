@@ -12,6 +12,7 @@ from astropy.time import Time
 import flybystab as fs
 from flybystab import progress
 from flybystab.body.recovery import recovery
+from flybystab.core.numerics import compile_notice
 from flybystab.errors import InvalidInput
 from flybystab.plots.grains import grains_animation
 from flybystab.plots.scene import animation
@@ -25,6 +26,13 @@ APRIL = Time("2029-04-13", scale="tdb")
 class Terminal(io.StringIO):
     def isatty(self):
         return True
+
+
+@pytest.fixture(autouse=True)
+def without_the_notice_of_compilation(monkeypatch):
+    """Kernels that are compiled during a test write a notice into the same stream as the bars."""
+    compile_notice.uninstall()
+    monkeypatch.setattr(compile_notice, "install", lambda: None)
 
 
 @pytest.fixture

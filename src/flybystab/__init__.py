@@ -49,6 +49,7 @@ _HOME = {
     "Record": "tabular",
     "RecoveryLimit": "body.recovery",
     "Requirements": "body.bounds",
+    "ResultTable": "result_table",
     "RotationState": "flybys.shape_spin",
     "Shape": "body.shape",
     "ShapeSpin": "flybys.shape_spin",
@@ -174,6 +175,7 @@ if TYPE_CHECKING:
     from flybystab.population.model_population import known_population, read_population
     from flybystab.population.rates import EncounterRates, encounter_rates
     from flybystab.population.verdict_rates import DisruptionRates
+    from flybystab.result_table import ResultTable
     from flybystab.screening.inference import infer
     from flybystab.screening.screening import screen
     from flybystab.tabular import Record, Tabular

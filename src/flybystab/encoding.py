@@ -10,6 +10,7 @@ import base64
 import io
 import math
 import re
+import sys
 import zlib
 from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
@@ -84,15 +85,15 @@ def encoded(value: Any) -> Any:
 
 def _object(value: Any) -> dict[str, Any]:
     kind = type(value)
+    if "astropy.table" in sys.modules and isinstance(value, sys.modules["astropy.table"].Table):
+        columns = [encoded(value[name]) for name in value.colnames]
+        return {"table": kind.__name__, "names": value.colnames, "columns": columns}
     if _MODULE.fullmatch(kind.__module__):
         label = kind.__name__ if kind.__name__ in KNOWN else _address(kind)
         return {"class": label, **{name: encoded(getattr(value, name)) for name in stored_fields(kind)}}
     if kind.__module__.startswith("astropy.table"):
-        from astropy.table import Row, Table
+        from astropy.table import Row
 
-        if isinstance(value, Table):
-            columns = [encoded(value[name]) for name in value.colnames]
-            return {"table": kind.__name__, "names": value.colnames, "columns": columns}
         if isinstance(value, Row):
             return {"row": encoded(value.table[value.index : value.index + 1])}
     if kind.__name__ == "CubicHermiteSpline":
@@ -153,7 +154,10 @@ def _restored_quantity(value: dict[str, Any]) -> Quantity:
 def _restored_table(value: dict[str, Any]) -> Any:
     from astropy import table
 
-    kind = table.QTable if value["table"] == "QTable" else table.Table
+    if value["table"] == "ResultTable":
+        kind = import_module("flybystab.result_table").ResultTable  # by name: it imports this module
+    else:
+        kind = table.QTable if value["table"] == "QTable" else table.Table
     return kind([decoded(c) for c in value["columns"]], names=value["names"])
 
 

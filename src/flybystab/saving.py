@@ -143,6 +143,11 @@ def written(
     return out
 
 
+def content_of(suffix: str, columns: Mapping[str, Any], meta: Mapping[str, Any]) -> bytes:
+    """The bytes of a file in the format of a suffix."""
+    return _WRITERS[suffix](columns, meta)
+
+
 def read_columns(path: str | Path) -> tuple[Columns, dict[str, Any]]:
     """Columns and metadata of a file that :func:`save_columns` wrote.
 

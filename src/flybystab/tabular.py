@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from html import escape
 from importlib import import_module
@@ -32,6 +32,8 @@ __all__ = ["Record", "Tabular", "with_unit"]
 
 #: Columns and rows of a table in a notebook.
 SHOWN_COLUMNS, SHOWN_ROWS = 10, 20
+#: Significant digits of the numbers there; enough for a Julian date to 0.1 d.
+DIGITS = 8
 
 
 class Results:
@@ -145,11 +147,26 @@ class Results:
 
     def _repr_html_(self) -> str:
         table = self.to_table()
-        names = [n for n in self._shown if n in table.colnames] or table.colnames[:SHOWN_COLUMNS]
-        rest = [n for n in table.colnames if n not in names]
-        lines = table[names].pformat(max_lines=SHOWN_ROWS + 5, max_width=-1, html=True, show_unit=True)
-        note = f"<p>and {len(rest)} more columns in to_table(): {escape(', '.join(rest))}</p>" if rest else ""
-        return f"<div><p>{escape(repr(self))}</p>{''.join(lines)}{note}</div>"
+        shown = [n for n in self._shown if n in table.colnames]
+        return table_html(table, shown, repr(self), "columns in to_table()")
+
+
+def table_html(table: QTable, shown: Sequence[str], title: str, place: str) -> str:
+    """A table in a notebook: its main columns, by default the first ten, and the names of the others."""
+    names = list(shown) or table.colnames[:SHOWN_COLUMNS]
+    rest = [n for n in table.colnames if n not in names]
+    part = table[names]
+    for name in names:
+        column = part[name]
+        if isinstance(column, Time):
+            part.replace_column(name, np.array([str(x)[:19] for x in column.tdb.iso], dtype=str))
+        elif getattr(getattr(column, "dtype", None), "kind", "") == "f" and not column.info.format:
+            column = column.copy()
+            column.info.format = f".{DIGITS}g"
+            part.replace_column(name, column)
+    lines = part.pformat(max_lines=SHOWN_ROWS + 5, max_width=-1, html=True, show_unit=True)
+    note = f"<p>{len(rest)} more {place}: {escape(', '.join(rest))}</p>" if rest else ""
+    return f"<div><p>{escape(title)}</p>{''.join(lines)}{note}</div>"
 
 
 class Tabular(Results):

@@ -125,6 +125,27 @@ def needs():
     return fs.requirements(BODY, density_sigma=400 * u.kg / u.m**3, spin_period_sigma=0.5 * u.h, samples=80)
 
 
+def screened():
+    return fs.screen(["Apophis", "Bennu", "Toutatis"], "2026-01-01", "2050-01-01", within=0.1 * u.au)
+
+
+def bounded():
+    return fs.infer(fs.Asteroid.from_catalogue("Anteros"), [])
+
+
+def approaches():
+    bodies = [fs.Asteroid.from_catalogue(name) for name in ("Apophis", "Bennu")]
+    return fs.find_encounters(bodies, "2026-01-01", "2050-01-01", ["earth", "venus"], within=0.2 * u.au)
+
+
+def possible_impacts():
+    from astropy.time import Time
+
+    days = Time(["2032-12-22", "2039-12-22", "2047-12-22"], scale="tdb")
+    odds = {"sigma": [1.1, 1.2, 1.3], "probability": [1e-3, 2e-6, 4e-7]}
+    return fs.ResultTable({"time": days, **odds}, meta={"planet": "earth"})
+
+
 #: Figures by the name of their function; those of axes take them as an argument.
 AXES = {
     "flyby.distance_plot": lambda a: flyby.distance_plot(a, kept(flown).history, passage(2.0)),
@@ -160,6 +181,11 @@ AXES = {
     "distributions.grains_course_plot": lambda a: distributions.grains_course_plot(
         a, kept(grained).grains.median.course
     ),
+    "screening.rise_plot": lambda a: tables.rise_plot(a, kept(screened)),
+    "screening.margin_plot": lambda a: tables.margin_plot(a, kept(screened)),
+    "screening.bounds_plot": lambda a: tables.bounds_plot(a, kept(bounded), "friction_equilibrium"),
+    "screening.encounters_plot": lambda a: tables.encounters_plot(a, kept(approaches)),
+    "screening.impacts_plot": lambda a: tables.impacts_plot(a, possible_impacts()),
     "distributions.requirements_plot": lambda a: distributions.requirements_plot(a, kept(needs)),
     "results.survival": lambda a: fs.plot_result(
         Survival(

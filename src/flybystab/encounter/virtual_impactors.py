@@ -32,6 +32,7 @@ from flybystab.orbit.planets import Planet, planet
 from flybystab.orbit.search.encounter_finder import find_encounters
 from flybystab.orbit.target_plane import capture_radius
 from flybystab.progress import Progressing, progress_bar
+from flybystab.result_table import ResultTable
 from flybystab.typing import Array
 from flybystab.units import checked_time, to_si, whole
 
@@ -73,7 +74,7 @@ class _Line:
         moved = change.matrix[:3] @ states + change.parameters[:3] @ pushes
         return np.asarray(np.linalg.svd(moved)[2][0])
 
-    def encounters(self, z: Array, start: Time, stop: Time, within: float) -> QTable:
+    def encounters(self, z: Array, start: Time, stop: Time, within: float) -> ResultTable:
         """Encounters of the orbits of z, shape (m, n)."""
         parameters = self.covariance.values + z @ self.covariance.factor.T
         if not self.covariance._possible(parameters).all():
@@ -111,7 +112,7 @@ def virtual_impactors(
     ephemeris: str | Ephemeris | None = None,
     workers: int | None = None,
     progress: Progressing = None,
-) -> QTable:
+) -> ResultTable:
     """Possible impacts of an uncertain orbit, by a search along its line of variations.
 
     Parameters
@@ -136,7 +137,7 @@ def virtual_impactors(
 
     Returns
     -------
-    QTable
+    ResultTable
         A row for each possible impact, in order of time: ``time`` (TDB) and ``distance`` (km; two-body, without a
         surface) of the closest orbit on the line, ``sigma`` (its position on the line), ``stretching`` (km of the
         target plane for one sigma along the line), ``width`` (km, standard deviation across it), ``probability``,
@@ -171,7 +172,7 @@ def virtual_impactors(
     rows = sorted(
         (r for r in _distinct(rows) if r["probability"] >= least), key=lambda r: float(r["time"].tdb.jd)
     )
-    out = QTable()
+    out = ResultTable()
     out["time"] = Time([r["time"].tdb.jd for r in rows], format="jd", scale="tdb")
     for name, unit in (("distance", u.km), ("sigma", None), ("stretching", u.km), ("width", u.km)):
         values = np.array([r[name] for r in rows], dtype=float)

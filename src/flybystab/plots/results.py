@@ -25,7 +25,7 @@ from flybystab.flybys.spin_forecast import SpinForecast
 from flybystab.flybys.spin_sample import SpinSample
 from flybystab.flybys.survival import Survival
 from flybystab.flybys.table import FlybyTable
-from flybystab.plots import distributions
+from flybystab.plots import distributions, screening
 from flybystab.plots.flyby import BLUE, axes_plot, described, flyby_panels, friction_plot, spin_plot
 from flybystab.plots.outcome_map import outcome_plot, target_plot
 from flybystab.plots.population import rate_plot, verdict_plot
@@ -33,6 +33,7 @@ from flybystab.plots.stability import barrier_plot
 from flybystab.plots.style import new_axes, styled
 from flybystab.population.rates import EncounterRates
 from flybystab.population.verdict_rates import DisruptionRates
+from flybystab.result_table import ResultTable
 
 
 def plot_result(result: Any, axes: Any = None, **options: Any) -> Any:
@@ -174,6 +175,24 @@ def _(result: FlybyTable, axes: Any) -> Any:
 @_plot.register
 def _(result: Survival, axes: Any) -> Any:
     return _counts(axes, result.verdict)
+
+
+@_plot.register
+def _(result: ResultTable, axes: Any, **options: Any) -> Any:
+    figure = _TABLES.get(result.kind())
+    if figure is None:
+        names = ", ".join(result.colnames)
+        raise InvalidInput("result", f"a table with the columns {names}", f"a table of {', '.join(_TABLES)}")
+    return figure(axes, result, **options)
+
+
+#: Figures of tables, by their kind.
+_TABLES: dict[str, Callable[..., Any]] = {
+    "encounters with verdicts": screening.rise_plot,
+    "encounters": screening.encounters_plot,
+    "possible impacts": screening.impacts_plot,
+    "bounds on the material": screening.bounds_plot,
+}
 
 
 def _counts(axes: Any, verdict: Any) -> Any:

@@ -19,6 +19,7 @@ from flybystab.body.stability_regions import StabilityTable, stability_many
 from flybystab.catalogues.asteroid import Asteroid
 from flybystab.constants import G
 from flybystab.errors import FlybystabError
+from flybystab.result_table import ResultTable
 from flybystab.screening.draws import nominal
 from flybystab.screening.priors import Population
 from flybystab.screening.results import Column, table_of
@@ -73,7 +74,7 @@ def classification(
     population: Population | None = None,
     workers: int | None = None,
     threads: int | None = None,
-) -> QTable:
+) -> ResultTable:
     """Structural stability of a catalogue.
 
     Parameters
@@ -95,7 +96,7 @@ def classification(
 
     Returns
     -------
-    QTable
+    ResultTable
         :data:`COLUMNS`; a body that cannot be computed has its reason in `error`.
     """
     if threads is not None:

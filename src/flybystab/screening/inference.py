@@ -29,6 +29,7 @@ from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
 from flybystab.orbit.search.encounter_finder import find_encounters
 from flybystab.progress import Progressing, progress_bar
+from flybystab.result_table import ResultTable
 from flybystab.screening.draws import stream
 from flybystab.units import to_si, whole
 
@@ -49,7 +50,7 @@ def infer(
     seed: int = 0,
     yield_surface: str = DEFAULT_SURFACE,
     progress: Progressing = None,
-) -> QTable:
+) -> ResultTable:
     """Least friction angles compatible with the shape and spin of a body and with its past encounters.
 
     Parameters
@@ -71,7 +72,7 @@ def infer(
 
     Returns
     -------
-    QTable
+    ResultTable
         Rows over densities, then cohesions: ``density``, ``cohesion``, ``friction_equilibrium`` (of a tumbler: in
         all its phases), and over all passages ``friction_any_attitude`` (necessary at any attitude) and
         ``friction_every_attitude`` (sufficient at every attitude tried); deg, inf where no friction suffices.
@@ -121,7 +122,7 @@ def infer(
     least, most = (
         np.maximum(rest, needs[..., side].max(axis=2)) if len(encounters) else rest for side in (0, 1)
     )
-    table = QTable()
+    table = ResultTable()
     table["density"] = np.repeat(rho, len(cohesion)) * u.kg / u.m**3
     table["cohesion"] = np.tile(cohesion, len(rho)) * u.Pa
     for name, values in (("equilibrium", rest), ("any_attitude", least), ("every_attitude", most)):

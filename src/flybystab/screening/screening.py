@@ -23,7 +23,6 @@ from pathlib import Path
 from typing import Any
 
 import astropy.units as u
-from astropy.table import QTable
 from astropy.time import Time
 from astropy.units import Quantity
 
@@ -34,6 +33,7 @@ from flybystab.catalogues.catalogue import Asteroid
 from flybystab.errors import FlybystabWarning, InvalidInput, OutputFailed
 from flybystab.orbit.ephemeris import ephemeris
 from flybystab.progress import check_progress, progress_bar
+from flybystab.result_table import ResultTable
 from flybystab.screening.columns import COLUMNS, SAMPLE_COLUMNS
 from flybystab.screening.encounters import Finder, passages
 from flybystab.screening.journal import Journal
@@ -299,7 +299,7 @@ def screen(
     grains: int | None = None,
     progress: bool | Callable[[Progress], None] | None = None,
     finder: Finder = passages,
-) -> QTable:
+) -> ResultTable:
     """Verdicts on the encounters of asteroids, modelled as rubble piles.
 
     Parameters
@@ -335,7 +335,7 @@ def screen(
 
     Returns
     -------
-    QTable
+    ResultTable
         One row per encounter (:data:`COLUMNS`), by asteroid and time; provenance in ``meta``.
 
     Notes

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 
 import astropy.units as u
@@ -11,6 +10,7 @@ from astropy.table import QTable
 from astropy.time import Time
 from astropy.units import Quantity
 
+from flybystab.result_table import ecsv_content
 from flybystab.screening.results import WRITTEN, Column
 from flybystab.screening.table_files import check_output, write_rows, write_whole
 
@@ -32,11 +32,7 @@ def write_table(table: QTable, path: str | Path) -> None:
     """
     out = check_output(path, WRITTEN)
     if out.suffix == ".ecsv":
-        counted = table.copy(copy_data=False)
-        counted.meta = {**table.meta, "rows": len(table)}
-        text = io.StringIO()
-        counted.write(text, format="ascii.ecsv")
-        write_whole(text.getvalue(), out)
+        write_whole(ecsv_content(table).decode(), out)
         return
     columns: dict[str, Column] = {}
     values: dict[str, np.ndarray] = {}

@@ -12,7 +12,6 @@ from typing import Any, NamedTuple
 
 import astropy.units as u
 import numpy as np
-from astropy.table import QTable
 from astropy.time import Time
 from astropy.units import Quantity
 
@@ -51,6 +50,7 @@ from flybystab.orbit.search.search_setup import (
 )
 from flybystab.orbit.search.track import EXHAUSTED, INSIDE, MAX_STEPS, STALLED, search
 from flybystab.progress import check_progress, progress_bar
+from flybystab.result_table import ResultTable
 from flybystab.typing import Array
 from flybystab.units import checked_time, to_si
 
@@ -71,7 +71,7 @@ def find_encounters(
     workers: int | None = None,
     progress: bool | Callable[[int, int, int], None] | None = None,
     threads: int | None = None,
-) -> QTable:
+) -> ResultTable:
     """All closest approaches of asteroids to planets within a distance.
 
     Parameters
@@ -112,7 +112,7 @@ def find_encounters(
 
     Returns
     -------
-    QTable
+    ResultTable
         One row per encounter, sorted by asteroid and time: ``asteroid``, ``planet``, ``time`` (TDB),
         ``distance`` (km), ``v_rel`` and ``v_inf`` (km/s; 0 for a bound passage), ``b_t`` and ``b_r`` (km;
         target plane, north +z of ICRF, :mod:`flybystab.orbit.target_plane`; nan for a bound passage), ``impact``,

@@ -6,7 +6,6 @@ from typing import Any
 
 import astropy.units as u
 import numpy as np
-from astropy.table import QTable
 from astropy.time import Time
 from numpy.typing import NDArray
 
@@ -16,6 +15,7 @@ from flybystab.orbit.observatories import geographic
 from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.search.force_selection import NAMES
 from flybystab.orbit.target_plane import target_plane
+from flybystab.result_table import ResultTable
 from flybystab.typing import Array
 
 # Columns of the rows that :func:`flybystab.orbit.search.track.search` writes (``minima.WIDTH`` of them).
@@ -61,14 +61,14 @@ def encounter_table(
     origin: Time,
     window: Window,
     meta: dict[str, Any],
-) -> QTable:
+) -> ResultTable:
     """Table of encounters; `contacts` holds times (s) and relative states of closest approaches or entries."""
     index = raw[:, ASTEROID].astype(int)
     gm = window.gm[raw[:, BODY].astype(int)]
     hits = raw[:, IMPACT] > 0.0
     speed2 = raw[:, V_INF2] + 2.0 * gm / raw[:, DISTANCE]
     b, _ = target_plane(raw[:, STATE], gm)
-    out = QTable()
+    out = ResultTable()
     out["asteroid"] = np.array([rows[i][0] for i in index], dtype=str)
     out["planet"] = np.array([BODIES[int(k)] for k in raw[:, BODY]], dtype=str)
     zero = origin.tdb
