@@ -1,5 +1,7 @@
 """Barycentres of DE421 and DE440: the polynomial against the files, and states given relative to either."""
 
+from pathlib import Path
+
 import astropy.units as u
 import numpy as np
 import pytest
@@ -46,6 +48,36 @@ def test_difference_of_the_two_suns(year):
     assert np.abs(found[:, 3:]).max() < 3e-6
     assert np.linalg.norm(suns[0][0, :3] - suns[1][0, :3]) > 1.1e5
     assert not barycentre_of_de440("de440", J2000, t).any()
+
+
+def sun_of(kernel, jd):
+    """Sun relative to the barycentre of an ephemeris file, m and m/s, shape (6,)."""
+    from jplephem.spk import SPK
+
+    with SPK.open(kernel) as spk:
+        position, rate = spk[0, 10].compute_and_differentiate(jd)
+    return np.concatenate([1e3 * np.asarray(position), 1e3 * np.asarray(rate) / DAY])
+
+
+@pytest.mark.parametrize(
+    ("excerpt", "jd", "old"),
+    [("de430-2015-03-02.bsp", 2457083.75, True), ("de441-1969.bsp", 2440438.5, False)],
+)
+def test_de430_has_the_barycentre_of_de421_and_de441_that_of_de440(excerpt, jd, old):
+    """Excerpts of the two ephemerides among the tests of skyfield: within 0.4 km of one, 100 km from the other."""
+    skyfield = pytest.importorskip("skyfield")
+    kernel = Path(skyfield.__file__).parent / "tests" / "data" / excerpt
+    if not kernel.exists():
+        pytest.skip(f"this version of skyfield has no {excerpt}")
+    need_ephemeris("de440")
+    t = np.array([(jd - 2451545.0) * DAY])
+    suns = {n: ephemeris(n).window(J2000, t[0] - DAY, t[0] + DAY).states(0, t)[0] for n in ("de440", "de421")}
+    same, other = ("de421", "de440") if old else ("de440", "de421")
+    sun = sun_of(kernel, jd)
+    assert np.linalg.norm((sun - suns[same])[:3]) < 400.0
+    assert np.linalg.norm((sun - suns[other])[:3]) > 1e5
+    converted = sun - barycentre_of_de440("de430" if old else "de441", J2000, t)[0]
+    assert np.linalg.norm((converted - suns["de440"])[:3]) < 400.0
 
 
 def test_a_barycentric_state_gives_the_same_encounter_with_both_ephemerides():

@@ -2,8 +2,10 @@
 
 First line: ecliptic longitude and latitude of the pole (deg, J2000) and sidereal rotation period (h); second line:
 epoch (JD) and rotation angle at it (deg); then a YORP change or parameters of the light scattering, which are not used
-(https://damit.cuni.cz, "Documentation"; Durech et al. 2010, A&A 513, A46). A file does not name its asteroid. The
-files of two mirror poles are rival solutions of the same weight.
+(https://astro.troja.mff.cuni.cz/projects/damit/pages/documentation; Durech et al. 2010, A&A 513, A46). For model 101,
+(2) Pallas, the first line is ``35 -12 7.81323``; ``IAUspin.txt`` gives the same pole as right ascension 37, declination
+2, with 1105.816672 deg/d, so that the first number is the longitude. ``IAUspin.txt`` itself is refused. A file does not
+name its asteroid. The files of two mirror poles are rival solutions of the same weight.
 """
 
 from __future__ import annotations
@@ -12,6 +14,7 @@ import re
 
 from flybystab.catalogues.physical import PhysicalData, physical_reader
 from flybystab.catalogues.spin_solutions import SpinSolution
+from flybystab.errors import InvalidInput
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 #: A Julian date of the second line stands between 1880 and 2100.
@@ -27,9 +30,15 @@ def read_spin(text: str, file: str) -> list[PhysicalData]:
     Raises
     ------
     InvalidInput
-        The period is not positive, or the latitude is beyond 90 degrees.
+        The period is not positive, the latitude is beyond 90 degrees, or the file is ``IAUspin.txt``.
     """
     found = _FIRST.match(text)
     assert found is not None
     longitude, latitude, period = (float(x) for x in found.groups())
+    if float(text.split()[3]) == 2451545.0 and period > 100.0:
+        raise InvalidInput(
+            "spin file",
+            found[0].splitlines()[0].strip(),
+            f"spin.txt of DAMIT in {file}, not IAUspin.txt (deg/d)",
+        )
     return [PhysicalData((), {}, (SpinSolution(period, 0.0, (longitude, latitude), 1.0, f"DAMIT ({file})"),))]

@@ -2,8 +2,9 @@
 
 Columns of the LCDB: its ``readme.pdf``, section 4 (Warner, Harris & Pravec 2009, Icarus 202, 134; https://minplanobs.org):
 Number, Name, Desig, Class, Diam (km), H, Period (h), AmpMax (mag), U (quality of the period, 3 is unambiguous), Notes
-(``T``: tumbling); ``-`` and -9.99 are missing values. Copies with numbers before the names of columns (``19-Period``)
-are read too. Of several rows of one asteroid those of the best quality are rival solutions of the same weight.
+(``T``: tumbling); ``-`` and -9.99 are missing values. A period or an amplitude with the flag ``<`` or ``>`` (PFlag,
+AmpFlag) is a bound and is not read. Copies with numbers before the names of columns (``19-Period``) are read too. Of
+several rows of one asteroid those of the best quality are rival solutions of the same weight.
 
 A table of spin solutions has the columns ``period_h``, and as far as known ``sigma_h``, ``lon_deg``, ``lat_deg``
 (ecliptic J2000), ``weight``, ``source``, ``name``.
@@ -12,13 +13,15 @@ A table of spin solutions has the columns ``period_h``, and as far as known ``si
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 
 from flybystab.catalogues.physical import PhysicalData, physical_reader
 from flybystab.catalogues.readers import header_of, rows_of
 from flybystab.catalogues.readers.conversion import number
 from flybystab.catalogues.spin_solutions import SpinSolution
 
+#: Flags of a period or an amplitude that is an upper or a lower bound.
+_BOUNDS = ("<", ">")
 _MISSING = ("", "-", "-9.99", "-9.990")
 
 
@@ -43,9 +46,14 @@ def read_lcdb(text: str, file: str) -> list[PhysicalData]:
     ------
     InvalidInput
     """
+    return bodies_of([{_plain(c): v for c, v in raw.items()} for raw in rows_of(text, file)], file)
+
+
+def bodies_of(rows: Iterable[Mapping[str, str]], file: str) -> list[PhysicalData]:
+    """Rows by the names of the columns, put together by asteroid."""
     bodies: dict[tuple[str, ...], list[dict[str, str]]] = {}
-    for raw in rows_of(text, file):
-        row = {_plain(c): v for c, v in raw.items() if v not in _MISSING}
+    for raw in rows:
+        row = {c: v for c, v in raw.items() if v not in _MISSING}
         names = tuple(row[c] for c in ("Number", "Name", "Desig") if row.get(c) not in (None, "0"))
         if names:
             bodies.setdefault(names, []).append(row)
@@ -70,9 +78,9 @@ def _body(names: tuple[str, ...], rows: list[dict[str, str]], file: str) -> Phys
     if "Diam" in merged:
         out["diameter_m"] = f"{1e3 * number(merged['Diam'], 'Diam', file):.10g}"
         out["diameter_source"] = f"LCDB ({file})"
-    if "AmpMax" in merged:
+    if "AmpMax" in merged and merged.get("AmpFlag") not in _BOUNDS:
         out |= {"amplitude_mag": merged["AmpMax"], "amplitude_source": f"LCDB ({file})"}
-    timed = [row for row in rows if "Period" in row]
+    timed = [row for row in rows if "Period" in row and row.get("PFlag") not in _BOUNDS]
     best = max((_quality(row) for row in timed), default=-1.0)
     spins = {}
     for row in timed:

@@ -127,7 +127,9 @@ def text_of(path: str | Path) -> str:
 
 
 def decoded(raw: bytes, what: str, path: str | Path) -> str:
-    """Text of the bytes of a file: UTF-8 or, with a mark, UTF-16; lines end with a line feed, and none is blank before.
+    """Text of the bytes of a file, with lines that end with a line feed, from the first that is not blank.
+
+    The encoding is UTF-8 or, with a mark, UTF-16; otherwise Latin-1 if the text has no control characters.
 
     Raises
     ------
@@ -136,7 +138,9 @@ def decoded(raw: bytes, what: str, path: str | Path) -> str:
     try:
         text = raw.decode("utf-16" if raw[:2] in (b"\xff\xfe", b"\xfe\xff") else "utf-8-sig")
     except UnicodeDecodeError as error:
-        raise InvalidInput(what, path, f"a readable text file ({error})") from None
+        text = raw.decode("latin-1")
+        if re.search(r"[\x00-\x08\x0e-\x1f\x7f-\x9f]", text):
+            raise InvalidInput(what, path, f"a readable text file ({error})") from None
     if "\r" in text:
         text = text.replace("\r\n", "\n").replace("\r", "\n")
     text = text.rstrip("\x1a")  # the end of a file in DOS
