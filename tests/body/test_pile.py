@@ -232,3 +232,14 @@ def test_bad_piles_are_refused_by_name():
         Pile(shape, density=2.0)
     with pytest.raises(UnsettledBody):
         Pile(body(state="flowing"))
+
+
+def test_more_grains_than_fit_are_refused_with_the_number_that_fits(monkeypatch):
+    body = Body([1408, 850, 748] * u.m, 2000 * u.kg / u.m**3)
+    monkeypatch.setattr("flybystab.body.pile._memory", lambda: 8e6)
+    with pytest.raises(InvalidInput, match="at most 2000 grains, which fit in the memory of this machine"):
+        Pile(body, grains=2001)
+    assert Pile(body, grains=2000).grains == 2000
+    monkeypatch.setattr("flybystab.body.pile._memory", lambda: np.inf)
+    with pytest.raises(InvalidInput, match="at most 200000 grains, which take days"):
+        Pile(body, grains=200_001)

@@ -1,5 +1,7 @@
 """Figures of grains: the grains are where the run has put them, in the colours of their clumps."""
 
+from dataclasses import replace
+
 import astropy.units as u
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ from scenes import earth
 import flybystab as fs
 from flybystab.encounter.attitude import periapsis_axes
 from flybystab.errors import InvalidInput
-from flybystab.plots.grains import COLOURS, LOOSE, grains_plot, grains_scene_plot
+from flybystab.plots.grains import COLOURS, LOOSE, grains_figure, grains_plot, grains_scene_plot
 
 BODY = fs.Body(semi_axes=[1408, 850, 748] * u.m, density=2000 * u.kg / u.m**3, spin_period=6 * u.h)
 
@@ -65,3 +67,12 @@ def test_a_still_is_to_scale_about_the_largest_clump(result):
 def test_an_ellipsoid_has_no_grains_to_draw():
     with pytest.raises(InvalidInput, match="grains"):
         grains_scene_plot(Figure().subplots(), fs.flyby(BODY, earth(3.0)))
+
+
+def test_the_title_counts_piles(result):
+    figure = grains_figure(result)
+    assert figure.get_suptitle().endswith(", 1 pile")
+    assert "1 pile:" in repr(result.grains)
+    two = result.with_(grains=replace(result.grains, runs=2 * result.grains.runs))
+    assert grains_figure(two).get_suptitle().endswith(", 2 piles, blue: the median one")
+    assert "2 piles:" in repr(two.grains)

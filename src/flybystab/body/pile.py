@@ -157,11 +157,10 @@ def checked_number(grains: int) -> int:
     """Raise InvalidInput for a number of grains out of range."""
     if not isinstance(grains, int | np.integer) or isinstance(grains, bool) or not grains >= LEAST:
         raise InvalidInput("grains", grains, f"a whole number of grains, {LEAST} or more")
-    most = min(MOST, int(_memory() / _BYTES))
-    if grains > most:
-        raise InvalidInput(
-            "grains", grains, f"at most {most} grains, for the memory and the time that they take"
-        )
+    fitting = int(_memory() / _BYTES) if np.isfinite(_memory()) else MOST
+    if grains > min(MOST, fitting):
+        reason = "which fit in the memory of this machine" if fitting < MOST else "which take days to compute"
+        raise InvalidInput("grains", grains, f"at most {min(MOST, fitting)} grains, {reason}")
     return int(grains)
 
 

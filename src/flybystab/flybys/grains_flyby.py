@@ -24,7 +24,7 @@ from flybystab.core.grains.simulation import GRAVITY_ERROR, TREE_FROM
 from flybystab.core.numerics.threads import in_order
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
-from flybystab.flybys.grains_outcome import GrainsOutcome, GrainsRun
+from flybystab.flybys.grains_outcome import GrainsOutcome, GrainsRun, piles_of
 from flybystab.flybys.grains_run import FRAMES, QUIET, one_pile
 from flybystab.progress import Progressing, progress_bar
 from flybystab.typing import Array
@@ -39,8 +39,8 @@ def warn_of_few(grains: int) -> None:
     """Warn of a number of grains too small to resolve fragments."""
     if grains < FEW:
         warnings.warn(
-            f"{grains} grains tell whether a body comes apart, not the mass of its fragments nor how far it stretches; "
-            f"use {FEW} or more",
+            f"{grains} grains show whether a body is disrupted, but neither the masses of its fragments nor its "
+            f"stretch; use {FEW} or more",
             stacklevel=4,
         )
 
@@ -95,7 +95,7 @@ def grains_flyby(
     begun = clock.perf_counter()
     cores = os.cpu_count() or 1
     frames = FRAMES * len(chosen)
-    with progress_bar(progress, frames, "frames", f"{len(chosen)} piles of {grains} grains") as tick:
+    with progress_bar(progress, frames, "frames", f"{piles_of(len(chosen))} of {grains} grains") as tick:
         counter = itertools.count(1)
 
         def one(seed: int) -> GrainsRun:
@@ -127,10 +127,10 @@ def _modelled(body: Body, encounter: Encounter, grains: int, runs: tuple[GrainsR
     unsettled = sum(not r.settled for r in runs)
     return (
         *encounter.forces,
-        f"{len(runs)} piles of {grains} grains, soft spheres, {gravity}",
+        f"{piles_of(len(runs))} of {grains} grains, soft spheres, {gravity}",
         f"friction angle {friction:g} deg (calibrated by spin-up), {cohesion}",
         f"until clumps had not changed for {QUIET:g} dynamical times, {low:.1f} to {high:.1f} h after closest approach"
-        + (f"; in {unsettled} runs they still did" if unsettled else ""),
+        + (f"; still changing at the end of {unsettled} of {len(runs)} runs" if unsettled else ""),
     )
 
 

@@ -20,6 +20,11 @@ if TYPE_CHECKING:
     from astropy.table import QTable
 
 
+def piles_of(count: int) -> str:
+    """A number of piles as text: ``1 pile``, ``8 piles``."""
+    return f"{count} pile{'' if count == 1 else 's'}"
+
+
 @dataclass(frozen=True, eq=False)
 class GrainsCourse(Tabular):
     """Clumps of one pile against time; every array has the same first dimension.
@@ -209,6 +214,6 @@ class GrainsOutcome(Collection):
         low, high = self.largest_range
         shares = ", ".join(f"{v} {p[0]:.2g}" for v, p in self.probabilities().items())
         return (
-            f"<GrainsOutcome {len(self.runs)} piles: {shares}; largest clump {self.largest_fraction:.3g} "
-            f"({low:.3g} to {high:.3g}), {len(self.fragments)} fragments, {brief(self.wall_time, u.s)}>"
+            f"<GrainsOutcome {piles_of(len(self.runs))}: {shares}; largest clump {self.largest_fraction:.3g} "
+            f"({low:.3g} to {high:.3g}), {len(self.fragments)} clumps of 1 % or more, {brief(self.wall_time, u.s)}>"
         )

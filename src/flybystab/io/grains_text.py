@@ -5,6 +5,7 @@ from __future__ import annotations
 import astropy.units as u
 import numpy as np
 
+from flybystab.flybys.grains_outcome import piles_of
 from flybystab.flybys.result import FlybyResult
 
 
@@ -14,7 +15,7 @@ def grains_lines(r: FlybyResult, most: int = 6) -> list[str]:
         return []
     low, high = r.grains.largest_range
     out = [
-        f"grains     {len(r.grains.runs)} pile{'s' if len(r.grains.runs) > 1 else ''}: "
+        f"grains     {piles_of(len(r.grains.runs))}: "
         + ", ".join(f"{v} {p:.0%} ({a:.0%} to {b:.0%})" for v, (p, a, b) in r.grains.probabilities().items()),
         f"           largest clump {r.largest_fraction:.1%} of the mass ({low:.1%} to {high:.1%}); "
         f"computed in {r.grains.wall_time.to_value(u.s):.1f} s",

@@ -1,7 +1,7 @@
-"""A pile of grains through an encounter: stills, the largest clump against time, an animation.
+"""Figures of a pile of grains in an encounter: grains at one time, the largest clump against time, an animation.
 
-Grains are drawn to scale in the plane of the orbit, seen from the side of its angular momentum, coloured by the
-clump to which they belong at the end; loose grains are grey.
+Grains are drawn to scale in the plane of the orbit, seen from the direction of the orbital angular momentum. The colour
+is that of the clump to which a grain belongs at the end; grains that belong to none are grey.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ from matplotlib.collections import EllipseCollection
 from flybystab.encounter.attitude import periapsis_axes
 from flybystab.errors import InvalidInput
 from flybystab.flybys.batch import span_of
-from flybystab.flybys.grains_outcome import GrainsOutcome, GrainsRun
+from flybystab.flybys.grains_outcome import GrainsOutcome, GrainsRun, piles_of
 from flybystab.flybys.result import FlybyResult
 from flybystab.plots.flyby import BLACK
 from flybystab.plots.style import NARROW, new_figure, save, styled
@@ -130,7 +130,7 @@ def grains_scene_plot(
 def grains_figure(
     result: FlybyResult, title: str = "", path: str | Path | None = None, *, figure: Any = None
 ) -> Any:
-    """Four stills of the pile with the median outcome, and the largest clump of all piles against time.
+    """The pile with the median outcome at four times, and the largest clump of all piles against time.
 
     Parameters
     ----------
@@ -175,7 +175,8 @@ def grains_figure(
     spin.set(xlabel="time from closest approach (h)", ylabel="its long semi-axis (m)")
     figure.suptitle(
         fill(
-            f"{title + ': ' if title else ''}{result.verdict}, {len(outcome.runs)} piles, blue: the median one",
+            f"{title + ': ' if title else ''}{result.verdict}, {piles_of(len(outcome.runs))}"
+            + (", blue: the median one" if len(outcome.runs) > 1 else ""),
             int(11.0 * figure.get_figwidth()),
         )
     )
