@@ -26,7 +26,8 @@ from flybystab.constants import AU, YEAR
 from flybystab.encounter.encounter import Encounter
 from flybystab.orbit.ephemeris import Window, ephemeris
 from flybystab.orbit.epochs import later, seconds
-from flybystab.orbit.forces import FORCES, LAW_SIZE
+from flybystab.orbit.forces import FORCES
+from flybystab.orbit.nongravitational import NONE
 from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.predictability import deviations_of
 from flybystab.orbit.search import neighbours
@@ -68,7 +69,7 @@ def places(orbits: Sequence[Orbit], time: Time, window: Window) -> NDArray[np.fl
     room, out = empty_room(), np.full((len(orbits), 1, 6), np.nan)
     for i, orbit in enumerate(orbits):
         push = orbit.nongrav
-        law = push.row if push.active else np.zeros(LAW_SIZE)
+        law = push.parameters if push.active else NONE
         start = seconds(orbit.epoch, window.epoch)
         carry(
             forces,
@@ -86,7 +87,7 @@ def places(orbits: Sequence[Orbit], time: Time, window: Window) -> NDArray[np.fl
 def displacement(orbit: Orbit, time: Time, window: Window) -> float:
     """One sigma of an orbit in the direction least known at a time, m."""
     forces = field(window, [n for n in FORCES if n.endswith("point mass") or n == "1PN"])
-    law = orbit.nongrav.row
+    law = orbit.nongrav.parameters
     times = np.array([seconds(time, window.epoch)])
     return float(spread(deviations_of(orbit), forces, law, window, times, 1e-13).displacement[0])
 

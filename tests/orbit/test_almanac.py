@@ -12,6 +12,7 @@ from flybystab.core.numerics.jit import kernel
 from flybystab.orbit.almanac import almanac, find_places, gather
 from flybystab.orbit.ephemeris import BELT, BELT_GM, BODIES, N_ALL, N_BODIES
 from flybystab.orbit.forces import FORCES, NonGravitational, acceleration, model
+from flybystab.orbit.nongravitational import NONE
 from flybystab.orbit.search.acceleration import empty_places, field, rate
 
 
@@ -64,7 +65,7 @@ def test_field_is_the_acceleration_of_the_other_code(names):
     """Two codes: one body after the other, exact series; all at once, from the almanac."""
     window = window_of("de421", 2459000.5, 100.0)
     push = NonGravitational((3e-12, -2e-12, 1e-12), "comet", delay=35.0 * 86400.0, area_to_mass=1e-5)
-    law = push.row if "non-gravitational" in names else np.zeros(10)
+    law = push.parameters if "non-gravitational" in names else NONE
     f = field(window, [n for n in names if n != "non-gravitational"])
     flat = model(window, names, push)
     rng = np.random.default_rng(5)

@@ -15,8 +15,9 @@ from flybystab.constants import AU, DAY
 from flybystab.errors import FlybystabError, InvalidInput, UnknownName
 from flybystab.orbit.covariance import Covariance
 from flybystab.orbit.ephemeris import ephemeris
-from flybystab.orbit.forces import FORCES, RADIATION_PRESSURE, NonGravitational, acceleration, model, zonal
+from flybystab.orbit.forces import FORCES, NonGravitational, acceleration, model, zonal
 from flybystab.orbit.kepler import two_body
+from flybystab.orbit.nongravitational import RADIATION_PRESSURE
 from flybystab.orbit.planets import PLANETS
 from flybystab.orbit.predictability import deviations_of
 from flybystab.orbit.search.acceleration import field
@@ -165,7 +166,7 @@ def test_the_error_of_one_parameter_displaces_the_asteroid_as_in_the_other_integ
     window = ephemeris("de421").window(EPOCH, -DAY, t + DAY)
     forces = [n for n in FORCES if n != "non-gravitational"]
     beside = deviations_of(orbit(covariance=known), "de421")
-    law = orbit().nongrav.row
+    law = orbit().nongrav.parameters
     found = spread(beside, field(window, forces), law, window, np.array([t]), 1e-14).displacement[0]
     ends = [orbit(sign * sigma).flight(window, FORCES).to(t)[:3] for sign in (1.0, -1.0)]
     truth = 0.5 * np.linalg.norm(ends[0] - ends[1])

@@ -16,6 +16,7 @@ from flybystab.orbit.elements import GM_SUN
 from flybystab.orbit.ephemeris import BODIES, ephemeris
 from flybystab.orbit.epochs import later, seconds
 from flybystab.orbit.forces import FORCES, NonGravitational, acceleration, model
+from flybystab.orbit.nongravitational import NONE
 from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.planets import PLANETS, Planet, planet
 from flybystab.orbit.relativity import of_source
@@ -289,7 +290,7 @@ def test_one_pn_is_that_of_einstein_infeld_hoffmann():
         # and the same in the arrangement of a search
         rates = [np.empty(6), np.empty(6)]
         for chosen, out in zip(fields, rates, strict=True):
-            rate(chosen, np.zeros(10), t, np.concatenate([x, v]), empty_places(), out)
+            rate(chosen, NONE, t, np.concatenate([x, v]), empty_places(), out)
         assert np.linalg.norm((rates[0] - rates[1])[3:] - truth) < (1e-4 if k < 5 else 3e-3) * size
 
 

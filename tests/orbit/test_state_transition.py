@@ -52,7 +52,7 @@ def test_two_body_motion_is_the_limit():
     state, sun = orbit.barycentric(window), window.states(SUN, np.zeros(1))[0]
     # a Sun at rest: the difference of two paths about the moving one is that about a fixed one to 1e-3
     found, error = derivatives(
-        model(window, ("sun point mass",)), orbit.nongrav.row, 0.0, state, sun, 30.0 * DAY
+        model(window, ("sun point mass",)), orbit.nongrav.parameters, 0.0, state, sun, 30.0 * DAY
     )
     size = units(orbit, window)
     expected = np.empty((6, 6))

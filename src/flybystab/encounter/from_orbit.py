@@ -181,9 +181,9 @@ def followed(
 
 def _spread(orbit: Orbit, beside: Deviations, window: Window, forces: tuple[str, ...], t: float) -> Spread:
     """Errors of the orbit at `t` s from the epoch of the window."""
-    law = orbit.nongrav.row
+    law = orbit.nongrav.parameters
     if "non-gravitational" not in forces:
-        law[:3] = law[9] = 0.0
+        law = law._replace(a1=0.0, a2=0.0, a3=0.0, pressure=0.0)
     acting = field(window, [name for name in forces if name != "non-gravitational"])
     return spread(beside, acting, law, window, np.array([t]), _TOLERANCE)
 

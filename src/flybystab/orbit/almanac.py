@@ -35,7 +35,11 @@ HEAVY = tuple(name for name in BODIES if PLANETS[name].relativity and name != "s
 N_HEAVY = len(HEAVY)
 #: Columns of the grids; those of ``HEAVY`` end with acceleration and potential of the Sun.
 C_FAST, C_SLOW, C_BELT, C_HEAVY = 3 * N_FAST + 4, 3 * N_SLOW, 3 * N_BELT, -(-(11 * N_HEAVY + 4) // 4) * 4
-_SUN_VELOCITY = 3 * N_FAST
+#: Columns of the Sun's velocity in the fast grid, and of its acceleration and potential in the heavy one.
+SUN_VELOCITY, AT_SUN = 3 * N_FAST, 10 * N_HEAVY
+# Rows and columns of Almanac.when.
+_FAST, _SLOW, BELT_GRID, _HEAVY = range(4)
+_START, _PER_SECOND, PIECES = range(3)
 _NOWHERE = 1e15
 
 
@@ -111,7 +115,7 @@ def _grid(
         for slot, name in enumerate(names):
             sample[:, slot : 3 * slots : slots] = window.states(order.index(name), times)[:, :3]
     if names == FAST:
-        sample[:, _SUN_VELOCITY : _SUN_VELOCITY + 3] = window.states(SUN, times)[:, 3:]
+        sample[:, SUN_VELOCITY : SUN_VELOCITY + 3] = window.states(SUN, times)[:, 3:]
     by_chebyshev = np.linalg.inv(chebyshev.chebvander(nodes, degree)) @ sample.reshape(count, degree + 1, -1)
     powers = np.zeros((degree + 1, degree + 1))
     for n in range(degree + 1):
@@ -130,7 +134,7 @@ def _write_heavy(window: Window, times: Array, out: Array) -> None:
         gm = window.gm[others, None]
         pull, potential = np.sum((gm / r**3)[:, :, None] * away, axis=0), np.sum(gm / r, axis=0)
         if name == "sun":
-            out[:, 10 * N_HEAVY : 10 * N_HEAVY + 3], out[:, 10 * N_HEAVY + 3] = pull, potential
+            out[:, AT_SUN : AT_SUN + 3], out[:, AT_SUN + 3] = pull, potential
             continue
         for block, values in enumerate((states[body, :, :3], states[body, :, 3:], pull)):
             out[:, 3 * N_HEAVY * block + slot : 3 * N_HEAVY * (block + 1) : N_HEAVY] = values
@@ -140,9 +144,15 @@ def _write_heavy(window: Window, times: Array, out: Array) -> None:
 @pasted_kernel
 def _piece(when: Array, t: float) -> tuple[int, float]:
     """Number of the piece at `t` and the place -1...1 in it."""
-    s = (t - when[0]) * when[1]
-    i = int(min(max(s, 0.0), when[2] - 1.0))
+    s = (t - when[_START]) * when[_PER_SECOND]
+    i = int(min(max(s, 0.0), when[PIECES] - 1.0))
     return i, 2.0 * (s - i) - 1.0
+
+
+@pasted_kernel
+def has_belt(book: Almanac) -> bool:
+    """Whether the massive asteroids are in the almanac and in use."""
+    return book.when[BELT_GRID, PIECES] > 0.0
 
 
 @pasted_kernel
@@ -160,7 +170,7 @@ def _find_quartic(when: Array, pieces: Array, t: float, p: Array, columns: int) 
 def find_places(book: Almanac, t: float, belt: bool, out: Places) -> None:
     """Write where all bodies are at ``t`` (s)."""
     # Powers in pairs of pairs (Estrin): independent products, which the compiler makes vectors of.
-    i, x = _piece(book.when[0], t)
+    i, x = _piece(book.when[_FAST], t)
     c = book.fast[i]
     p = out.fast
     x2 = x * x
@@ -172,7 +182,7 @@ def find_places(book: Almanac, t: float, belt: bool, out: Places) -> None:
             + ((c[4, j] + c[5, j] * x) + (c[6, j] + c[7, j] * x) * x2) * x4
             + (((c[8, j] + c[9, j] * x) + (c[10, j] + c[11, j] * x) * x2) + c[12, j] * x4) * x8
         )
-    i, x = _piece(book.when[1], t)
+    i, x = _piece(book.when[_SLOW], t)
     c = book.slow[i]
     p = out.slow
     x2 = x * x
@@ -182,13 +192,13 @@ def find_places(book: Almanac, t: float, belt: bool, out: Places) -> None:
             (c[4, j] + c[5, j] * x) + (c[6, j] + c[7, j] * x) * x2
         ) * x4
     if belt:
-        _find_quartic(book.when[2], book.belt, t, out.belt, C_BELT)
+        _find_quartic(book.when[BELT_GRID], book.belt, t, out.belt, C_BELT)
 
 
 @pasted_kernel
 def find_heavy(book: Almanac, t: float, out: Places) -> None:
     """Write what relativity needs of the heavy bodies at ``t`` (s)."""
-    _find_quartic(book.when[3], book.heavy, t, out.heavy, C_HEAVY)
+    _find_quartic(book.when[_HEAVY], book.heavy, t, out.heavy, C_HEAVY)
 
 
 @pasted_kernel

@@ -19,16 +19,23 @@ from flybystab.errors import NotConverged
 from flybystab.orbit.ephemeris import Window, body_states
 from flybystab.typing import Array
 
+#: Columns of a log of steps: time (s), then three each of position (m), velocity (m/s), acceleration (m/s2).
+TIME, POSITION, VELOCITY, ACCELERATION = 0, 1, 4, 7
+#: Position and velocity.
+STATE = slice(1, 7)
+#: Numbers of a row of a log.
+LOG_WIDTH = 10
+
 
 @kernel
 def between(log: Array, k: int, t: float, out: Array) -> None:
     """Write into ``out[6]`` position (m) and velocity (m/s) at ``t`` inside step ``k`` (row k to k + 1)."""
-    h = log[k + 1, 0] - log[k, 0]
-    s = (t - log[k, 0]) / h
+    h = log[k + 1, TIME] - log[k, TIME]
+    s = (t - log[k, TIME]) / h
     for j in range(3):
-        x0, x1 = log[k, 1 + j], log[k + 1, 1 + j]
-        v0, v1 = h * log[k, 4 + j], h * log[k + 1, 4 + j]
-        a0, a1 = 0.5 * h * h * log[k, 7 + j], 0.5 * h * h * log[k + 1, 7 + j]
+        x0, x1 = log[k, POSITION + j], log[k + 1, POSITION + j]
+        v0, v1 = h * log[k, VELOCITY + j], h * log[k + 1, VELOCITY + j]
+        a0, a1 = 0.5 * h * h * log[k, ACCELERATION + j], 0.5 * h * h * log[k + 1, ACCELERATION + j]
         # x0 + v0 s + a0 s^2 + s^3 (c3 + c4 s + c5 s^2), matched at s = 1
         d = (x1 - x0) - v0 - a0
         dv = v1 - v0 - 2.0 * a0
@@ -70,9 +77,9 @@ def crossings(
     steps = []
     s = np.empty(6)
     for k in range(log.shape[0] - 1):
-        h = (log[k + 1, 0] - log[k, 0]) / cuts
+        h = (log[k + 1, TIME] - log[k, TIME]) / cuts
         for i in range(cuts):
-            ta = log[k, 0] + i * h
+            ta = log[k, TIME] + i * h
             tb = ta + h
             relative(log, k, head, data, gm, body, ta, s)
             fa = _measure(s, level)
@@ -96,7 +103,7 @@ def crossings(
                     break
             relative(log, k, head, data, gm, body, tb, s)
             d = np.sqrt(s[0] ** 2 + s[1] ** 2 + s[2] ** 2)
-            relative(log, k, head, data, gm, body, log[k, 0] + i * h, s)
+            relative(log, k, head, data, gm, body, log[k, TIME] + i * h, s)
             found.append((tb, d, 1.0 if _measure(s, level) < 0.0 else -1.0))
             steps.append(k)
     out = np.empty((len(found), 3))
@@ -115,17 +122,17 @@ def steps_into(log: Array, head: Array, data: Array, gm: Array, body: int, floor
     """
     out = np.zeros(log.shape[0], dtype=np.int64)
     count = 0
-    states = body_states(head, data, gm, body, log[:, 0].copy())
+    states = body_states(head, data, gm, body, log[:, TIME].copy())
     for k in range(log.shape[0] - 1):
-        h = log[k + 1, 0] - log[k, 0]
+        h = log[k + 1, TIME] - log[k, TIME]
         rr = rd = dd = bend = pull = 0.0
         for j in range(3):
-            r = log[k, 1 + j] - states[k, j]
-            d = log[k + 1, 1 + j] - states[k + 1, j] - r
+            r = log[k, POSITION + j] - states[k, j]
+            d = log[k + 1, POSITION + j] - states[k + 1, j] - r
             rr += r * r
             rd += r * d
             dd += d * d
-            bend = max(bend, log[k, 7 + j] ** 2, log[k + 1, 7 + j] ** 2)
+            bend = max(bend, log[k, ACCELERATION + j] ** 2, log[k + 1, ACCELERATION + j] ** 2)
             pull += (states[k + 1, 3 + j] - states[k, 3 + j]) ** 2
         s = min(max(-rd / dd, 0.0), 1.0) if dd > 0.0 else 0.0
         chord = np.sqrt(max(rr + s * (2.0 * rd + s * dd), 0.0))
@@ -145,7 +152,7 @@ def first_contact(log: Array, window: Window, floors: Array) -> tuple[float, int
         None where the path stays outside of every body.
     """
     best: tuple[float, int] | None = None
-    sign = 1.0 if log[-1, 0] >= log[0, 0] else -1.0
+    sign = 1.0 if log[-1, TIME] >= log[0, TIME] else -1.0
     tables = (window.head, window.data, window.gm)
     for body, floor in enumerate(floors):
         for k in steps_into(log, *tables, body, float(floor)):

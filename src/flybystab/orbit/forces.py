@@ -6,24 +6,21 @@ The asteroid is massless; Sun, planets and Moon move on the ephemeris. Barycentr
 - 1PN: :mod:`flybystab.orbit.relativity`;
 - zonal harmonics J2 to J4: ``GM Jn a^n/r^(n+2) [P'(n+1)(s) r/|r| - P'n(s) p]`` with the derivatives of Legendre
   polynomials, ``s = r.p/|r|``, p the pole, the Earth's of date; J3 and J4 of the Earth alone;
-- non-gravitational: ``g(r') (A1 er + A2 et + A3 en)``, ``g(r) = alpha (r/r0)^-m [1 + (r/r0)^n]^-k`` (Marsden,
-  Sekanina & Yeomans 1973), r' the heliocentric distance a time DT earlier (Yeomans & Chodas 1989);
-- radiation pressure: ``(S/c) (A/m) (1 au/r)^2 er`` with the solar constant S (IAU 2015 Resolution B3), absorbing body.
+- non-gravitational acceleration and radiation pressure: :mod:`flybystab.orbit.nongravitational`.
 
 A force is one entry of :data:`FORCES`.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
-from types import MappingProxyType
+from collections.abc import Iterable
+from typing import NamedTuple
 
 import numpy as np
 
-from flybystab.constants import AU, C_LIGHT, DAY
-from flybystab.core.numerics.jit import kernel, pasted_kernel
-from flybystab.errors import InvalidInput, UnknownName
+from flybystab.constants import AU, DAY
+from flybystab.core.numerics.jit import inlined, kernel, pasted_kernel
+from flybystab.errors import UnknownName
 from flybystab.orbit.ephemeris import (
     BELT,
     BELT_GM,
@@ -37,7 +34,14 @@ from flybystab.orbit.ephemeris import (
     series_position,
     series_state,
 )
-from flybystab.orbit.kepler import two_body
+from flybystab.orbit.nongravitational import (
+    N_LAW,
+    NONE,
+    NonGravitational,
+    NonGravitationalParameters,
+    add_nongravitational,
+    parameters_of,
+)
 from flybystab.orbit.planets import PLANETS
 from flybystab.orbit.relativity import IS_SOURCE, one_pn
 from flybystab.typing import Array
@@ -51,101 +55,68 @@ FORCES = (
     "earth J4",
     "non-gravitational",
 )
-_PN, _J2, _NON = N_ALL, N_ALL + 1, N_ALL + 3 + N_BODIES
-_J3, _J4 = _NON - 2, _NON - 1
+# Places of forces in FORCES, after the point masses.
+_BY_1PN, _BY_J2 = N_ALL, N_ALL + 1
+_BY_J3, _BY_J4, _BY_NONGRAVITATIONAL = range(N_ALL + 1 + N_BODIES, N_ALL + 4 + N_BODIES)
 
-# Layout of a model, one flat array that a C callback can be handed as a pointer:
-#   [0] length  [1] Earth/Moon ratio  [2..4] switches: 1PN, any J2, non-gravitational
-#   [5..14] non-gravitational law, see NonGravitational.row  [15] address, [16] rows and [17] count of a log
-#   then, with the rows of BODIES before those of BELT where both are in: head (N_ALL x 5), gm (N_ALL), radius of the
-#   core (N_BODIES), zonal harmonics: J2, pole, rate of the pole (1/s), J3, J4, Jn times GM a^n (N_BODIES x 9), GM in
-#   use (N_ALL; zero: left out), coefficients
-_LAW, _LOG = 5, 15
-LOG_ADDRESS, LOG_ROWS, LOG_COUNT = _LOG, _LOG + 1, _LOG + 2
-_HEAD = 20
-#: Numbers per body of its zonal harmonics: J2, pole, rate of the pole, J3, J4.
-FLAT_WIDTH = 9
-_GM = _HEAD + 5 * N_ALL
-_INNER = _GM + N_ALL
-_FLAT = _INNER + N_BODIES
-_USED = _FLAT + FLAT_WIDTH * N_BODIES
-_DATA = _USED + N_ALL
-_GM_SUN = PLANETS["sun"].gm
+#: Radius of the smooth core over that of the body.
 INNER = 0.9
-#: Laws ``g(r)`` by name: ALN, r0 (m), m, n, k. The comets' is that of water ice.
-LAWS: Mapping[str, tuple[float, float, float, float, float]] = MappingProxyType(
-    {
-        "asteroid": (1.0, AU, 2.0, 5.093, 0.0),
-        "comet": (0.1112620426, 2.808 * AU, 2.15, 5.093, 4.6142),
-    }
-)
-#: Pressure of sunlight on an absorbing surface at 1 au, Pa.
-RADIATION_PRESSURE = 1361.0 / C_LIGHT
-#: Numbers of a row of :attr:`NonGravitational.row`.
-LAW_SIZE = 10
 
 
-@dataclass(frozen=True)
-class NonGravitational:
-    """Non-gravitational acceleration ``g(r') (A1 er + A2 et + A3 en)`` and radiation pressure.
+class ForceModel(NamedTuple):
+    """The forces on an asteroid and the ephemeris behind them.
+
+    Rows of bodies are those of ``BODIES``, then those of ``BELT`` where both are in.
 
     Attributes
     ----------
-    a : tuple of float
-        A1, A2, A3, m/s2.
-    law : str
-        ``"asteroid"``: ``g = (1 au/r)^2``; ``"comet"``: ``g = 0.1113 (r/r0)^-2.15 [1 + (r/r0)^5.093]^-4.6142`` with
-        r0 = 2.808 au; or the five constants ALN, R0 (au), NM, NN, NK of ``ALN (r/R0)^-NM [1 + (r/R0)^NN]^-NK`` as
-        numbers separated by spaces.
-    delay : float
-        DT: r' is the heliocentric distance this time earlier, s; positive for a maximum after perihelion.
-    area_to_mass : float
-        AMRAT: illuminated area over mass, m2/kg.
+    moon_ratio : float
+        GM of the Moon over that of the Earth.
+    relativity, oblate, nongravitational : bool
+        Whether the first post-Newtonian terms, any zonal harmonic, the non-gravitational acceleration act.
+    law : NonGravitationalParameters
+    head, data : ndarray, shape (N_ALL, 5), ndarray
+        Chebyshev series of the bodies, as in :class:`flybystab.orbit.ephemeris.Window`.
+    gm, used : ndarray, shape (N_ALL,)
+        GM of the bodies, and as it acts on the asteroid (zero: left out), m3/s2.
+    inner : ndarray, shape (N_ALL,)
+        Radius of the smooth core, m; zero for asteroids.
+    harmonics : ndarray, shape (N_BODIES, 3)
+        ``Jn GM a^n`` of J2, J3, J4, m^(n+3)/s2; zero: left out.
+    poles : ndarray, shape (N_BODIES, 6)
+        Pole at t = 0 and its rate, 1/s.
     """
 
-    a: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    law: str = "asteroid"
-    delay: float = 0.0
-    area_to_mass: float = 0.0
-
-    @property
-    def active(self) -> bool:
-        """Whether there is any acceleration."""
-        return any(self.a) or self.area_to_mass != 0.0
-
-    @property
-    def constants(self) -> tuple[float, float, float, float, float]:
-        """ALN, r0 (m), m, n, k of the law ``ALN (r/r0)^-m [1 + (r/r0)^n]^-k``.
-
-        Raises
-        ------
-        UnknownName, InvalidInput
-        """
-        if self.law in LAWS:
-            return LAWS[self.law]
-        try:
-            numbers = [float(word) for word in self.law.split()]
-        except ValueError:
-            numbers = []
-        if not numbers:
-            known = f"(known: {', '.join(LAWS)}, or five numbers: ALN R0 NM NN NK)"
-            raise UnknownName("non-gravitational law", self.law, [], known=known)
-        if len(numbers) != 5 or not np.isfinite(numbers).all() or numbers[1] <= 0.0:
-            raise InvalidInput(
-                "non-gravitational law", self.law, "five numbers ALN R0 NM NN NK, R0 > 0 in au"
-            )
-        aln, r0, m, n, k = numbers
-        return aln, r0 * AU, m, n, k
-
-    @property
-    def row(self) -> Array:
-        """The kernels' row: A1, A2, A3 (m/s2); ALN, r0 (m), m, n, k; DT (s); pressure/mass at 1 au (m/s2)."""
-        pressure = RADIATION_PRESSURE * self.area_to_mass
-        return np.array([*self.a, *self.constants, self.delay, pressure])
+    moon_ratio: float
+    relativity: bool
+    oblate: bool
+    nongravitational: bool
+    law: NonGravitationalParameters
+    head: Array
+    gm: Array
+    used: Array
+    inner: Array
+    harmonics: Array
+    poles: Array
+    data: Array
 
 
-def model(window: Window, forces: Iterable[str], nongrav: NonGravitational | None = None) -> Array:
-    """The named forces as the flat array that the kernels read.
+# A model as one flat array, which a C callback can be handed as a pointer: its length, three numbers of a log of steps
+# (address, rows, rows written), then the fields of ForceModel in their order.
+_LENGTH, LOG_ADDRESS, LOG_ROWS, LOG_COUNT, _MOON_RATIO, _RELATIVITY, _OBLATE, _NONGRAVITATIONAL, _LAW = range(
+    9
+)
+_HEAD = _LAW + N_LAW
+_GM = _HEAD + 5 * N_ALL
+_USED = _GM + N_ALL
+_INNER = _USED + N_ALL
+_HARMONICS = _INNER + N_ALL
+_POLES = _HARMONICS + 3 * N_BODIES
+_DATA = _POLES + 6 * N_BODIES
+
+
+def force_model(window: Window, forces: Iterable[str], nongrav: NonGravitational | None = None) -> ForceModel:
+    """The named forces in a window.
 
     Raises
     ------
@@ -155,47 +126,80 @@ def model(window: Window, forces: Iterable[str], nongrav: NonGravitational | Non
     chosen = set(forces)
     for name in chosen - set(FORCES):
         raise UnknownName("force", name, [], known=f"(known: {', '.join(FORCES)})")
-    out = np.zeros(_DATA + window.data.size)
-    out[0] = out.size
-    out[1] = window.gm[MOON] / window.gm[EARTH]
-    out[_HEAD:_GM] = window.head.ravel()
-    out[_GM : _GM + N_BODIES] = window.gm
-    out[_GM + N_BODIES : _INNER] = list(BELT_GM.values())
-    out[_DATA:] = window.data
+    gm = np.array([*window.gm, *BELT_GM.values()])
+    point = [f"{name} point mass" in chosen for name in (*BODIES, *BELT)]
+    inner = np.zeros(N_ALL)
+    harmonics, poles = np.zeros((N_BODIES, 3)), np.zeros((N_BODIES, 6))
     for i, name in enumerate(BODIES):
         body = PLANETS[name]
-        out[_INNER + i] = INNER * body.radius
-        if f"{name} point mass" in chosen:
-            out[_USED + i] = window.gm[i]
-        used = [f"{name} J{n}" in chosen for n in (2, 3, 4)]
-        if any(used):
-            out[3] = 1.0
-            terms = zip(used, (body.j2, body.j3, body.j4), (2, 3, 4), strict=True)
-            c2, c3, c4 = (jn * window.gm[i] * body.radius**n if there else 0.0 for there, jn, n in terms)
-            row = _FLAT + FLAT_WIDTH * i
-            pole, pole_rate = body.pole_motion(window.epoch)
-            out[row : row + FLAT_WIDTH] = c2, *pole, *pole_rate, c3, c4
-    out[2] = float("1PN" in chosen)
-    for i, name in enumerate(BELT, N_BODIES):
-        if f"{name} point mass" in chosen:
-            out[_USED + i] = BELT_GM[name]
-    if "non-gravitational" in chosen and nongrav is not None and nongrav.active:
-        out[4] = 1.0
-        out[_LAW:_LOG] = nongrav.row
+        inner[i] = INNER * body.radius
+        for k, (n, jn) in enumerate(zip((2, 3, 4), (body.j2, body.j3, body.j4), strict=True)):
+            if f"{name} J{n}" in chosen:
+                harmonics[i, k] = jn * window.gm[i] * body.radius**n
+        if any(f"{name} J{n}" in chosen for n in (2, 3, 4)):
+            poles[i] = np.concatenate(body.pole_motion(window.epoch))
+    active = "non-gravitational" in chosen and nongrav is not None and nongrav.active
+    return ForceModel(
+        moon_ratio=float(window.gm[MOON] / window.gm[EARTH]),
+        relativity="1PN" in chosen,
+        oblate=bool(harmonics.any()),
+        nongravitational=active,
+        law=nongrav.parameters if active and nongrav is not None else NONE,
+        head=window.head,
+        gm=gm,
+        used=np.where(point, gm, 0.0),
+        inner=inner,
+        harmonics=harmonics,
+        poles=poles,
+        data=window.data,
+    )
+
+
+def model(window: Window, forces: Iterable[str], nongrav: NonGravitational | None = None) -> Array:
+    """The named forces as one flat array for :mod:`flybystab.orbit.ias15`; errors as of :func:`force_model`."""
+    its = force_model(window, forces, nongrav)
+    out = np.concatenate([np.zeros(_MOON_RATIO), *(np.ravel(field) for field in its)])
+    out[_LENGTH] = out.size
     return out
 
 
+def with_law(flat: Array, law: NonGravitationalParameters) -> Array:
+    """A copy of a :func:`model` with a non-gravitational acceleration that acts, even if it is zero."""
+    out = np.array(flat)
+    out[_NONGRAVITATIONAL] = 1.0
+    out[_LAW:_HEAD] = law
+    return out
+
+
+@inlined
+def unpacked(flat: Array) -> ForceModel:
+    """The forces in a flat array of :func:`model`; the arrays are views."""
+    return ForceModel(
+        flat[_MOON_RATIO],
+        flat[_RELATIVITY] != 0.0,
+        flat[_OBLATE] != 0.0,
+        flat[_NONGRAVITATIONAL] != 0.0,
+        parameters_of(flat[_LAW:_HEAD]),
+        flat[_HEAD:_GM].reshape((N_ALL, 5)),
+        flat[_GM:_USED],
+        flat[_USED:_INNER],
+        flat[_INNER:_HARMONICS],
+        flat[_HARMONICS:_POLES].reshape((N_BODIES, 3)),
+        flat[_POLES:_DATA].reshape((N_BODIES, 6)),
+        flat[_DATA:],
+    )
+
+
 @kernel
-def bodies(model: Array, t: float, out: Array, rates: Array) -> None:
+def bodies(model: ForceModel, t: float, out: Array, rates: Array) -> None:
     """Write positions (m) at ``t`` into ``out[N_ALL, 3]``, velocities (m/s) of the sources of 1PN into ``rates``.
 
     Massive asteroids that are not in use, and velocities on which no force depends, are left out.
     """
-    head = model[_HEAD:_GM].reshape((N_ALL, 5))
-    data = model[_DATA:]
+    head, data = model.head, model.data
     state = np.empty(6)
     for i in range(N_BODIES):
-        if (model[2] != 0.0 and IS_SOURCE[i]) or (model[4] != 0.0 and i == SUN):
+        if (model.relativity and IS_SOURCE[i]) or (model.nongravitational and i == SUN):
             series_state(head, data, i, t, state)
             for j in range(3):
                 out[i, j] = state[j]
@@ -206,9 +210,9 @@ def bodies(model: Array, t: float, out: Array, rates: Array) -> None:
     for j in range(3):
         far = out[MOON, j]
         out[MOON, j] = out[EARTH, j] + far
-        out[EARTH, j] -= model[1] * far
+        out[EARTH, j] -= model.moon_ratio * far
     for i in range(N_BODIES, N_ALL):
-        if model[_USED + i] != 0.0:
+        if model.used[i] != 0.0:
             series_position(head, data, i, t, out[i])
             for j in range(3):
                 out[i, j] += out[SUN, j]
@@ -246,43 +250,6 @@ def zonal_factors(c2: float, c3: float, c4: float, d: float, s: float) -> tuple[
 
 
 @kernel
-def push(law: Array, r: Array, v: Array, out: Array) -> None:
-    """Add the non-gravitational acceleration (m/s2) at heliocentric ``r`` (m), ``v`` (m/s) to ``out[3]``.
-
-    ``law`` is :attr:`NonGravitational.row`. The distance a time DT earlier is that of two-body motion.
-    """
-    d = np.sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2])
-    sunlight = law[9] * (AU / d) ** 2 / d
-    for j in range(3):
-        out[j] += sunlight * r[j]
-    if law[0] == 0.0 and law[1] == 0.0 and law[2] == 0.0:
-        return
-    x = d / law[4]
-    if law[8] != 0.0:
-        now = np.empty(6)
-        for j in range(3):
-            now[j] = r[j]
-            now[3 + j] = v[j]
-        before = two_body(_GM_SUN, now, -law[8])
-        x = np.sqrt(before[0] ** 2 + before[1] ** 2 + before[2] ** 2) / law[4]
-    if law[7] == 0.0 and law[5] == 2.0:
-        g = law[3] / (x * x)
-    else:
-        g = law[3] * x ** (-law[5]) * (1.0 + x ** law[6]) ** (-law[7])
-    h0 = r[1] * v[2] - r[2] * v[1]
-    h1 = r[2] * v[0] - r[0] * v[2]
-    h2 = r[0] * v[1] - r[1] * v[0]
-    h = np.sqrt(h0 * h0 + h1 * h1 + h2 * h2)
-    if h == 0.0:
-        return
-    n0, n1, n2 = h0 / h, h1 / h, h2 / h
-    e0, e1, e2 = r[0] / d, r[1] / d, r[2] / d
-    out[0] += g * (law[0] * e0 + law[1] * (n1 * e2 - n2 * e1) + law[2] * n0)
-    out[1] += g * (law[0] * e1 + law[1] * (n2 * e0 - n0 * e2) + law[2] * n1)
-    out[2] += g * (law[0] * e2 + law[1] * (n0 * e1 - n1 * e0) + law[2] * n2)
-
-
-@kernel
 def core(s: float) -> float:
     """``s^(-3/2)`` continued into ``s < 1`` by its first nine Taylor terms at 1: finite and smooth.
 
@@ -306,22 +273,37 @@ def fade(s: float) -> float:
     return x**5 * (126.0 + x * (-420.0 + x * (540.0 + x * (-315.0 + 70.0 * x))))
 
 
+@inlined
+def _add_oblateness(model: ForceModel, t: float, places: Array, x: Array, out: Array) -> None:
+    """Add the acceleration (m/s2) by all zonal harmonics at ``x`` (m) to ``out[3]``."""
+    d = np.empty(3)
+    for i in range(N_BODIES):
+        c2, c3, c4 = model.harmonics[i, 0], model.harmonics[i, 1], model.harmonics[i, 2]
+        if c2 != 0.0 or c3 != 0.0 or c4 != 0.0:
+            r2 = 0.0
+            for j in range(3):
+                d[j] = x[j] - places[i, j]
+                r2 += d[j] * d[j]
+            w = fade(r2 / model.inner[i] ** 2)
+            zonal(w * c2, w * c3, w * c4, model.poles[i], t, d, out)
+
+
 @kernel
 def acceleration_among(
-    model: Array, t: float, places: Array, rates: Array, x: Array, v: Array, out: Array
+    model: ForceModel, t: float, places: Array, rates: Array, x: Array, v: Array, out: Array
 ) -> None:
     """Write into ``out[3]`` the acceleration (m/s2) at ``t`` (s), ``x`` (m), ``v`` (m/s); bodies at ``places`` (m)."""
     ax = ay = az = potential = 0.0
     g = np.zeros(3)
     for i in range(N_ALL):
-        gm = model[_USED + i]
+        gm = model.used[i]
         if gm == 0.0:
             continue
         dx = places[i, 0] - x[0]
         dy = places[i, 1] - x[1]
         dz = places[i, 2] - x[2]
         r2 = dx * dx + dy * dy + dz * dz
-        inner = model[_INNER + i] if i < N_BODIES else 0.0
+        inner = model.inner[i]
         c = gm / (r2 * np.sqrt(r2)) if r2 > inner * inner else gm * core(r2 / (inner * inner)) / inner**3
         ax += c * dx
         ay += c * dy
@@ -334,37 +316,22 @@ def acceleration_among(
     out[0] = ax
     out[1] = ay
     out[2] = az
-    if model[3] != 0.0:
-        d = np.empty(3)
-        for i in range(N_BODIES):
-            p = _FLAT + FLAT_WIDTH * i
-            if model[p] != 0.0 or model[p + 7] != 0.0 or model[p + 8] != 0.0:
-                r2 = 0.0
-                for j in range(3):
-                    d[j] = x[j] - places[i, j]
-                    r2 += d[j] * d[j]
-                w = fade(r2 / model[_INNER + i] ** 2)
-                c2, c3, c4 = w * model[p], w * model[p + 7], w * model[p + 8]
-                zonal(c2, c3, c4, model[p + 1 : p + 7], t, d, out)
-    if model[2] != 0.0:
-        gms, used, inners = model[_GM : _GM + N_BODIES], model[_USED : _USED + N_BODIES], model[_INNER:_FLAT]
-        one_pn(gms, used, inners, places, rates, g, potential, x, v, out)
-    if model[4] != 0.0:
-        r = np.empty(3)
-        u = np.empty(3)
-        for j in range(3):
-            r[j] = x[j] - places[SUN, j]
-            u[j] = v[j] - rates[SUN, j]
-        push(model[_LAW:_LOG], r, u, out)
+    if model.oblate:
+        _add_oblateness(model, t, places, x, out)
+    if model.relativity:
+        one_pn(model.gm, model.used, model.inner, places, rates, g, potential, x, v, out)
+    if model.nongravitational:
+        add_nongravitational(model.law, x - places[SUN], v - rates[SUN], out)
 
 
 @kernel
-def acceleration(model: Array, t: float, x: Array, v: Array, out: Array) -> None:
-    """Write into ``out[3]`` the acceleration (m/s2) at ``t`` (s), ``x`` (m), ``v`` (m/s)."""
+def acceleration(flat: Array, t: float, x: Array, v: Array, out: Array) -> None:
+    """Write into ``out[3]`` the acceleration (m/s2) at ``t`` (s), ``x`` (m), ``v`` (m/s) by a :func:`model`."""
+    its = unpacked(flat)
     places = np.empty((N_ALL, 3))
     rates = np.zeros((N_BODIES, 3))
-    bodies(model, t, places, rates)
-    acceleration_among(model, t, places, rates, x, v, out)
+    bodies(its, t, places, rates)
+    acceleration_among(its, t, places, rates, x, v, out)
 
 
 def shares(window: Window, t: Array, states: Array, nongrav: NonGravitational | None) -> dict[str, float]:
@@ -382,7 +349,7 @@ def shares(window: Window, t: Array, states: Array, nongrav: NonGravitational | 
         Barycentric track, m and m/s.
     nongrav : NonGravitational or None
     """
-    full = model(window, FORCES, nongrav)
+    full = force_model(window, FORCES, nongrav)
     sizes = np.empty((t.size, len(FORCES)))
     _sizes(full, np.ascontiguousarray(t), np.ascontiguousarray(states), sizes)
     weight = 3.0 * np.abs(t[-1] - t)
@@ -392,61 +359,54 @@ def shares(window: Window, t: Array, states: Array, nongrav: NonGravitational | 
 
 
 @kernel
-def _sizes(model: Array, t: Array, states: Array, out: Array) -> None:
+def _length(a: Array) -> float:
+    return np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2)
+
+
+@kernel
+def _oblateness_sizes(model: ForceModel, t: float, places: Array, x: Array, out: Array) -> None:
+    """Write the size (m/s2) of the acceleration by each zonal harmonic at ``x`` (m) into a row of `_sizes`."""
+    a = np.empty(3)
+    for i in range(N_BODIES):
+        c2, c3, c4 = model.harmonics[i, 0], model.harmonics[i, 1], model.harmonics[i, 2]
+        d = x - places[i]
+        a[:] = 0.0
+        zonal(c2, 0.0, 0.0, model.poles[i], t, d, a)
+        out[_BY_J2 + i] = _length(a)
+        if i == EARTH:
+            a[:] = 0.0
+            zonal(0.0, c3, 0.0, model.poles[i], t, d, a)
+            out[_BY_J3] = _length(a)
+            a[:] = 0.0
+            zonal(0.0, 0.0, c4, model.poles[i], t, d, a)
+            out[_BY_J4] = _length(a)
+
+
+@kernel
+def _sizes(model: ForceModel, t: Array, states: Array, out: Array) -> None:
     """Write the size (m/s2) of each force of ``FORCES`` at each point of a track into ``out[n, forces]``."""
     places = np.empty((N_ALL, 3))
     rates = np.zeros((N_BODIES, 3))
     a = np.empty(3)
-    g = np.empty(3)
-    d = np.empty(3)
     for n in range(t.size):
+        x, v = states[n, :3], states[n, 3:]
         bodies(model, t[n], places, rates)
-        for i in range(N_ALL):
-            r2 = 0.0
-            for j in range(3):
-                d[j] = states[n, j] - places[i, j]
-                r2 += d[j] * d[j]
-            out[n, i] = model[_GM + i] / r2
-            if i >= N_BODIES:
-                continue
-            p = _FLAT + FLAT_WIDTH * i
-            c2, c3, c4, pole = model[p], model[p + 7], model[p + 8], model[p + 1 : p + 7]
-            a[:] = 0.0
-            zonal(c2, 0.0, 0.0, pole, t[n], d, a)
-            out[n, _J2 + i] = np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2)
-            if i == EARTH:
-                a[:] = 0.0
-                zonal(0.0, c3, 0.0, pole, t[n], d, a)
-                out[n, _J3] = np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2)
-                a[:] = 0.0
-                zonal(0.0, 0.0, c4, pole, t[n], d, a)
-                out[n, _J4] = np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2)
-        r = states[n, :3] - places[SUN]
-        w = states[n, 3:] - rates[SUN]
-        a[:] = 0.0
         potential = 0.0
-        for i in range(N_BODIES):
-            potential += model[_GM + i] / np.sqrt(np.sum((states[n, :3] - places[i]) ** 2))
-        for j in range(3):
-            g[j] = -model[_GM + SUN] * r[j] / np.sum(r * r) ** 1.5
-        gms = model[_GM : _GM + N_BODIES]
-        one_pn(
-            gms,
-            gms,
-            model[_INNER:_FLAT],
-            places,
-            rates,
-            g,
-            potential,
-            states[n, :3],
-            states[n, 3:],
-            a,
-        )
-        out[n, _PN] = np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2)
+        for i in range(N_ALL):
+            r2 = np.sum((x - places[i]) ** 2)
+            out[n, i] = model.gm[i] / r2
+            if i < N_BODIES:
+                potential += model.gm[i] / np.sqrt(r2)
+        _oblateness_sizes(model, t[n], places, x, out[n])
+        r = x - places[SUN]
+        g = -model.gm[SUN] / np.sum(r * r) ** 1.5 * r
         a[:] = 0.0
-        if model[4] != 0.0:
-            push(model[_LAW:_LOG], r, w, a)
-        out[n, _NON] = np.sqrt(a[0] ** 2 + a[1] ** 2 + a[2] ** 2)
+        one_pn(model.gm, model.gm, model.inner, places, rates, g, potential, x, v, a)
+        out[n, _BY_1PN] = _length(a)
+        a[:] = 0.0
+        if model.nongravitational:
+            add_nongravitational(model.law, r, v - rates[SUN], a)
+        out[n, _BY_NONGRAVITATIONAL] = _length(a)
 
 
 def au_per_day2(value: float) -> float:

@@ -1,28 +1,26 @@
 """An asteroid among prescribed bodies, moved by rebound (IAS15) through a compiled force.
 
 rebound calls the force and the log through C function pointers that numba compiles: a Python callback costs
-about 90 times as much. The layout of ``reb_simulation`` differs between rebound 4 and 5, so that the offsets
-of the fields are read from rebound's own ctypes classes.
+about 90 times as much.
 """
 
 from __future__ import annotations
 
+from ctypes import Structure
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 import rebound
-from numba import carray, cfunc, types
-from numba.core import cgutils
-from numba.extending import intrinsic
+from numba import cfunc
+from numba.core.ccallback import CFunc
 
 from flybystab.core.numerics.jit import CACHE
 from flybystab.errors import NotConverged
+from flybystab.orbit.callbacks import CALLBACK, Layout, layout, numbers_at, under_way
+from flybystab.orbit.closest_approach import ACCELERATION, LOG_WIDTH, POSITION, TIME, VELOCITY
 from flybystab.orbit.forces import LOG_ADDRESS, LOG_COUNT, LOG_ROWS, acceleration
 from flybystab.typing import Array
 
-#: Columns of a log: time, position, velocity, acceleration.
-LOG_WIDTH = 10
 #: Step-size criterion of IAS15 (Aarseth 1985) and its number in rebound 4, which takes no names. With rebound's
 #: default (Pham, Rein & Spiegel 2024, "PRS23") a step can pass over an encounter: after ten years 10 of 635 near-Earth
 #: asteroids are off by more than 100 km (up to 12,000 km), with this one none, at 1.2 times the cost.
@@ -31,7 +29,7 @@ STEP_CONTROL, _STEP_CONTROL_4 = "AARSETH85", 3
 EPSILON, TIGHT = 1e-9, 1e-11
 
 
-def set_step_control(sim: Any, epsilon: float) -> Any:
+def set_step_control(sim: rebound.Simulation, epsilon: float) -> Structure:
     """Choose criterion and tolerance of the step size of a simulation; returns the settings of its IAS15."""
     old = hasattr(sim, "ri_ias15")  # rebound 4
     settings = sim.ri_ias15 if old else sim.integrator
@@ -40,80 +38,44 @@ def set_step_control(sim: Any, epsilon: float) -> Any:
     return settings
 
 
-@intrinsic
-def _pointer(typingctx: Any, address: Any) -> Any:
-    """An address (integer) as a pointer."""
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.inttoptr(args[0], cgutils.voidptr_t)
-
-    return types.voidptr(types.int64), generate
-
-
-@intrinsic
-def _address(typingctx: Any, pointer: Any) -> Any:
-    """A pointer as an address (integer)."""
-
-    def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-        return builder.ptrtoint(args[0], cgutils.intp_t)
-
-    return types.int64(types.voidptr), generate
-
-
 @lru_cache(maxsize=1)
-def _callbacks() -> tuple[Any, Any]:
+def _callbacks() -> tuple[CFunc, CFunc]:
     """The force and the log for the rebound that is installed."""
-    sim, particle = rebound.Simulation, rebound.Particle
-    return _compile(
-        sim.t.offset,
-        sim._particles.offset,
-        sim.extras.offset,
-        particle.x.offset // 8,
-        particle.vx.offset // 8,
-        particle.ax.offset // 8,
-    )
+    return _compile(layout())
 
 
-def _compile(at_t: int, at_p: int, at_model: int, x: int, v: int, a: int) -> tuple[Any, Any]:
-    # The offsets are closure variables: they are part of the key of numba's cache on disk.
-    words = max(x, v, a) + 3
+def _compile(at: Layout) -> tuple[CFunc, CFunc]:
+    # The layout is a closure variable: it is part of the key of numba's cache on disk.
+    x, v, a = at.x, at.v, at.a
 
-    @cfunc(types.void(types.voidptr), cache=CACHE)
-    def force(sim: Any) -> None:
-        base: int = _address(sim)  # type: ignore[call-arg]
-        t = carray(_pointer(base + at_t), 1, np.float64)[0]
-        particle = carray(_pointer(carray(_pointer(base + at_p), 1, np.int64)[0]), words, np.float64)
-        where = carray(_pointer(base + at_model), 1, np.int64)[0]
-        size = int(carray(_pointer(where), 1, np.float64)[0])
-        model = carray(_pointer(where), size, np.float64)
+    @cfunc(CALLBACK, cache=CACHE)
+    def force(sim: int) -> None:
+        t, particles, model, _ = under_way(sim, at, 1)
+        particle = particles[0]
         out = np.empty(3)
         acceleration(model, t, particle[x : x + 3], particle[v : v + 3], out)
         for j in range(3):
             particle[a + j] += out[j]
 
-    @cfunc(types.void(types.voidptr), cache=CACHE)
-    def log(sim: Any) -> None:
-        base: int = _address(sim)  # type: ignore[call-arg]
-        t = carray(_pointer(base + at_t), 1, np.float64)[0]
-        particle = carray(_pointer(carray(_pointer(base + at_p), 1, np.int64)[0]), words, np.float64)
-        where = carray(_pointer(base + at_model), 1, np.int64)[0]
-        size = int(carray(_pointer(where), 1, np.float64)[0])
-        model = carray(_pointer(where), size, np.float64)
+    @cfunc(CALLBACK, cache=CACHE)
+    def log(sim: int) -> None:
+        t, particles, model, _ = under_way(sim, at, 1)
+        particle = particles[0]
         n = int(model[LOG_COUNT])
         model[LOG_COUNT] = n + 1
         if n >= int(model[LOG_ROWS]):
             return
-        row = carray(_pointer(int(model[LOG_ADDRESS]) + 8 * LOG_WIDTH * n), LOG_WIDTH, np.float64)
-        row[0] = t
+        row = numbers_at(int(model[LOG_ADDRESS]) + 8 * LOG_WIDTH * n, LOG_WIDTH)
+        row[TIME] = t
         for j in range(3):
-            row[1 + j] = particle[x + j]
-            row[4 + j] = particle[v + j]
-        acceleration(model, t, particle[x : x + 3], particle[v : v + 3], row[7:10])
+            row[POSITION + j] = particle[x + j]
+            row[VELOCITY + j] = particle[v + j]
+        acceleration(model, t, particle[x : x + 3], particle[v : v + 3], row[ACCELERATION:])
 
     return force, log
 
 
-def simulation(t: float, states: Array, epsilon: float, memory: Array, force: Any) -> Any:
+def simulation(t: float, states: Array, epsilon: float, memory: Array, force: CFunc) -> rebound.Simulation:
     """A simulation of test particles at `t` (s) with states (n, 6), m and m/s, moved by a compiled force alone.
 
     The force reads `memory`, which has to live as long as the simulation.
@@ -188,7 +150,7 @@ class Flight:
             self._model[LOG_ROWS] = 0
             if count <= rows:
                 out = out[:count]
-                return out[np.concatenate([[True], np.diff(out[:, 0]) != 0.0])]
+                return out[np.concatenate([[True], np.diff(out[:, TIME]) != 0.0])]
             # The log was too short: integrate again with a longer one.
             self._sim, rows = Flight(self._model, start, state, self._epsilon)._sim, 2 * count
             self._sim.extras = self._model.ctypes.data

@@ -178,7 +178,7 @@ class Orbit(OsculatingState):
         forces = without_itself(default_forces(self, *BODIES), self, window)
         found, error = derivatives(
             model(window, forces, self.nongrav),
-            self.nongrav.row,
+            self.nongrav.parameters,
             0.0,
             self.barycentric(window),
             window.states(BODIES.index("sun"), np.zeros(1))[0],

@@ -83,7 +83,7 @@ def test_area_over_mass_of_find_orb_and_of_orbfit(tmp_path):
     path.write_text(text("2018VP1.eq0").replace("LSP   0  0    6", "LSP   1  2    6") + " NGR  2.0 -1e-4\n")
     (b,) = catalogue(path)
     assert b.orbit.nongrav.area_to_mass == pytest.approx(2e-3 * 1370.0 / 1361.0)
-    assert b.orbit.nongrav.row[-1] == pytest.approx(2e-3 * 1370.0 / 299792458.0, rel=1e-9)
+    assert b.orbit.nongrav.parameters.pressure == pytest.approx(2e-3 * 1370.0 / 299792458.0, rel=1e-9)
     assert float(b.row["A2_au_d2"]) == pytest.approx(-1e-14, rel=1e-15)
     document = json.loads(text("2020AB.json"))
     for part in ("CAR", "COM"):

@@ -35,7 +35,16 @@ def by_the_search(orbit, time):
     there, change = np.empty((1, 6)), np.empty((1, 6, 11))
     state = orbit.barycentric(window)
     reached = carry_with_deviations(
-        acting, orbit.nongrav.row, 0.0, state, np.array([t]), 1e-14, empty_room(), np.eye(5), there, change
+        acting,
+        orbit.nongrav.parameters,
+        0.0,
+        state,
+        np.array([t]),
+        1e-14,
+        empty_room(),
+        np.eye(5),
+        there,
+        change,
     )
     assert reached == 1
     return change[0]

@@ -7,14 +7,15 @@ the sums over bodies.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from flybystab.constants import C_LIGHT
 from flybystab.core.numerics.jit import borrowed, kernel, pasted_kernel
-from flybystab.orbit import forces as table
 from flybystab.orbit.almanac import (
+    AT_SUN,
     C_BELT,
     C_FAST,
     C_HEAVY,
@@ -26,18 +27,44 @@ from flybystab.orbit.almanac import (
     N_HEAVY,
     N_SLOW,
     SLOT,
+    SUN_VELOCITY,
     Almanac,
     Places,
     almanac,
     find_heavy,
     find_places,
+    has_belt,
 )
-from flybystab.orbit.ephemeris import BODIES, SUN, Window
-from flybystab.orbit.forces import core, fade, model, push, zonal_factors
+from flybystab.orbit.ephemeris import BODIES, N_BODIES, SUN, Window
+from flybystab.orbit.forces import core, fade, force_model, zonal_factors
+from flybystab.orbit.nongravitational import NonGravitationalParameters, acts, add_nongravitational
 from flybystab.orbit.relativity import of_source
 from flybystab.typing import Array
 
 _SUN = int(SLOT[SUN])
+
+
+#: Zonal harmonics of a body: grid (0 fast, 1 slow) and slot of its position, ``J2 GM a^2`` (m5/s2) and so on, pole at
+#: t = 0 and its rate (1/s), square of the radius of the smooth core (m2).
+ZONAL = np.dtype(
+    (
+        np.record,
+        [
+            ("grid", "i8"),
+            ("slot", "i8"),
+            ("j2", "f8"),
+            ("j3", "f8"),
+            ("j4", "f8"),
+            ("pole_x", "f8"),
+            ("pole_y", "f8"),
+            ("pole_z", "f8"),
+            ("rate_x", "f8"),
+            ("rate_y", "f8"),
+            ("rate_z", "f8"),
+            ("inner2", "f8"),
+        ],
+    )
+)
 
 
 class Field(NamedTuple):
@@ -48,14 +75,13 @@ class Field(NamedTuple):
     book : Almanac
     gm_fast, gm_slow, gm_belt : ndarray
         GM (m3/s2) in use per slot; zero: left out.
-    inner_fast, inner_slow : ndarray
-        Square of the radius of the smooth core per slot, m2; ``nothing`` is zeros, for the asteroids.
-    flat : ndarray, shape (n, 12)
-        Bodies with zonal harmonics: grid (0 fast, 1 slow), slot, ``J2 GM a^2`` (m5/s2), pole at t = 0, rate of the
-        pole (1/s), ``J3 GM a^3``, ``J4 GM a^4``, square of the radius of the core (m2).
+    inner_fast, inner_slow, inner_belt : ndarray
+        Square of the radius of the smooth core per slot, m2; zero for asteroids.
+    zonal : ndarray of ZONAL
+        Bodies with zonal harmonics.
     gm_pn : float
         GM of the Sun with 1PN, else zero.
-    heavy : ndarray, shape (2, N_HEAVY)
+    gm_heavy, inner_heavy : ndarray, shape (N_HEAVY,)
         GM in use of ``HEAVY``, and the square of the radius (m2) inside of which each is left out of relativity.
     head, data, gm : ndarray
         The ephemeris itself, for positions without interpolation error.
@@ -67,10 +93,11 @@ class Field(NamedTuple):
     gm_belt: Array
     inner_fast: Array
     inner_slow: Array
-    nothing: Array
-    flat: Array
+    inner_belt: Array
+    zonal: NDArray[Any]
     gm_pn: float
-    heavy: Array
+    gm_heavy: Array
+    inner_heavy: Array
     head: Array
     data: Array
     gm: Array
@@ -83,35 +110,34 @@ def field(window: Window, forces: Iterable[str]) -> Field:
     ------
     UnknownName
     """
-    flat_model = model(window, forces)
-    used = flat_model[table._USED : table._DATA]
-    inner = flat_model[table._INNER : table._FLAT] ** 2
+    its = force_model(window, forces)
+    used, inner2 = its.used[:N_BODIES], its.inner[:N_BODIES] ** 2
     grids = [np.zeros(N_FAST), np.zeros(N_SLOW)]
     inners = [np.zeros(N_FAST), np.zeros(N_SLOW)]
-    for b in range(len(BODIES)):
+    for b in range(N_BODIES):
         grids[GRID[b]][SLOT[b]] = used[b]
-        inners[GRID[b]][SLOT[b]] = inner[b]
-    belt = used[len(BODIES) :]
-    rows = []
-    for b in range(len(BODIES)):
-        at = table._FLAT + table.FLAT_WIDTH * b
-        numbers = flat_model[at : at + table.FLAT_WIDTH]
-        if numbers[[0, 7, 8]].any():
-            rows.append([float(GRID[b]), float(SLOT[b]), *numbers, inner[b]])
+        inners[GRID[b]][SLOT[b]] = inner2[b]
+    belt = its.used[N_BODIES:]
+    zonal = [
+        (GRID[b], SLOT[b], *its.harmonics[b], *its.poles[b], inner2[b])
+        for b in np.flatnonzero(its.harmonics.any(axis=1))
+    ]
+    heavy = [BODIES.index(name) for name in HEAVY]
     return Field(
-        almanac(window, bool(belt.any())),
-        grids[0],
-        grids[1],
-        belt.copy(),
-        inners[0],
-        inners[1],
-        np.zeros(N_BELT),
-        np.array(rows).reshape(-1, 3 + table.FLAT_WIDTH),
-        float(window.gm[SUN]) if flat_model[2] != 0.0 else 0.0,
-        np.array([used[: len(BODIES)], inner])[:, [BODIES.index(name) for name in HEAVY]],
-        window.head,
-        window.data,
-        window.gm,
+        book=almanac(window, bool(belt.any())),
+        gm_fast=grids[0],
+        gm_slow=grids[1],
+        gm_belt=belt.copy(),
+        inner_fast=inners[0],
+        inner_slow=inners[1],
+        inner_belt=np.zeros(N_BELT),
+        zonal=np.array(zonal, dtype=ZONAL),
+        gm_pn=float(window.gm[SUN]) if its.relativity else 0.0,
+        gm_heavy=used[heavy],
+        inner_heavy=inner2[heavy],
+        head=window.head,
+        data=window.data,
+        gm=window.gm,
     )
 
 
@@ -132,10 +158,11 @@ def borrowed_field(f: Field) -> Field:
         borrowed(f.gm_belt),
         borrowed(f.inner_fast),
         borrowed(f.inner_slow),
-        borrowed(f.nothing),
-        borrowed(f.flat),
+        borrowed(f.inner_belt),
+        borrowed(f.zonal),
         f.gm_pn,
-        borrowed(f.heavy),
+        borrowed(f.gm_heavy),
+        borrowed(f.inner_heavy),
         borrowed(f.head),
         borrowed(f.data),
         borrowed(f.gm),
@@ -183,24 +210,116 @@ def _pull_inside(p: Array, slots: int, gm: Array, inner: Array, x: Array, out: A
             out[5] += c * dz
 
 
-@kernel
-def _push(law: Array, y: Array, places: Places, out: Array) -> None:
-    """Add the non-gravitational acceleration (m/s2) to ``out[3:6]``."""
-    r = np.empty(3)
-    w = np.empty(3)
+@pasted_kernel
+def heliocentric(y: Array, places: Places, r: Array, v: Array) -> None:
+    """Write position ``r[3]`` (m) and velocity ``v[3]`` (m/s) relative to the Sun."""
     for j in range(3):
         r[j] = y[j] - places.slow[j * N_SLOW + _SUN]
-        w[j] = y[3 + j] - places.fast[3 * N_FAST + j]
-    push(law, r, w, out[3:])
+        v[j] = y[3 + j] - places.fast[SUN_VELOCITY + j]
+
+
+@kernel
+def _add_nongravitational(law: NonGravitationalParameters, y: Array, places: Places, out: Array) -> None:
+    """Add the non-gravitational acceleration (m/s2) to ``out[3:6]``."""
+    r = np.empty(3)
+    v = np.empty(3)
+    heliocentric(y, places, r, v)
+    add_nongravitational(law, r, v, out[3:])
 
 
 @pasted_kernel
-def rate(field: Field, law: Array, t: float, y: Array, places: Places, out: Array) -> None:
+def _oblate_pull(
+    field: Field, t: float, places: Places, x: float, y: float, z: float, ax: float, ay: float, az: float
+) -> tuple[float, float, float]:
+    """Add the acceleration (m/s2) by zonal harmonics at ``x, y, z`` (m) to ``ax, ay, az``."""
+    for i in range(field.zonal.shape[0]):
+        body = field.zonal[i]
+        p, slots = (places.fast, N_FAST) if body.grid == 0 else (places.slow, N_SLOW)
+        s = body.slot
+        dx = x - p[s]
+        dy = y - p[slots + s]
+        dz = z - p[slots + slots + s]
+        r2 = dx * dx + dy * dy + dz * dz
+        d = np.sqrt(r2)
+        px, py, pz = (
+            body.pole_x + t * body.rate_x,
+            body.pole_y + t * body.rate_y,
+            body.pole_z + t * body.rate_z,
+        )
+        sine = (dx * px + dy * py + dz * pz) / d
+        w = 1.0 if r2 > body.inner2 else fade(r2 / body.inner2)
+        radial, along = zonal_factors(w * body.j2, w * body.j3, w * body.j4, d, sine)
+        ax += radial * dx + along * px
+        ay += radial * dy + along * py
+        az += radial * dz + along * pz
+    return ax, ay, az
+
+
+@pasted_kernel
+def _relativistic_sources(
+    field: Field,
+    places: Places,
+    px: float,
+    py: float,
+    pz: float,
+    vx: float,
+    vy: float,
+    vz: float,
+) -> tuple[float, float, float]:
+    """Sum of the terms of the sources in ``c^2`` times the 1PN acceleration, m3/s4; the Sun first.
+
+    ``places.heavy`` has been found for this time.
+    """
+    fast, slow, q = places.fast, places.slow, places.heavy
+    ex, ey, ez = of_source(
+        field.gm_pn,
+        px - slow[_SUN],
+        py - slow[N_SLOW + _SUN],
+        pz - slow[2 * N_SLOW + _SUN],
+        fast[SUN_VELOCITY],
+        fast[SUN_VELOCITY + 1],
+        fast[SUN_VELOCITY + 2],
+        q[AT_SUN],
+        q[AT_SUN + 1],
+        q[AT_SUN + 2],
+        q[AT_SUN + 3],
+        vx,
+        vy,
+        vz,
+    )
+    for i in range(N_HEAVY):
+        dx, dy, dz = px - q[i], py - q[N_HEAVY + i], pz - q[2 * N_HEAVY + i]
+        bx, by, bz = of_source(
+            0.0 if dx * dx + dy * dy + dz * dz < field.inner_heavy[i] else field.gm_heavy[i],
+            dx,
+            dy,
+            dz,
+            q[3 * N_HEAVY + i],
+            q[4 * N_HEAVY + i],
+            q[5 * N_HEAVY + i],
+            q[6 * N_HEAVY + i],
+            q[7 * N_HEAVY + i],
+            q[8 * N_HEAVY + i],
+            q[9 * N_HEAVY + i],
+            vx,
+            vy,
+            vz,
+        )
+        ex += bx
+        ey += by
+        ez += bz
+    return ex, ey, ez
+
+
+@pasted_kernel
+def rate(
+    field: Field, law: NonGravitationalParameters, t: float, y: Array, places: Places, out: Array
+) -> None:
     """Write velocity and acceleration at ``t`` (s), ``y[6]`` into ``out[6]``, and positions of bodies into ``places``.
 
-    ``law`` is :attr:`flybystab.orbit.forces.NonGravitational.row`; zeros without non-gravitational acceleration.
+    ``law`` is :data:`flybystab.orbit.nongravitational.NONE` without non-gravitational acceleration.
     """
-    belt = field.book.when[2, 2] > 0.0
+    belt = has_belt(field.book)
     find_places(field.book, t, belt, places)
     fast, slow = places.fast, places.slow
     px, py, pz, vx, vy, vz = y[0], y[1], y[2], y[3], y[4], y[5]
@@ -212,66 +331,14 @@ def rate(field: Field, law: Array, t: float, y: Array, places: Places, out: Arra
     potential += other
     gx, gy, gz = ax, ay, az
     if belt:
-        bx, by, bz, _, _ = _pull(places.belt, N_BELT, field.gm_belt, field.nothing, px, py, pz)
+        bx, by, bz, _, _ = _pull(places.belt, N_BELT, field.gm_belt, field.inner_belt, px, py, pz)
         ax += bx
         ay += by
         az += bz
-    for i in range(field.flat.shape[0]):
-        row = field.flat[i]
-        p, slots = (fast, N_FAST) if row[0] == 0.0 else (slow, N_SLOW)
-        s = int(row[1])
-        dx = px - p[s]
-        dy = py - p[slots + s]
-        dz = pz - p[slots + slots + s]
-        r2 = dx * dx + dy * dy + dz * dz
-        d = np.sqrt(r2)
-        polar_x, polar_y, polar_z = row[3] + t * row[6], row[4] + t * row[7], row[5] + t * row[8]
-        z = (dx * polar_x + dy * polar_y + dz * polar_z) / d
-        w = 1.0 if r2 > row[11] else fade(r2 / row[11])
-        a, b = zonal_factors(w * row[2], w * row[9], w * row[10], d, z)
-        ax += a * dx + b * polar_x
-        ay += a * dy + b * polar_y
-        az += a * dz + b * polar_z
+    ax, ay, az = _oblate_pull(field, t, places, px, py, pz, ax, ay, az)
     if field.gm_pn != 0.0:
         find_heavy(field.book, t, places)
-        q = places.heavy
-        ex, ey, ez = of_source(
-            field.gm_pn,
-            px - slow[_SUN],
-            py - slow[N_SLOW + _SUN],
-            pz - slow[2 * N_SLOW + _SUN],
-            fast[3 * N_FAST],
-            fast[3 * N_FAST + 1],
-            fast[3 * N_FAST + 2],
-            q[10 * N_HEAVY],
-            q[10 * N_HEAVY + 1],
-            q[10 * N_HEAVY + 2],
-            q[10 * N_HEAVY + 3],
-            vx,
-            vy,
-            vz,
-        )
-        for i in range(N_HEAVY):
-            dx, dy, dz = px - q[i], py - q[N_HEAVY + i], pz - q[2 * N_HEAVY + i]
-            bx, by, bz = of_source(
-                0.0 if dx * dx + dy * dy + dz * dz < field.heavy[1, i] else field.heavy[0, i],
-                dx,
-                dy,
-                dz,
-                q[3 * N_HEAVY + i],
-                q[4 * N_HEAVY + i],
-                q[5 * N_HEAVY + i],
-                q[6 * N_HEAVY + i],
-                q[7 * N_HEAVY + i],
-                q[8 * N_HEAVY + i],
-                q[9 * N_HEAVY + i],
-                vx,
-                vy,
-                vz,
-            )
-            ex += bx
-            ey += by
-            ez += bz
+        ex, ey, ez = _relativistic_sources(field, places, px, py, pz, vx, vy, vz)
         a = vx * vx + vy * vy + vz * vz - 4.0 * potential
         b = -4.0 * (gx * vx + gy * vy + gz * vz)
         ax += (a * gx + b * vx + ex) / (C_LIGHT * C_LIGHT)
@@ -281,14 +348,16 @@ def rate(field: Field, law: Array, t: float, y: Array, places: Places, out: Arra
     if n + m > 0:
         _pull_inside(fast, N_FAST, field.gm_fast, field.inner_fast, y, out)
         _pull_inside(slow, N_SLOW, field.gm_slow, field.inner_slow, y, out)
-    if law[0] != 0.0 or law[1] != 0.0 or law[2] != 0.0 or law[9] != 0.0:
-        _push(law, y, places, out)
+    if acts(law):
+        _add_nongravitational(law, y, places, out)
 
 
 @kernel
-def first_rate(field: Field, law: Array, t: float, y: Array, places: Places, out: Array) -> None:
+def first_rate(
+    field: Field, law: NonGravitationalParameters, t: float, y: Array, places: Places, out: Array
+) -> None:
     """`rate` as a kernel of its own, for the start of an integration: it is compiled once instead of once a caller."""
     rate(field, law, t, y, places, out)
 
 
-__all__ = ["Field", "borrowed_field", "empty_places", "field", "first_rate", "rate"]
+__all__ = ["ZONAL", "Field", "borrowed_field", "empty_places", "field", "first_rate", "heliocentric", "rate"]

@@ -10,6 +10,7 @@ from flybystab.constants import DAY
 from flybystab.core.numerics.dop853 import N_STAGES, NODE, error_norm, error_sums, stage_state_6
 from flybystab.core.numerics.jit import borrowed, kernel, pasted_kernel, summing_kernel
 from flybystab.orbit.almanac import Places
+from flybystab.orbit.nongravitational import NonGravitationalParameters
 from flybystab.orbit.search.acceleration import Field, empty_places, rate
 from flybystab.typing import Array
 
@@ -43,7 +44,14 @@ def borrowed_room(room: Room) -> Room:
 
 @summing_kernel
 def step(
-    field: Field, law: Array, t: float, y: Array, h: float, k: Array, new: Array, places: Places
+    field: Field,
+    law: NonGravitationalParameters,
+    t: float,
+    y: Array,
+    h: float,
+    k: Array,
+    new: Array,
+    places: Places,
 ) -> float:
     """One step from ``y[6]`` at ``t`` over ``h`` s with the rate there in ``k[0]``.
 
@@ -60,7 +68,7 @@ def step(
 @pasted_kernel
 def advance(
     field: Field,
-    law: Array,
+    law: NonGravitationalParameters,
     t: float,
     y: Array,
     h: float,

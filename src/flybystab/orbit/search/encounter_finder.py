@@ -14,41 +14,33 @@ import astropy.units as u
 import numpy as np
 from astropy.time import Time
 from astropy.units import Quantity
+from numpy.typing import NDArray
 
 from flybystab.arguments import check_arguments
 from flybystab.core.numerics.threads import in_order, worker_count
 from flybystab.errors import Impact, InvalidInput, NotConverged
 from flybystab.orbit.ephemeris import BODIES, SUN, Ephemeris
 from flybystab.orbit.epochs import later
+from flybystab.orbit.nongravitational import parameters_of
 from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.orbit_arguments import as_ephemeris
 from flybystab.orbit.planets import PLANETS, Planet, planet
 from flybystab.orbit.predictability import deviations_of
-from flybystab.orbit.search.encounter_table import (
-    ASTEROID,
-    BODY,
-    EDGE,
-    IMPACT,
-    TIME,
-    TIME_AND_STATE,
-    encounter_table,
-    forces_used,
-    in_span,
-)
+from flybystab.orbit.search.encounter_table import EDGE, encounter_table, forces_used, in_span
 from flybystab.orbit.search.entry import entry
 from flybystab.orbit.search.force_selection import N_SHARES
-from flybystab.orbit.search.minima import WIDTH
+from flybystab.orbit.search.minima import FOUND
 from flybystab.orbit.search.neighbours import add_growth
 from flybystab.orbit.search.search_setup import (
     SearchForces,
     SearchSpan,
     initial_states,
-    limits_of,
+    reach_of,
     search_forces,
     search_span,
     search_tolerances,
 )
-from flybystab.orbit.search.track import EXHAUSTED, INSIDE, MAX_STEPS, STALLED, search
+from flybystab.orbit.search.track import EXHAUSTED, INSIDE, MAX_STEPS, STALLED, Reach, search
 from flybystab.progress import check_progress, progress_bar
 from flybystab.result_table import ResultTable
 from flybystab.typing import Array
@@ -138,7 +130,7 @@ def find_encounters(
     start, stop = checked_time(start, "start"), checked_time(stop, "stop")
     _check_options(start, stop, forces, tolerance)
     check_progress(progress)
-    found, reach = _planets_within(planets, within)
+    found, distances = _planets_within(planets, within)
     accuracy = to_si(error, u.m, "error", low=0.0)
     eph = as_ephemeris(ephemeris)
     span, epochs = search_span(rows, start, stop, eph, growth)
@@ -146,35 +138,14 @@ def find_encounters(
     # A tenth: several displacements add up, and passages enlarge them.
     least = 0.1 * accuracy if forces is None and not growth else 0.0
     acting = search_forces(rows, found, forces, least, span.window, epochs, states)
-    limits, floors = limits_of(found, reach)
     tolerances = search_tolerances(span, epochs, accuracy, tolerance, growth)
-    job = _Search(
-        rows, span, acting, epochs, states, limits, floors, tolerances, np.zeros((len(rows), N_SHARES)), {}
-    )
+    shares = np.zeros((len(rows), N_SHARES))
+    job = _Search(rows, span, acting, epochs, states, reach_of(found, distances), tolerances, shares, {})
     raw = _without_early_impacts(job, _integrated(job, workers, progress))
     # A fall into the Sun ends an orbit and is always a row.
-    asked = np.isin(raw[:, BODY], [SUN, *(BODIES.index(b.name) for b in found)])
-    elsewhere = [
-        {
-            "asteroid": rows[int(r[ASTEROID])][0],
-            "planet": BODIES[int(r[BODY])],
-            "time_jd_tdb": later(span.middle, r[TIME]).jd,
-        }
-        for r in raw[~asked]
-    ]
-    raw = raw[asked]
-    kept, share, left_out = forces_used(acting.names, job.shares, least)
-    meta = {
-        "ephemeris": span.window.name,
-        "forces": list(kept),
-        "share_km": share,
-        "left_out_km": left_out,
-        "impacts_elsewhere": elsewhere,
-        "failed": [job.failed[i] for i in sorted(job.failed)],
-        "frame": "ICRF",
-        "time_scale": "TDB",
-        "tolerance": float(tolerances.min(initial=1.0)),
-    }
+    requested = np.isin(raw["body"], [SUN, *(BODIES.index(b.name) for b in found)])
+    meta = _metadata(job, raw[~requested])
+    raw = raw[requested]
     contacts = _contacts(job, raw)
     out = encounter_table(rows, raw, contacts, span.middle, span.window, meta)
     if growth:
@@ -193,7 +164,7 @@ def find_encounters(
 
 
 class _Search(NamedTuple):
-    """A search: orbits (n), span, forces, limits (by body), tolerances, and what the integration adds.
+    """A search: orbits (n), span, forces, distances, tolerances, and the output of the integration.
 
     Attributes
     ----------
@@ -208,8 +179,7 @@ class _Search(NamedTuple):
     forces: SearchForces
     epochs: Array
     states: Array
-    limits: Array
-    floors: Array
+    reach: Reach
     tolerances: Array
     shares: Array
     failed: dict[int, dict[str, str]]
@@ -255,25 +225,27 @@ def _planets_within(planets: Sequence[str], within: Quantity) -> tuple[list[Plan
     return found, np.broadcast_to(reach, (len(found),)).astype(float)
 
 
-def _integrated(job: _Search, workers: int, progress: bool | Callable[[int, int, int], None] | None) -> Array:
+def _integrated(
+    job: _Search, workers: int, progress: bool | Callable[[int, int, int], None] | None
+) -> NDArray[Any]:
     """Rows of all encounters, sorted by asteroid and time."""
     total, own = len(job.rows), job.forces.own
     # Parts small enough for an even load of the threads, large enough for a small overhead of Python.
     size = max(1, min(64, -(-total // (4 * workers)))) if workers > 1 else max(total, 1)
     cuts = sorted({*range(0, total, size), *own, *(i + 1 for i in own), total})
     tasks = [slice(i, j) for i, j in pairwise(cuts)]
-    flat: list[Array] = []
+    flat: list[NDArray[Any]] = []
     with progress_bar(not callable(progress) and progress, total, "orbits", "encounters") as tick:
         for task, parts in zip(tasks, in_order(lambda part: _part(job, part), tasks, workers), strict=True):
             flat += parts
             tick(task.stop)
             if callable(progress):
                 progress(task.stop, total, sum(map(len, flat)))
-    raw = np.concatenate(flat) if flat else np.empty((0, WIDTH))
-    return raw[np.lexsort((raw[:, TIME], raw[:, ASTEROID]))]
+    raw = np.concatenate(flat) if flat else np.empty(0, FOUND)
+    return raw[np.lexsort((raw["time"], raw["asteroid"]))]
 
 
-def _part(job: _Search, part: slice) -> list[Array]:
+def _part(job: _Search, part: slice) -> list[NDArray[Any]]:
     """Rows of the encounters of some of the asteroids, which have one field of forces."""
     forces, span = job.forces, job.span
     tables = (
@@ -285,13 +257,12 @@ def _part(job: _Search, part: slice) -> list[Array]:
     size = len(job.epochs[part])
     i, space, parts = 0, 64 * size + 256, []
     while i < size:
-        out = np.empty((space, WIDTH))
+        out = np.empty(space, FOUND)
         i, n, status, reached = search(
             *tables,
             span.begin,
             span.end,
-            job.limits,
-            job.floors,
+            job.reach,
             job.tolerances[part],
             forces.least,
             forces.always,
@@ -310,42 +281,65 @@ def _part(job: _Search, part: slice) -> list[Array]:
             i += 1
         elif n == 0:
             space *= 4
-        out[:n, ASTEROID] += part.start
+        out["asteroid"][:n] += part.start
         parts.append(out[:n].copy())
     return parts
 
 
-def _without_early_impacts(job: _Search, raw: Array) -> Array:
+def _without_early_impacts(job: _Search, raw: NDArray[Any]) -> NDArray[Any]:
     """Rows within the span; an impact between the epoch of an orbit and the span ends the search of that asteroid."""
     t_start, t_stop = job.span.start, job.span.stop
-    since = np.array([job.epochs[int(i)] for i in raw[:, ASTEROID]])
-    early = (raw[:, TIME] < t_start - EDGE) & (since < t_start)
-    late = (raw[:, TIME] >= t_stop - EDGE) & (since > t_stop)
-    for r in raw[(raw[:, IMPACT] > 0.0) & (early | late)]:
-        i = int(r[ASTEROID])
+    since = np.array([job.epochs[int(i)] for i in raw["asteroid"]])
+    early = (raw["time"] < t_start - EDGE) & (since < t_start)
+    late = (raw["time"] >= t_stop - EDGE) & (since > t_stop)
+    for r in raw[(raw["impact"] != 0) & (early | late)]:
+        i = int(r["asteroid"])
         job.fail(
             i,
             Impact(
-                f"{job.rows[i][0]} meets {BODIES[int(r[BODY])]} at {later(job.span.middle, float(r[TIME])).iso} TDB, "
+                f"{job.rows[i][0]} meets {BODIES[r['body']]} at {later(job.span.middle, float(r['time'])).iso} TDB, "
                 f"between its epoch and the span of the search"
             ),
         )
     return raw[in_span(raw, t_start, t_stop)]
 
 
-def _contacts(job: _Search, raw: Array) -> Array:
+def _metadata(job: _Search, elsewhere: NDArray[Any]) -> dict[str, Any]:
+    """Metadata of the table; `elsewhere` are the impacts on bodies that were not requested."""
+    kept, share, left_out = forces_used(job.forces.names, job.shares, job.forces.least)
+    return {
+        "ephemeris": job.span.window.name,
+        "forces": list(kept),
+        "share_km": share,
+        "left_out_km": left_out,
+        "impacts_elsewhere": [
+            {
+                "asteroid": job.rows[r["asteroid"]][0],
+                "planet": BODIES[r["body"]],
+                "time_jd_tdb": later(job.span.middle, r["time"]).jd,
+            }
+            for r in elsewhere
+        ],
+        "failed": [job.failed[i] for i in sorted(job.failed)],
+        "frame": "ICRF",
+        "time_scale": "TDB",
+        "tolerance": float(job.tolerances.min(initial=1.0)),
+    }
+
+
+def _contacts(job: _Search, raw: NDArray[Any]) -> Array:
     """Time (s) and relative state of each row: closest approach, or entry of an impact."""
-    contacts = raw[:, TIME_AND_STATE].copy()
-    for k in np.flatnonzero(raw[:, IMPACT] > 0.0):
-        i, body = int(raw[k, ASTEROID]), int(raw[k, BODY])
-        sign = 1.0 if raw[k, TIME] >= job.epochs[i] else -1.0
+    contacts = np.column_stack([raw["time"], raw["state"]])
+    for k in np.flatnonzero(raw["impact"] != 0):
+        i, body = int(raw["asteroid"][k]), int(raw["body"][k])
+        sign = 1.0 if raw["time"][k] >= job.epochs[i] else -1.0
         contacts[k, 0], contacts[k, 1:] = entry(
             job.forces.of(i, job.shares[i]),
-            job.forces.laws[i],
+            parameters_of(job.forces.laws[i]),
             job.span.window,
             body,
             raw[k],
-            float(job.floors[body]),
+            float(job.reach.floors[body]),
             sign,
         )
     return contacts

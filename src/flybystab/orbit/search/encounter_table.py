@@ -18,27 +18,18 @@ from flybystab.orbit.target_plane import target_plane
 from flybystab.result_table import ResultTable
 from flybystab.typing import Array
 
-# Columns of the rows that :func:`flybystab.orbit.search.track.search` writes (``minima.WIDTH`` of them).
-BODY = 0  # place in ``BODIES``
-TIME = 1  # s
-STATE = slice(2, 8)  # relative to the body, m and m/s
-TIME_AND_STATE = slice(1, 8)
-DISTANCE = 8  # m
-V_INF2 = 9  # m2/s2; negative for a bound passage
-IMPACT = 10  # 0 or 1
-ASTEROID = 11
-
 #: A passage this close to an end of the span counts at `start` and not at `stop`, s. It exceeds the error of the time,
 #: so that exactly one of two adjacent spans contains the passage.
 EDGE = 1.0
 
 
-def in_span(raw: Array, t_start: float, t_stop: float) -> NDArray[np.bool_]:
-    """Rows of a sorted result inside the span, each passage once where the epoch of an orbit lies at it."""
-    keep = (raw[:, TIME] >= t_start - EDGE) & (raw[:, TIME] < t_stop - EDGE)
-    same = (
-        (np.diff(raw[:, TIME]) < EDGE) & (np.diff(raw[:, ASTEROID]) == 0.0) & (np.diff(raw[:, BODY]) == 0.0)
-    )
+def in_span(raw: NDArray[Any], t_start: float, t_stop: float) -> NDArray[np.bool_]:
+    """Rows of a sorted result inside the span; each passage once, also where the epoch of an orbit lies at it.
+
+    `raw` is an array of :data:`flybystab.orbit.search.minima.FOUND`.
+    """
+    keep = (raw["time"] >= t_start - EDGE) & (raw["time"] < t_stop - EDGE)
+    same = (np.diff(raw["time"]) < EDGE) & (np.diff(raw["asteroid"]) == 0) & (np.diff(raw["body"]) == 0)
     keep[1:] &= ~same
     return keep
 
@@ -56,26 +47,26 @@ def forces_used(
 
 def encounter_table(
     rows: list[tuple[str, Orbit]],
-    raw: Array,
+    raw: NDArray[Any],
     contacts: Array,
     origin: Time,
     window: Window,
     meta: dict[str, Any],
 ) -> ResultTable:
     """Table of encounters; `contacts` holds times (s) and relative states of closest approaches or entries."""
-    index = raw[:, ASTEROID].astype(int)
-    gm = window.gm[raw[:, BODY].astype(int)]
-    hits = raw[:, IMPACT] > 0.0
-    speed2 = raw[:, V_INF2] + 2.0 * gm / raw[:, DISTANCE]
-    b, _ = target_plane(raw[:, STATE], gm)
+    index = raw["asteroid"].copy()
+    gm = window.gm[raw["body"]]
+    hits = raw["impact"] != 0
+    speed2 = raw["v_inf2"] + 2.0 * gm / raw["distance"]
+    b, _ = target_plane(raw["state"], gm)
     out = ResultTable()
     out["asteroid"] = np.array([rows[i][0] for i in index], dtype=str)
-    out["planet"] = np.array([BODIES[int(k)] for k in raw[:, BODY]], dtype=str)
+    out["planet"] = np.array([BODIES[k] for k in raw["body"]], dtype=str)
     zero = origin.tdb
-    out["time"] = Time(np.full(len(raw), zero.jd1), zero.jd2 + raw[:, TIME] / DAY, format="jd", scale="tdb")
-    out["distance"] = (raw[:, DISTANCE] * u.m).to(u.km)
+    out["time"] = Time(np.full(len(raw), zero.jd1), zero.jd2 + raw["time"] / DAY, format="jd", scale="tdb")
+    out["distance"] = (raw["distance"] * u.m).to(u.km)
     out["v_rel"] = (np.sqrt(np.maximum(speed2, 0.0)) * u.m / u.s).to(u.km / u.s)
-    out["v_inf"] = (np.sqrt(np.maximum(raw[:, V_INF2], 0.0)) * u.m / u.s).to(u.km / u.s)
+    out["v_inf"] = (np.sqrt(np.maximum(raw["v_inf2"], 0.0)) * u.m / u.s).to(u.km / u.s)
     out["b_t"], out["b_r"] = (b[:, 0] * u.m).to(u.km), (b[:, 1] * u.m).to(u.km)
     out["impact"] = hits
     out["index"] = index

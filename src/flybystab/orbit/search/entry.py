@@ -6,6 +6,7 @@ import numpy as np
 
 from flybystab.orbit.ephemeris import Window
 from flybystab.orbit.kepler import time_at_distance
+from flybystab.orbit.nongravitational import NonGravitationalParameters
 from flybystab.orbit.search.acceleration import Field
 from flybystab.orbit.search.dop853 import empty_room
 from flybystab.orbit.search.minima import two_body
@@ -14,7 +15,13 @@ from flybystab.typing import Array
 
 
 def entry(
-    field: Field, law: Array, window: Window, body: int, row: Array, floor: float, sign: float
+    field: Field,
+    law: NonGravitationalParameters,
+    window: Window,
+    body: int,
+    row: np.void,
+    floor: float,
+    sign: float,
 ) -> tuple[float, Array]:
     """First contact of an impact that a search has found.
 
@@ -23,13 +30,13 @@ def entry(
 
     Parameters
     ----------
-    field, law : Field, ndarray (10,)
+    field, law : Field, NonGravitationalParameters
         Forces of the search.
     window : Window
     body : int
         Place in ``BODIES``.
-    row : ndarray, shape (WIDTH,)
-        Raw row of the impact: periapsis time (s) of the two-body orbit and the state (m, m/s) before the impact.
+    row : record of FOUND
+        The impact: periapsis time (s) of the two-body orbit and the state (m, m/s) before it.
     floor : float
         Distance of contact, m.
     sign : float
@@ -42,10 +49,10 @@ def entry(
     ndarray, shape (6,)
         State relative to the body, m and m/s.
     """
-    gm, state = float(window.gm[body]), row[2:8]
+    gm, state = float(window.gm[body]), row["state"]
     q, ahead, energy = two_body(gm, state)
     inbound = sign * float(state[:3] @ state[3:]) < 0.0 and np.isfinite(ahead)
-    start = float(row[1]) - (sign * ahead if inbound else 0.0)
+    start = float(row["time"]) - (sign * ahead if inbound else 0.0)
     last = time_at_distance(gm, q, q * energy / gm, floor)
     t = start + sign * (ahead - last) if inbound and np.isfinite(last) else start
     origin = state + window.states(body, np.array([start]))[0]

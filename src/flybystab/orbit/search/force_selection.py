@@ -10,10 +10,23 @@ import numpy as np
 
 from flybystab.constants import C_LIGHT
 from flybystab.core.numerics.jit import kernel
-from flybystab.orbit.almanac import FAST, N_BELT, N_FAST, N_SLOW, SLOT, SLOW, Almanac, Places, find_places
+from flybystab.orbit.almanac import (
+    BELT_GRID,
+    FAST,
+    N_BELT,
+    N_FAST,
+    N_SLOW,
+    PIECES,
+    SLOT,
+    SLOW,
+    Almanac,
+    Places,
+    find_places,
+    has_belt,
+)
 from flybystab.orbit.ephemeris import BELT, SUN
 from flybystab.orbit.kepler import two_body
-from flybystab.orbit.search.acceleration import Field
+from flybystab.orbit.search.acceleration import Field, heliocentric
 from flybystab.typing import Array
 
 N_SHARES = N_FAST + N_SLOW + N_BELT + 1
@@ -45,12 +58,10 @@ def shares_along(field: Field, t0: float, y: Array, t_end: float, places: Places
         In the order of ``NAMES``.
     """
     gm = field.gm[SUN]
-    belt = field.book.when[2, 2] > 0.0
+    belt = has_belt(field.book)
     find_places(field.book, t0, belt, places)
     s = np.empty(6)
-    for j in range(3):
-        s[j] = y[j] - places.slow[j * N_SLOW + _SUN]
-        s[3 + j] = y[3 + j] - places.fast[3 * N_FAST + j]
+    heliocentric(y, places, s[:3], s[3:])
     total = np.zeros(N_SHARES)
     x = np.empty(3)
     dt = (t_end - t0) / _POINTS
@@ -103,7 +114,7 @@ def reduced(field: Field, share: Array, least: float, always: Array) -> Field:
             any_belt = True
     when = field.book.when.copy()
     if not any_belt:
-        when[2, 2] = 0.0
+        when[BELT_GRID, PIECES] = 0.0
     book = field.book
     return Field(
         Almanac(when, book.fast, book.slow, book.belt, book.heavy),
@@ -112,10 +123,11 @@ def reduced(field: Field, share: Array, least: float, always: Array) -> Field:
         belt,
         field.inner_fast,
         field.inner_slow,
-        field.nothing,
-        field.flat,
+        field.inner_belt,
+        field.zonal,
         field.gm_pn if share[N_SHARES - 1] >= least else 0.0,
-        field.heavy,
+        field.gm_heavy,
+        field.inner_heavy,
         field.head,
         field.data,
         field.gm,

@@ -7,23 +7,46 @@ The distance from the chord between the ends of a step, less the largest deviati
 
 from __future__ import annotations
 
-import numpy as np
+from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
+
+from flybystab.core.numerics.dop853 import N_STAGES
 from flybystab.core.numerics.jit import kernel
 from flybystab.orbit.almanac import Places
-from flybystab.orbit.closest_approach import between
+from flybystab.orbit.closest_approach import STATE, TIME, between
 from flybystab.orbit.ephemeris import BODIES, body_state
 from flybystab.orbit.kepler import time_at_distance
+from flybystab.orbit.nongravitational import NonGravitationalParameters
 from flybystab.orbit.planets import PLANETS
 from flybystab.orbit.search.acceleration import Field
 from flybystab.orbit.search.dop853 import step
 from flybystab.typing import Array
 
-#: Columns of a raw result: body, time (s), state relative to the body (6; m, m/s), distance (m), v_inf^2
-#: (m2/s2), impact (0, 1), asteroid.
-WIDTH = 12
+#: An encounter: place of the body in ``BODIES``; time of the minimum (s), state relative to the body (m, m/s) and
+#: distance (m) then; square of the hyperbolic excess speed (m2/s2; negative for a bound passage); whether it is an
+#: impact; number of the asteroid. The state of an impact is that at the last step outside the body; its time and
+#: distance are those of the periapsis of the two-body orbit through that state. (np.record: fields are attributes in
+#: uncompiled kernels, too.)
+FOUND = np.dtype(
+    (
+        np.record,
+        [
+            ("body", "i8"),
+            ("time", "f8"),
+            ("state", "f8", 6),
+            ("distance", "f8"),
+            ("v_inf2", "f8"),
+            ("impact", "i8"),
+            ("asteroid", "i8"),
+        ],
+    )
+)
 #: Intervals in which ``r.v`` is sampled: usual, and for slow relative motion, where it can change sign twice.
 _CUTS, FINE = 8, 64
+#: Precision of the sampled time of a minimum, and of the refined one, s.
+_SAMPLED, _REFINED = 1e-3, 1e-5
 #: Upper bound of the acceleration of each of ``BODIES``, m/s2: GM_sun over the square of the perihelion distance for
 #: an eccentricity of 0.3, and for the Moon the Earth's pull (0.0029); the Sun's is below 1e-5.
 BENDING = np.array(
@@ -54,7 +77,10 @@ def chord_distance(a: Array, pa: Array, b: Array, pb: Array) -> float:
 
 @kernel
 def relative_state(field: Field, pair: Array, body: int, t: float, out: Array, work: Array) -> float:
-    """Write the state (m, m/s) relative to a body at ``t`` on the quintic into ``out[6]``; ``r.v`` (m2/s)."""
+    """Write the state (m, m/s) relative to a body at ``t`` on the quintic into ``out[6]``; returns ``r.v`` (m2/s).
+
+    ``pair[2, LOG_WIDTH]`` are the ends of the step in order of time, as rows of a log.
+    """
     between(pair, 0, t, out)
     body_state(field.head, field.data, field.gm, body, t, work)
     for j in range(6):
@@ -64,10 +90,10 @@ def relative_state(field: Field, pair: Array, body: int, t: float, out: Array, w
 
 @kernel
 def end_state(field: Field, pair: Array, end: int, body: int, out: Array, work: Array) -> float:
-    """The same at an end of the step, without interpolation."""
-    body_state(field.head, field.data, field.gm, body, pair[end, 0], work)
+    """As `relative_state` at an end of the step, without interpolation."""
+    body_state(field.head, field.data, field.gm, body, pair[end, TIME], work)
     for j in range(6):
-        out[j] = pair[end, 1 + j] - work[j]
+        out[j] = pair[end, STATE.start + j] - work[j]
     return out[0] * out[3] + out[1] * out[4] + out[2] * out[5]
 
 
@@ -77,7 +103,7 @@ def cuts(field: Field, pair: Array, body: int) -> int:
     a, b, work = np.empty(6), np.empty(6), np.empty(6)
     end_state(field, pair, 0, body, a, work)
     end_state(field, pair, 1, body, b, work)
-    h = pair[1, 0] - pair[0, 0]
+    h = pair[1, TIME] - pair[0, TIME]
     ra = rb = va = vb = bend = 0.0
     for j in range(3):
         ra += a[j] ** 2
@@ -91,11 +117,19 @@ def cuts(field: Field, pair: Array, body: int) -> int:
 
 @kernel
 def refine(
-    field: Field, law: Array, t0: float, y0: Array, k: Array, body: int, t: float, out: Array, places: Places
+    field: Field,
+    law: NonGravitationalParameters,
+    t0: float,
+    y0: Array,
+    k: Array,
+    body: int,
+    t: float,
+    out: Array,
+    places: Places,
 ) -> float:
-    """Time of ``r.v = 0`` near ``t`` on the path through ``y0`` at ``t0``; relative state in ``out``.
+    """Time of ``r.v = 0`` near ``t`` on the path through ``y0`` at ``t0``; writes the relative state into ``out``.
 
-    ``k[0]`` holds the rate at ``t0``; the other rows are overwritten.
+    ``k[0]`` holds the rate at ``t0``; the other rows are overwritten. Newton's method.
     """
     y = np.empty(6)
     p = np.empty((3, 6))
@@ -113,12 +147,12 @@ def refine(
             out[3 + j] = y[3 + j] - p[1, 3 + j]
             rv += out[j] * out[3 + j]
             v2 += out[3 + j] ** 2
-            slope += out[j] * (k[12, 3 + j] - (p[2, 3 + j] - p[0, 3 + j]) / 120.0)
+            slope += out[j] * (k[N_STAGES, 3 + j] - (p[2, 3 + j] - p[0, 3 + j]) / 120.0)
         slope += v2
         if not slope > 1e-3 * v2:
             return t
         dt = -rv / slope
-        if abs(dt) < 1e-5:
+        if abs(dt) < _REFINED:
             # Linear in the remaining time: shift along the relative velocity.
             for j in range(3):
                 out[j] += dt * out[3 + j]
@@ -141,84 +175,133 @@ def two_body(gm: float, s: Array) -> tuple[float, float, float]:
 
 
 @kernel
-def crash(row: Array, body: int, gm: float, t: float, sign: float) -> None:
-    """Fill a row for an impact from the relative state in ``row[2:8]`` at ``t`` (s), outside the planet."""
-    r = np.sqrt(row[2] ** 2 + row[3] ** 2 + row[4] ** 2)
-    q, ahead, energy = two_body(gm, row[2:8])
-    inbound = sign * (row[2] * row[5] + row[3] * row[6] + row[4] * row[7])
-    row[0] = body
-    row[1] = t + sign * (ahead if inbound < 0.0 and ahead == ahead else 0.0)
-    row[8] = min(q, r)
-    row[9] = energy
-    row[10] = 1.0
+def _distance(s: Array) -> float:
+    return np.sqrt(s[0] ** 2 + s[1] ** 2 + s[2] ** 2)
 
 
 @kernel
-def look(
+def write_impact(row: Any, body: int, gm: float, t: float, s: Array, sign: float) -> None:
+    """Fill a row of FOUND for an impact from the relative state ``s[6]`` at ``t`` (s), outside the planet.
+
+    `sign` is the direction of the integration in time.
+    """
+    q, ahead, energy = two_body(gm, s)
+    inbound = sign * (s[0] * s[3] + s[1] * s[4] + s[2] * s[5])
+    row.body = body
+    row.time = t + sign * (ahead if inbound < 0.0 and ahead == ahead else 0.0)
+    row.state[:] = s
+    row.distance = min(q, _distance(s))
+    row.v_inf2 = energy
+    row.impact = 1
+
+
+@kernel
+def _write_minimum(row: Any, body: int, gm: float, t: float, s: Array) -> None:
+    """Fill a row of FOUND for a closest approach at ``t`` (s) with the relative state ``s[6]``."""
+    d = _distance(s)
+    row.body = body
+    row.time = t
+    row.state[:] = s
+    row.distance = d
+    row.v_inf2 = s[3] ** 2 + s[4] ** 2 + s[5] ** 2 - 2.0 * gm / d
+    row.impact = 0
+
+
+@kernel
+def _minimum_between(
+    field: Field, pair: Array, body: int, a: float, b: float, ga: float, gb: float, s: Array, work: Array
+) -> float:
+    """Time of ``r.v = 0`` on the quintic between `a` and `b` (s), where it is `ga` and `gb`; relative state in ``s``.
+
+    Illinois variant of the false position.
+    """
+    for _ in range(60):
+        t = (a * gb - b * ga) / (gb - ga)
+        if not (a < t < b or b < t < a):
+            t = 0.5 * (a + b)
+        g = relative_state(field, pair, body, t, s, work)
+        moved = abs(t - b)
+        if (g < 0.0) == (gb < 0.0):
+            ga *= 0.5
+        else:
+            a, ga = b, gb
+        b, gb = t, g
+        if moved < _SAMPLED or g == 0.0:
+            break
+    return b
+
+
+@kernel
+def minima_in_step(
     field: Field,
-    law: Array,
+    law: NonGravitationalParameters,
     pair: Array,
     first: Array,
     body: int,
     within: float,
     floor: float,
-    out: Array,
+    out: NDArray[Any],
     n: int,
     k: Array,
     places: Places,
 ) -> tuple[int, float]:
-    """Minima of distance inside one step: rows in ``out`` from ``n``; new count and time of an impact or nan.
+    """Minima of the distance from a body inside one step: rows in ``out`` from ``n``.
 
-    ``pair`` holds the ends of the step in order of time, ``first`` the rate at the earlier end. An end that is
-    a minimum itself counts with the step before it, so that steps side by side find it once.
+    An end that is a minimum itself counts with the step before it, so that adjacent steps find it once.
+
+    Parameters
+    ----------
+    field, law : Field, NonGravitationalParameters
+    pair : ndarray, shape (2, LOG_WIDTH)
+        Ends of the step in order of time, as rows of a log.
+    first : ndarray, shape (6,)
+        Rate at the earlier end.
+    body : int
+        Place in ``BODIES``.
+    within, floor : float
+        Largest distance of a minimum, and distance of an impact, m.
+    out : ndarray of FOUND
+        Result.
+    n : int
+        First row to write.
+    k, places : ndarray, Places
+        Work space of the refinement.
+
+    Returns
+    -------
+    int
+        Row after the last one written.
+    float
+        Time of an impact (s), else nan.
     """
     s, work = np.empty(6), np.empty(6)
+    gm = field.gm[body]
+    start = pair[0, TIME]
     m = cuts(field, pair, body)
-    h = (pair[1, 0] - pair[0, 0]) / m
-    fa = end_state(field, pair, 0, body, s, work)
+    h = (pair[1, TIME] - start) / m
+    after = end_state(field, pair, 0, body, s, work)
     for i in range(m):
-        ta = pair[0, 0] + i * h
+        ta = start + i * h
+        before = after
         if i < m - 1:
-            tb = pair[0, 0] + (i + 1) * h
-            fb = relative_state(field, pair, body, tb, s, work)
+            tb = start + (i + 1) * h
+            after = relative_state(field, pair, body, tb, s, work)
         else:
-            tb = pair[1, 0]
-            fb = end_state(field, pair, 1, body, s, work)
-        start = fa
-        fa = fb
-        if not (start < 0.0 and fb >= 0.0):
+            tb = pair[1, TIME]
+            after = end_state(field, pair, 1, body, s, work)
+        if not (before < 0.0 and after >= 0.0):
             continue
-        a, b, ga, gb = ta, tb, start, fb
-        for _ in range(60):  # Illinois false position
-            tm = (a * gb - b * ga) / (gb - ga)
-            if not (a < tm < b or b < tm < a):
-                tm = 0.5 * (a + b)
-            gmid = relative_state(field, pair, body, tm, s, work)
-            moved = abs(tm - b)
-            if (gmid < 0.0) == (gb < 0.0):
-                ga *= 0.5
-            else:
-                a, ga = b, gb
-            b, gb = tm, gmid
-            if moved < 1e-3 or gmid == 0.0:
-                break
-        d = np.sqrt(s[0] ** 2 + s[1] ** 2 + s[2] ** 2)
-        if d > max(within, floor) * 1.001 + 1e7:
+        t = _minimum_between(field, pair, body, ta, tb, before, after, s, work)
+        if _distance(s) > max(within, floor) * 1.001 + 1e7:
             continue
-        row = out[n]
         k[0] = first
-        t = refine(field, law, pair[0, 0], pair[0, 1:7], k, body, b, row[2:8], places)
-        d = np.sqrt(row[2] ** 2 + row[3] ** 2 + row[4] ** 2)
+        t = refine(field, law, start, pair[0, STATE], k, body, t, s, places)
+        d = _distance(s)
         if d < floor:  # entry and exit within one step
-            end_state(field, pair, 0, body, row[2:8], work)
-            crash(row, body, field.gm[body], pair[0, 0], 1.0)
-            return n + 1, row[1]
-        if d > within:
-            continue
-        row[0] = body
-        row[10] = 0.0
-        row[1] = t
-        row[8] = d
-        row[9] = row[5] ** 2 + row[6] ** 2 + row[7] ** 2 - 2.0 * field.gm[body] / d
-        n += 1
+            end_state(field, pair, 0, body, s, work)
+            write_impact(out[n], body, gm, start, s, 1.0)
+            return n + 1, out[n].time
+        if d <= within:
+            _write_minimum(out[n], body, gm, t, s)
+            n += 1
     return n, np.nan

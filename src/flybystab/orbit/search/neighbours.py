@@ -16,14 +16,15 @@ from astropy.table import QTable
 from numpy.typing import NDArray
 
 from flybystab.constants import DAY, YEAR
+from flybystab.core.numerics.dop853 import N_STAGES
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.threads import in_order
 from flybystab.orbit.covariance import PUSHES
 from flybystab.orbit.elements import GM_SUN
 from flybystab.orbit.ephemeris import SUN, Window
 from flybystab.orbit.epochs import seconds
-from flybystab.orbit.forces import RADIATION_PRESSURE
 from flybystab.orbit.kepler import two_body
+from flybystab.orbit.nongravitational import NONE, NonGravitationalParameters, deviated, parameters_of
 from flybystab.orbit.planets import planet
 from flybystab.orbit.predictability import Deviations, predictability, undisturbed_error
 from flybystab.orbit.search.acceleration import Field, borrowed_field, first_rate
@@ -43,7 +44,14 @@ AMPLIFIED = 2.0
 
 @kernel
 def carry(
-    field: Field, law: Array, t0: float, y0: Array, times: Array, tolerance: float, room: Room, out: Array
+    field: Field,
+    law: NonGravitationalParameters,
+    t0: float,
+    y0: Array,
+    times: Array,
+    tolerance: float,
+    room: Room,
+    out: Array,
 ) -> int:
     """Write barycentric states (m, m/s) at ``times`` (s), in order away from ``t0``, into ``out[n, 6]``.
 
@@ -62,7 +70,7 @@ def carry(
             if t != t:  # the step size collapsed
                 return n
             y[:] = new
-            k[0] = k[12]
+            k[0] = k[N_STAGES]
         out[n] = y
     return times.size
 
@@ -110,7 +118,12 @@ class Spread:
 
 
 def spread(
-    beside: Deviations, field: Field, law: Array, window: Window, times: Array, tolerance: float
+    beside: Deviations,
+    field: Field,
+    law: NonGravitationalParameters,
+    window: Window,
+    times: Array,
+    tolerance: float,
 ) -> Spread:
     """Errors of an orbit at `times` (s from the epoch of the window) with all forces of `field`.
 
@@ -122,17 +135,16 @@ def spread(
     Parameters
     ----------
     beside : Deviations
-    field, law : Field, ndarray (10,)
-        Forces, and :attr:`flybystab.orbit.forces.NonGravitational.row`.
+    field, law : Field, NonGravitationalParameters
+        Forces.
     window : Window
     times : ndarray, shape (n,)
     tolerance : float
         Of a step.
     """
     start = seconds(beside.orbit.epoch, window.epoch)
-    law = law.copy()
-    if not law.any():  # no non-gravitational acceleration, but its parameters can have errors
-        law[:] = beside.orbit.nongrav.row
+    if law == NONE:  # no non-gravitational acceleration, but its parameters can have errors
+        law = beside.orbit.nongrav.parameters
     states, pushes = beside.states.reshape(-1, 6), beside.pushes.reshape(-1, len(PUSHES))
     # Half of the difference of a pair: a column of the root of the covariance, or the shift itself.
     ways = 0.5 * (beside.states[0] - beside.states[1])
@@ -206,7 +218,7 @@ def _sizes(deviations: Array) -> Array:
 
 def _by_points(
     field: Field,
-    law: Array,
+    law: NonGravitationalParameters,
     window: Window,
     start: float,
     state: Array,
@@ -219,11 +231,7 @@ def _by_points(
 
     def follow(deviation: Array, more: Array) -> Array:
         out = np.full((times.size, 6), np.nan)
-        its = law.copy()
-        its[:3] += more[:3]
-        its[8] += more[3]
-        its[9] += RADIATION_PRESSURE * more[4]
-        carry(field, its, start, state + deviation, times, tolerance, empty_room(), out)
+        carry(field, deviated(law, more), start, state + deviation, times, tolerance, empty_room(), out)
         return out[:, :3]
 
     base = follow(np.zeros(6), np.zeros(len(PUSHES)))
@@ -257,7 +265,7 @@ class _Passage:
 
 
 def _passages(
-    field: Field, law: Array, window: Window, grid: Array, base: Array, change: Array
+    field: Field, law: NonGravitationalParameters, window: Window, grid: Array, base: Array, change: Array
 ) -> list[_Passage]:
     """Intervals of the grid whose state transition matrix exceeds that of two-body motion by :data:`AMPLIFIED`."""
     helio = base - window.states(SUN, grid)
@@ -273,7 +281,7 @@ def _passages(
 
 def _grown_error(
     field: Field,
-    law: Array,
+    law: NonGravitationalParameters,
     grid: Array,
     change: Array,
     passages: Sequence[_Passage],
@@ -303,7 +311,7 @@ def _grown_error(
 
 
 def _before_passage(
-    field: Field, law: Array, window: Window, begin: float, end: float, state: Array
+    field: Field, law: NonGravitationalParameters, window: Window, begin: float, end: float, state: Array
 ) -> tuple[float, Array, float]:
     """Time (s) and state before the largest attraction by a planet in an interval, and the distance there (m)."""
     times = np.linspace(begin, end, 65)
@@ -343,8 +351,9 @@ def add_growth(
         Of the rows: closest approach, or entry of an impact, s from the epoch of the window.
     beside : mapping
         Deviations by number of the asteroid, of each that the table has.
-    laws : ndarray, shape (n, 10)
-        Non-gravitational law of each asteroid, :attr:`flybystab.orbit.forces.NonGravitational.row`.
+    laws : ndarray, shape (n, N_LAW)
+        Non-gravitational acceleration of each asteroid: rows of
+        :class:`flybystab.orbit.nongravitational.NonGravitationalParameters`.
     window, tolerances
         Of the search.
     field_of : callable
@@ -355,7 +364,7 @@ def add_growth(
 
     def one(i: int) -> None:
         rows = np.flatnonzero(index == i)
-        found = spread(beside[i], field_of(i), laws[i], window, times[rows], tolerances[i])
+        found = spread(beside[i], field_of(i), parameters_of(laws[i]), window, times[rows], tolerances[i])
         out[:, rows] = found.displacement, found.growth, found.model_error
 
     for _ in in_order(one, np.unique(index).tolist(), threads):

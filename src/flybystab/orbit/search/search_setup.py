@@ -15,12 +15,14 @@ from flybystab.orbit.barycentre import barycentre_in
 from flybystab.orbit.default_forces import TWIN_DISTANCE, TWIN_SPEED, default_forces
 from flybystab.orbit.ephemeris import BELT, BODIES, N_BODIES, SUN, Ephemeris, Window
 from flybystab.orbit.epochs import later, seconds
-from flybystab.orbit.forces import FORCES, LAW_SIZE
+from flybystab.orbit.forces import FORCES
+from flybystab.orbit.nongravitational import N_LAW
 from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.planets import PLANETS, Planet
 from flybystab.orbit.predictability import deviation_epoch
 from flybystab.orbit.search.acceleration import Field, field
 from flybystab.orbit.search.force_selection import reduced
+from flybystab.orbit.search.track import Reach
 from flybystab.typing import Array
 
 _SPEED = u.m / u.s
@@ -66,8 +68,9 @@ class SearchForces(NamedTuple):
         All of them, without the non-gravitational acceleration.
     own : dict of int to Field
         Instead of `everything` for the orbits of massive asteroids, which do not attract themselves.
-    laws : ndarray, shape (n, LAW_SIZE)
-        Non-gravitational acceleration of each asteroid.
+    laws : ndarray, shape (n, N_LAW)
+        Non-gravitational acceleration of each asteroid: rows of
+        :class:`flybystab.orbit.nongravitational.NonGravitationalParameters`.
     least : float
         Point masses and 1PN with a smaller estimated displacement are left out, m.
     always : ndarray of bool
@@ -131,11 +134,11 @@ def search_forces(
     for name in ("sun", *(b.name for b in found)):
         b = BODIES.index(name)
         always[SLOT[b] + N_FAST * GRID[b]] = True
-    laws = np.zeros((len(rows), LAW_SIZE))
+    laws = np.zeros((len(rows), N_LAW))
     if "non-gravitational" in chosen:
         for i, (_, orbit) in enumerate(rows):
             if orbit.nongrav.active:
-                laws[i] = orbit.nongrav.row
+                laws[i] = orbit.nongrav.parameters
     # A massive asteroid does not attract itself.
     twins = {} if forces is not None else _twins(window, epochs, states)
     own = {
@@ -157,12 +160,12 @@ def search_tolerances(
     return np.minimum(tolerances, 1e-14) if growth else tolerances
 
 
-def limits_of(found: list[Planet], reach: Array) -> tuple[Array, Array]:
-    """Largest distance of an encounter (zero: only impacts count) and distance of an impact for each body, m."""
+def reach_of(found: list[Planet], distances: Array) -> Reach:
+    """Distances that count, from the planets of a search and the largest distance from each, m."""
     limits = np.zeros(len(BODIES))
-    limits[[BODIES.index(b.name) for b in found]] = reach
+    limits[[BODIES.index(b.name) for b in found]] = distances
     limits[SUN] = 0.0  # a perihelion is no encounter
-    return limits, np.array([PLANETS[name].impact_distance for name in BODIES])
+    return Reach(limits, np.array([PLANETS[name].impact_distance for name in BODIES]))
 
 
 def _epochs(rows: list[tuple[str, Orbit]], origin: Time) -> Array:

@@ -7,19 +7,25 @@ ends the integration of that asteroid.
 
 from __future__ import annotations
 
+from typing import Any, NamedTuple
+
 import numpy as np
+from numpy.typing import NDArray
 
 from flybystab.constants import DAY
-from flybystab.core.numerics.jit import code, kernel
+from flybystab.core.numerics.dop853 import N_STAGES
+from flybystab.core.numerics.jit import code, inlined, kernel
 from flybystab.orbit.almanac import gather
+from flybystab.orbit.closest_approach import ACCELERATION, LOG_WIDTH, STATE, TIME
 from flybystab.orbit.ephemeris import N_BODIES, body_state
+from flybystab.orbit.nongravitational import NonGravitationalParameters, parameters_of
 from flybystab.orbit.search.acceleration import Field, borrowed_field, empty_places, first_rate
 from flybystab.orbit.search.dop853 import Room, advance, borrowed_room, empty_room
 from flybystab.orbit.search.force_selection import reduced, shares_along
-from flybystab.orbit.search.minima import BENDING, FINE, chord_distance, crash, look
+from flybystab.orbit.search.minima import BENDING, FINE, chord_distance, minima_in_step, write_impact
 from flybystab.typing import Array
 
-#: Status of a search: `out` too small, step size collapsed, start inside a body or its atmosphere, too many steps.
+#: Status of a search: `out` too small, step size collapsed, start inside a body or its atmosphere, `MAX_STEPS` taken.
 FULL, STALLED, INSIDE, EXHAUSTED = 1, 2, 3, 4
 #: Most steps from the epoch to the end of the span; an asteroid of the inner main belt takes about 60 a year.
 MAX_STEPS = 1_000_000
@@ -27,20 +33,62 @@ MAX_STEPS = 1_000_000
 _NO_ROWS = code(0)
 
 
+class Reach(NamedTuple):
+    """Distances that count, of each body.
+
+    Attributes
+    ----------
+    limits : ndarray, shape (bodies,)
+        Largest distance of an encounter (zero: only impacts count), m.
+    floors : ndarray, shape (bodies,)
+        Distance of an impact, m.
+    """
+
+    limits: Array
+    floors: Array
+
+
+@kernel
+def _is_inside(y: Array, place: Array, floor: float) -> bool:
+    """Whether ``y[:3]`` is closer to ``place[3]`` than `floor`, m."""
+    return (y[0] - place[0]) ** 2 + (y[1] - place[1]) ** 2 + (y[2] - place[2]) ** 2 < floor**2
+
+
+@inlined
+def _write_ends(t: float, y: Array, t_new: float, new: Array, k: Array, pair: Array) -> float:
+    """Write the ends of a step in order of time into ``pair[2, LOG_WIDTH]``; three times the larger acceleration there.
+
+    Three times: the acceleration may be larger between them (m/s2).
+    """
+    early, late = (0, 1) if t_new >= t else (1, 0)
+    pair[early, TIME] = t
+    pair[late, TIME] = t_new
+    bend0 = 0.0
+    bend1 = 0.0
+    for j in range(6):
+        pair[early, STATE.start + j] = y[j]
+        pair[late, STATE.start + j] = new[j]
+    for j in range(3):
+        pair[early, ACCELERATION + j] = k[0, 3 + j]
+        pair[late, ACCELERATION + j] = k[N_STAGES, 3 + j]
+        bend0 += k[0, 3 + j] ** 2
+        bend1 += k[N_STAGES, 3 + j] ** 2
+    return 3.0 * np.sqrt(max(bend0, bend1))
+
+
 @kernel
 def track_encounters(
     field: Field,
-    law: Array,
+    law: NonGravitationalParameters,
     t0: float,
     y0: Array,
     t_quiet: float,
     t_end: float,
-    limits: Array,
-    floors: Array,
+    reach: Reach,
     tolerance: float,
     room: Room,
     spare_room: Room,
-    out: Array,
+    out: NDArray[Any],
     n: int,
 ) -> tuple[int, int, float]:
     """Encounters of one asteroid from ``t0`` to ``t_end``, s; only impacts before ``t_quiet``.
@@ -49,45 +97,43 @@ def track_encounters(
     ----------
     field : Field
         Forces, without the non-gravitational one.
-    law : ndarray, shape (10,)
-        :attr:`flybystab.orbit.forces.NonGravitational.row`; zeros for none.
+    law : NonGravitationalParameters
+        :data:`flybystab.orbit.nongravitational.NONE` for none.
     t0, y0 : float, ndarray
         Start (s) and barycentric state (m, m/s). Time may run backward.
-    limits, floors : ndarray, shape (bodies,)
-        Of each body: largest distance of an encounter (zero: only impacts count), distance of impact, m.
+    reach : Reach
     tolerance : float
         Error per step, in units of 1.5e11 m and 30 km/s.
     room, spare_room : Room
         For the integration and for the refinement of minima.
-    out : ndarray, shape (rows, 12)
-        Result from row `n` on; see ``WIDTH``.
+    out : ndarray of FOUND
+        Result from row `n` on.
 
     Returns
     -------
     int
         Number of rows.
     int
-        0 done; 1 `out` was too small; 2 the step size collapsed; 3 the start is inside a body; 4 `MAX_STEPS`.
+        0 or one of `FULL`, `STALLED`, `INSIDE`, `EXHAUSTED`.
     float
-        Time reached, s; for 3 the number of the body.
+        Time reached, s; for `INSIDE` the number of the body.
     """
     field = borrowed_field(field)
     k, places = borrowed_room(room)
     spare, spare_places = borrowed_room(spare_room)
+    limits, floors = reach
     y = y0.copy()
     new = np.empty(6)
     old, now = np.empty((N_BODIES, 3)), np.empty((N_BODIES, 3))
-    work = np.empty(6)
-    pair = np.empty((2, 10))
+    away, work = np.empty(6), np.empty(6)
+    pair = np.empty((2, LOG_WIDTH))
     sign = 1.0 if t_end >= t0 else -1.0
     h = DAY
     t = t0
     first_rate(field, law, t, y, places, k[0])
     gather(places, now)
     for body in range(N_BODIES):
-        if (y[0] - now[body, 0]) ** 2 + (y[1] - now[body, 1]) ** 2 + (y[2] - now[body, 2]) ** 2 < floors[
-            body
-        ] ** 2:
+        if _is_inside(y, now[body], floors[body]):
             return n, INSIDE, float(body)
     count = 0
     while (t_end - t) * sign > 0.0:
@@ -101,55 +147,30 @@ def track_encounters(
         old[:] = now
         gather(places, now)
         counts = (t - t_quiet) * sign >= 0.0
-        early, late = (0, 1) if sign > 0.0 else (1, 0)
-        pair[early, 0] = t
-        pair[late, 0] = t_new
-        bend0 = 0.0
-        bend1 = 0.0
-        for j in range(6):
-            pair[early, 1 + j] = y[j]
-            pair[late, 1 + j] = new[j]
-        for j in range(3):
-            pair[early, 7 + j] = k[0, 3 + j]
-            pair[late, 7 + j] = k[12, 3 + j]
-            bend0 += k[0, 3 + j] ** 2
-            bend1 += k[12, 3 + j] ** 2
-        bend = 3.0 * np.sqrt(max(bend0, bend1))
+        bend = _write_ends(t, y, t_new, new, k, pair)
         bulge = 0.125 * (t_new - t) ** 2
         for body in range(N_BODIES):
             limit = limits[body] if counts else 0.0
-            reach = max(limit, floors[body])
-            if chord_distance(y, old[body], new, now[body]) > reach + bulge * (bend + BENDING[body]):
+            far = max(limit, floors[body]) + bulge * (bend + BENDING[body])
+            if chord_distance(y, old[body], new, now[body]) > far:
                 continue
             if n + FINE > out.shape[0]:
                 return n, FULL, t
-            d1 = 0.0
-            for j in range(3):
-                d1 += (new[j] - now[body, j]) ** 2
-            if d1 < floors[body] ** 2:
+            if _is_inside(new, now[body], floors[body]):
                 body_state(field.head, field.data, field.gm, body, t, work)
                 for j in range(6):
-                    out[n, 2 + j] = y[j] - work[j]
-                crash(out[n], body, field.gm[body], t, sign)
+                    away[j] = y[j] - work[j]
+                write_impact(out[n], body, field.gm[body], t, away, sign)
                 return n + 1, 0, t_new
-            n, hit = look(
-                field,
-                law,
-                pair,
-                k[0] if sign > 0.0 else k[12],
-                body,
-                limit,
-                floors[body],
-                out,
-                n,
-                spare,
-                spare_places,
+            earlier = k[0] if sign > 0.0 else k[N_STAGES]
+            n, hit = minima_in_step(
+                field, law, pair, earlier, body, limit, floors[body], out, n, spare, spare_places
             )
             if hit == hit:
                 return n, 0, hit
         t = t_new
         y[:] = new
-        k[0] = k[12]
+        k[0] = k[N_STAGES]
     return n, 0, t
 
 
@@ -161,19 +182,19 @@ def search(
     states: Array,
     t_start: float,
     t_stop: float,
-    limits: Array,
-    floors: Array,
+    reach: Reach,
     tolerances: Array,
     least: float,
     always: Array,
     shares: Array,
     first: int,
-    out: Array,
+    out: NDArray[Any],
 ) -> tuple[int, int, int, float]:
     """Encounters of asteroids ``first``, ``first + 1``, ... until all are done or ``out`` is full.
 
     Forces with an estimated displacement below ``least`` (m) are left out; the estimates are written to ``shares``.
-    Other arguments as in :func:`track_encounters`, one row per asteroid.
+    Other arguments as in :func:`track_encounters`, one row per asteroid; ``laws`` has rows of
+    :class:`flybystab.orbit.nongravitational.NonGravitationalParameters`.
 
     Returns
     -------
@@ -182,15 +203,16 @@ def search(
     int
         Number of rows.
     int
-        0 done, 1 `out` was too small for the next asteroid, 2 its step size collapsed, 3 it starts inside a body.
+        0 for done, or a status of :func:`track_encounters`: that of the asteroid to go on with.
     float
-        Time at which it did, s; for 3 the number of the body.
+        Time at which it occurred, s; for `INSIDE` the number of the body.
     """
     n = _NO_ROWS
     room, spare_room, places = empty_room(), empty_room(), empty_places()
     for i in range(first, epochs.size):
         t0 = epochs[i]
         y = states[i]
+        law = parameters_of(laws[i])
         if t0 > t_start:
             shares_along(everything, t0, y, t_start, places, shares[i])
         if t0 < t_stop:
@@ -205,11 +227,11 @@ def search(
             else:
                 continue
             m, status, t = track_encounters(
-                field, laws[i], t0, y, quiet, end, limits, floors, tolerances[i], room, spare_room, out, m
+                field, law, t0, y, quiet, end, reach, tolerances[i], room, spare_room, out, m
             )
             if status != 0:
                 return i, n, status, t
         for row in range(n, m):
-            out[row, 11] = i
+            out[row].asteroid = i
         n = m
     return epochs.size, n, 0, 0.0
