@@ -39,12 +39,14 @@ def test_a_scenario_with_grains(scene, capsys):
     assert [r["seed"] for r in grains["runs"]] == [0, 1]
     assert grains["fragments"][0]["mass_fraction"] == grains["runs"][0]["largest_fraction"]
     assert sum(p["share"] for p in grains["probabilities"].values()) == pytest.approx(1.0)
+    assert 0.0 < grains["resolution_errors"]["largest_fraction"] < grains["largest_fraction"]
     assert (scene / "deep.png").stat().st_size > 20_000
     assert main(["scenario", "scene.toml", "--output", "deep.svg", "--movie", "deep.gif"]) == 0
     text = capsys.readouterr().out
     assert "2 piles: " in text
     assert "DISRUPTED" in text
     assert "largest clump" in text
+    assert "error from the number of grains (100)" in text
     assert (scene / "deep.gif").read_bytes()[:3] == b"GIF"
     assert "movie      deep.gif" in text
     assert main(["scenario", "scene.toml", "--movie", "deep.avi"]) != 0

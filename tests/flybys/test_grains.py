@@ -1,5 +1,8 @@
 """Grains through encounters."""
 
+import csv
+from pathlib import Path
+
 import astropy.units as u
 import numpy as np
 import pytest
@@ -10,6 +13,15 @@ import flybystab as fs
 from flybystab.core.grains.clumps import bound_clumps, friends_of_friends
 from flybystab.core.grains.state import Grains
 from flybystab.errors import InvalidInput
+from flybystab.flybys.grains_resolution import (
+    ELONGATION,
+    EXPONENT,
+    LARGE,
+    LOST,
+    REFERENCE,
+    SMALL,
+    resolution_errors,
+)
 
 BODY = fs.Body(semi_axes=[1408, 850, 748] * u.m, density=2000 * u.kg / u.m**3, spin_period=6 * u.h)
 
@@ -227,3 +239,35 @@ def test_cohesion_holds_a_pile_together():
     assert weak.largest_fraction < 0.9
     assert strong.verdict == fs.flyby(pile(300), earth(1.9)).verdict == "INTACT"
     assert "cohesion 300 Pa" in "; ".join(strong.modelled)
+
+
+def test_the_error_from_the_number_of_grains_falls_with_it(deep):
+    errors = deep.grains.resolution_errors
+    assert 0.0 < errors.largest_fraction < deep.largest_fraction
+    assert np.isnan(errors.stretch)
+    # four times the grains halve the error
+    few, many = (resolution_errors(n, 0.97, 1.5, whole=True) for n in (500, 2000))
+    assert many.stretch == pytest.approx(0.5 * few.stretch)
+    assert many.largest_fraction == pytest.approx(0.5 * few.largest_fraction)
+    # a body that is neither stretched nor loses mass has no such error
+    assert resolution_errors(500, 1.0, 1.0, whole=True) == (0.0, 0.0)
+
+
+@pytest.mark.parametrize(
+    ("q", "quantity", "base", "constant"),
+    [
+        ("1.6", "clump", lambda y: y, SMALL),
+        ("2.0", "clump", lambda y: y, LARGE),
+        ("2.2", "clump", lambda y: 1 - y, LOST),
+        ("2.2", "stretch", lambda y: y - 1, ELONGATION),
+    ],
+)
+def test_the_error_from_the_number_of_grains_is_that_of_the_runs(q, quantity, base, constant):
+    path = Path(__file__).parents[2] / "docs" / "tables" / "grains_numbers.csv"
+    with path.open() as file:
+        rows = list(csv.DictReader(x for x in file if not x.startswith("#")))
+    some = [r for r in rows if (r["periapsis"], r["quantity"]) == (q, quantity)]
+    n, piles, mean = (np.array([float(r[k]) for r in some]) for k in ("grains", "piles", "mean"))
+    slope, _ = np.polyfit(n**-EXPONENT, mean, 1, w=np.sqrt(piles))
+    at = mean[n == REFERENCE][0]
+    assert constant == pytest.approx(abs(slope) * REFERENCE**-EXPONENT / base(at), abs=0.01)

@@ -1,7 +1,8 @@
 """Friction angle of piles of grains by the spin-up of spheres: makes ``data/grains_friction.csv``.
 
 ``python -m flybystab.bench.grains_friction [FILE]`` prints, or writes, the table that maps a friction angle to contact
-friction; it takes about ten minutes on two cores.
+friction; it takes about ten minutes on two cores. ``python -m flybystab.bench.grains_friction numbers`` prints the
+friction angle against the number of grains.
 """
 
 from __future__ import annotations
@@ -28,6 +29,8 @@ POINTS = (
     (0.6, 0.45),
     (0.6, 0.7),
 )
+#: First ``omega^2/(pi G rho)`` in the comparison of numbers of grains: a sphere then mobilises 28 deg.
+_LATE = 8.0 / 3.0 * np.sin(np.deg2rad(28.0)) / (1.0 + np.sin(np.deg2rad(28.0)))
 
 
 def friction_angle(mu_s: float, beta: float, seed: int, grains: int = 528) -> tuple[float, Array]:
@@ -50,6 +53,22 @@ def table(seeds: int = 3) -> list[tuple[float, float, float, float]]:
     return out
 
 
+def numbers() -> None:
+    """Print the friction angle of spheres of different numbers of grains with the same contact friction."""
+    print("grains  spheres  friction angle (deg), standard error")
+    for grains, seeds in ((125, 4), (250, 4), (528, 4), (2000, 1)):
+        angles = np.array(
+            [
+                spin_up(settled_pile(np.ones(3), grains, seed, 0.6, 0.3), _LATE, surface="drucker-prager")[
+                    :, 1
+                ].max()
+                for seed in range(seeds)
+            ]
+        )
+        error = f" +- {angles.std(ddof=1) / np.sqrt(seeds):.2f}" if seeds > 1 else ""
+        print(f"{grains:6d} {seeds:8d}  {angles.mean():.2f}{error}", flush=True)
+
+
 def text(rows: list[tuple[float, float, float, float]]) -> str:
     """The table as a file."""
     head = (
@@ -61,7 +80,10 @@ def text(rows: list[tuple[float, float, float, float]]) -> str:
 
 
 if __name__ == "__main__":
-    made = text(table())
-    if len(sys.argv) > 1:
-        Path(sys.argv[1]).write_text(made)
-    print(made)
+    if sys.argv[1:] == ["numbers"]:
+        numbers()
+    else:
+        made = text(table())
+        if len(sys.argv) > 1:
+            Path(sys.argv[1]).write_text(made)
+        print(made)

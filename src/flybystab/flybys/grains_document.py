@@ -13,6 +13,7 @@ def grains_document(outcome: GrainsOutcome | None) -> dict[str, Any] | None:
     """The distribution, the runs and the fragments."""
     if outcome is None:
         return None
+    errors = outcome.resolution_errors
     return {
         "verdict": str(outcome.verdict),
         "probabilities": {
@@ -20,6 +21,10 @@ def grains_document(outcome: GrainsOutcome | None) -> dict[str, Any] | None:
         },
         "largest_fraction": outcome.largest_fraction,
         "bound_fraction": outcome.bound_fraction,
+        "resolution_errors": {
+            "largest_fraction": errors.largest_fraction,
+            "stretch": errors.stretch,
+        },
         "runs": [
             {
                 "seed": r.seed,

@@ -11,6 +11,7 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.arguments import check_arguments, finite
+from flybystab.flybys.grains_resolution import ResolutionErrors, resolution_errors
 from flybystab.flybys.verdict import Verdict, classed
 from flybystab.tabular import Collection, Record, Tabular
 from flybystab.typing import Array
@@ -18,6 +19,11 @@ from flybystab.units import brief
 
 if TYPE_CHECKING:
     from astropy.table import QTable
+
+
+#: A pile from which nothing escapes is whole if its largest clump has more than this fraction of the mass: the rest are
+#: loose grains and small satellites.
+WHOLE = 0.9
 
 
 def piles_of(count: int) -> str:
@@ -191,6 +197,17 @@ class GrainsOutcome(Collection):
         """Least and largest mass of the largest clump over the seeds."""
         found = [r.largest_fraction for r in self.runs]
         return min(found), max(found)
+
+    @property
+    def resolution_errors(self) -> ResolutionErrors:
+        """Errors of :attr:`largest_fraction` and of the stretch of the median run from the finite number of grains.
+
+        They are systematic and come on top of the spread over the seeds. Estimated
+        (:mod:`flybystab.flybys.grains_resolution`) from flybys with up to 4,000 grains.
+        """
+        run = self.median
+        whole = run.largest_fraction > WHOLE
+        return resolution_errors(len(run.radius), run.largest_fraction, run.stretch, whole=whole)
 
     @check_arguments
     def probabilities(self, confidence: float = 0.68) -> dict[Verdict, tuple[float, float, float]]:

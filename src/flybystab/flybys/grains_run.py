@@ -29,16 +29,13 @@ from flybystab.flybys.grain_clumps import (
     largest_clump,
     rotation_of,
 )
-from flybystab.flybys.grains_outcome import GrainsCourse, GrainsRun
+from flybystab.flybys.grains_outcome import WHOLE, GrainsCourse, GrainsRun
 from flybystab.flybys.verdict import Verdict, classed
 from flybystab.typing import Array
 
 #: Time without a change of clumps after which a run ends, in units of ``sqrt(R^3/(G M))`` (1.5 h at 2000 kg/m3), and
 #: the longest time after the end of the encounter.
 QUIET, LONGEST = 4.0, 40.0
-#: A pile from which nothing escapes is whole if its largest clump has more than this fraction of the mass: the rest are
-#: loose grains and small satellites.
-WHOLE = 0.9
 #: Relative change of a semi-axis of the remnant below which the body counts as intact.
 UNMOVED = 0.01
 #: Rows of the course of a run during the encounter.

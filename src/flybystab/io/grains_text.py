@@ -20,7 +20,16 @@ def grains_lines(r: FlybyResult, most: int = 6) -> list[str]:
         f"           largest clump {r.largest_fraction:.1%} of the mass ({low:.1%} to {high:.1%}); "
         f"computed in {r.grains.wall_time.to_value(u.s):.1f} s",
     ]
-    run = r.grains.median
+    run, errors = r.grains.median, r.grains.resolution_errors
+    stretch = (
+        ""
+        if np.isnan(errors.stretch)
+        else f", of the stretch {run.stretch:.2f} of its long axis {errors.stretch:.2f}"
+    )
+    out.append(
+        f"           error from the number of grains ({len(run.radius)}): of the largest clump "
+        f"{errors.largest_fraction:.1%} of the mass{stretch}"
+    )
     for k, row in enumerate(run.fragments[:most]):
         a = row["semi_axes"].to_value(u.m)
         rate = float(np.linalg.norm(row["spin"].to_value(u.rad / u.h)))
