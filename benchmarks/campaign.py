@@ -34,7 +34,7 @@ import flybystab as fs
 from flybystab.body.body import YIELD_SURFACES
 from flybystab.constants import G
 from flybystab.core.dynamics.moreau import follow_steps
-from flybystab.core.dynamics.run import integrate, parameters
+from flybystab.core.dynamics.run import LIMITS, body_state, integrate, parameters
 from flybystab.core.ellipsoid.tide import TidePanels, components, tensor
 from flybystab.flybys.batch import FlybyRun, flyby_run
 from flybystab.flybys.verdict import bound_fraction, classed
@@ -297,10 +297,13 @@ def integrators(n: int, seed: int) -> Counter[str]:
             continue
         count["bodies"] += 1
         run = integrate(
-            body.axes, body.rho, body.omega, turn, encounter.t_start, encounter.t_stop, encounter.tide, phi=m.phi,
-            cohesion=m.c_pa, dilatancy=m.dilatancy, surface=m.surface_code, brittle=m.brittle, tolerance=1e-9,
-            max_axis_ratio=LIMIT,
-        )  # fmt: skip
+            body_state(
+                body.axes, body.rho, body.omega, turn, m.phi, m.c_pa, m.dilatancy, m.surface_code, m.brittle
+            ),
+            (encounter.t_start, encounter.t_stop),
+            encounter.tide,
+            limits=LIMITS._replace(axis_ratio=LIMIT),
+        )
         steps = int(STEPS * (encounter.t_stop - encounter.t_start) / body.dynamical_time)
         coarse, fine = (stepped(body, encounter, turn, k * steps) for k in (1, 2))
         if run.reason == "stuck":

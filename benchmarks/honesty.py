@@ -25,7 +25,7 @@ from scipy.spatial.transform import Rotation
 from flybystab.body.body import YIELD_SURFACES, Material
 from flybystab.catalogues.catalogue import catalogue
 from flybystab.constants import G
-from flybystab.core.dynamics.run import integrate
+from flybystab.core.dynamics.run import LIMITS, body_state, integrate
 from flybystab.core.ellipsoid.yield_bound import INTACT, NOT_IN_EQUILIBRIUM, quick_margins, tide_size
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import FlybystabError
@@ -109,12 +109,13 @@ def campaign(seed: int, encounters: int, each: int) -> Count:
         standing += int(np.sum(verdict == NOT_IN_EQUILIBRIUM))
         for i in np.flatnonzero(verdict == INTACT):
             turn = Rotation.random(random_state=int(rng.integers(2**31))).as_matrix()
-            way = axes[i], rho[i], omega[i], turn, enc.t_start, enc.t_stop, enc.tide
-            material = {"phi": phi[i], "cohesion": cohesion[i], "surface": code, "tolerance": 1e-8}
-            run = integrate(*way, **material, brittle=bool(rng.integers(2)), max_axis_ratio=8.0)
+            body = body_state(axes[i], rho[i], omega[i], turn, phi[i], cohesion[i], surface=code)
+            way = (enc.t_start, enc.t_stop), enc.tide
+            limits = LIMITS._replace(tolerance=1e-8, axis_ratio=8.0)
+            run = integrate(body._replace(brittle=bool(rng.integers(2))), *way, limits=limits)
             yielded = any(name == "onset" for name, _, _ in run.events) or run.reason != "done"
             intact += 1
-            most = integrate(*way, **material, unyielding=True, max_axis_ratio=8.0).max_friction
+            most = integrate(body, *way, limits=limits, unyielding=True).max_friction
             false += yielded or most > friction[i, 1] + 1e-9
             rest, bound = friction[i]
             if np.isfinite(rest) and bound - rest > 1e-3:
@@ -160,8 +161,9 @@ def surfaces(args: argparse.Namespace) -> int:
             size = tide_size(enc.tide, enc.t_start, enc.t_stop)
             quick_margins(axes, rho, omega, phi, np.zeros(n), code, *size, friction, verdict)
             for i in np.flatnonzero(verdict != NOT_IN_EQUILIBRIUM):
-                way = axes[i], rho[i], omega[i], np.eye(3), enc.t_start, enc.t_stop, enc.tide
-                run = integrate(*way, phi=phi[i], surface=code, tolerance=1e-8, unyielding=True)
+                body = body_state(axes[i], rho[i], omega[i], np.eye(3), phi[i], surface=code)
+                limits = LIMITS._replace(tolerance=1e-8)
+                run = integrate(body, (enc.t_start, enc.t_stop), enc.tide, limits=limits, unyielding=True)
                 rigid = run.max_friction <= phi[i]
                 counts += 1, rigid, verdict[i] == INTACT
                 false += bool(verdict[i] == INTACT and not rigid)

@@ -7,7 +7,7 @@ onset of yield found by the dynamics in a slowly increasing tide.
 import numpy as np
 
 from flybystab.constants import G
-from flybystab.core.dynamics.run import integrate
+from flybystab.core.dynamics.run import LIMITS, body_state, integrate
 from flybystab.core.ellipsoid.tide import tide_panels
 
 RHO = 2000.0
@@ -25,9 +25,8 @@ for phi in (10, 20, 30, 40, 50):
         return np.stack([2 * x, -x, -x, 0 * x, 0 * x, 0 * x], axis=-1)
 
     tide, _ = tide_panels(ramp, 0.0, span, span, width=0.2)
-    run = integrate(
-        np.full(3, 500.0), RHO, np.zeros(3), np.eye(3), 0.0, span, tide, phi=np.deg2rad(phi), tolerance=1e-10
-    )
+    body = body_state(np.full(3, 500.0), RHO, np.zeros(3), np.eye(3), np.deg2rad(phi))
+    run = integrate(body, (0.0, span), tide, limits=LIMITS._replace(tolerance=1e-10))
     onset = run.events[0][1]
     found = (4.0 / 3.0 * rate**2 / (2.0 * strength * onset / span)) ** (1.0 / 3.0)
     worst = max(worst, abs(found / distance - 1.0))

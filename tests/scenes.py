@@ -14,7 +14,7 @@ from flybystab.core.dynamics import state
 from flybystab.core.dynamics.ground import no_ground
 from flybystab.core.dynamics.moreau import follow_steps
 from flybystab.core.dynamics.regimes import Span, follow
-from flybystab.core.dynamics.run import Run, integrate, parameters
+from flybystab.core.dynamics.run import EXPANSION, LIMITS, Run, body_state, integrate, parameters
 from flybystab.core.dynamics.workspace import Limits, new_log, workspace
 from flybystab.core.ellipsoid.tide import TidePanels, components, no_tide, tensor, tide_at
 from flybystab.encounter.encounter import Encounter
@@ -47,6 +47,10 @@ def material(phi: float, **kwargs: Any) -> Material:
     return Material(friction_angle=phi * u.deg, **({"yield_surface": CONE} | kwargs))
 
 
+#: Limits of a run by their names in :func:`carried`.
+_LIMITS = {"tolerance": "tolerance", "max_axis_ratio": "axis_ratio", "max_steps": "max_steps"}
+
+
 def carried(
     body: Body,
     t_start: float,
@@ -57,19 +61,25 @@ def carried(
 ) -> Run:
     """Array-level run of a body."""
     m = body.material
+    turn = np.eye(3) if attitude is None else attitude
+    given = {name: kwargs.pop(key) for key, name in _LIMITS.items() if key in kwargs}
+    expansion = kwargs.pop("expansion", EXPANSION)
     return integrate(
-        body.axes,
-        body.rho,
-        body.omega,
-        np.eye(3) if attitude is None else attitude,
-        t_start,
-        t_stop,
+        body_state(
+            body.axes,
+            body.rho,
+            body.omega,
+            turn,
+            m.phi,
+            m.c_pa,
+            m.dilatancy,
+            m.surface_code,
+            m.brittle,
+            expansion,
+        ),
+        Span(t_start, kwargs.pop("t_rest", t_stop), t_stop),
         no_tide() if tide is None else tide,
-        phi=m.phi,
-        cohesion=m.c_pa,
-        dilatancy=m.dilatancy,
-        surface=m.surface_code,
-        brittle=m.brittle,
+        limits=LIMITS._replace(**given),
         **kwargs,
     )
 

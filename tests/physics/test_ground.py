@@ -14,7 +14,7 @@ from scipy.spatial.transform import Rotation
 from tests.scenes import PILE
 
 from flybystab import Body, Encounter, Material, flyby, flyby_many
-from flybystab.core.dynamics.run import integrate
+from flybystab.core.dynamics.run import LIMITS, body_state, integrate
 from flybystab.flybys.batch import span_of
 from flybystab.flybys.rigid_course import rigid_course
 from flybystab.io.text import flyby_lines
@@ -36,9 +36,13 @@ def flown(body: Body, encounter: Encounter, attitude: NDArray[np.float64]) -> Ca
     start, stop, _ = span_of(encounter)
     m = body.material
     run = integrate(
-        body.axes, body.rho, body.omega, attitude, start, stop, encounter.tide,
-        phi=m.phi, cohesion=m.c_pa, unyielding=True, tolerance=1e-11, keep=20_000,
-    )  # fmt: skip
+        body_state(body.axes, body.rho, body.omega, attitude, m.phi, m.c_pa),
+        (start, stop),
+        encounter.tide,
+        limits=LIMITS._replace(tolerance=1e-11),
+        unyielding=True,
+        keep=20_000,
+    )
     q = run.history["quaternion"]
     vectors = CubicSpline(run.history["time"], Rotation.from_quat(q, scalar_first=True).as_matrix())
 

@@ -8,7 +8,7 @@ from astropy.time import Time
 from flybystab.body.body import Body
 from flybystab.catalogues.catalogue import Asteroid
 from flybystab.constants import R_EARTH, G
-from flybystab.core.dynamics.run import integrate
+from flybystab.core.dynamics.run import body_state, integrate
 from flybystab.core.material.surfaces import code_of
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
@@ -65,16 +65,9 @@ def test_bounds_are_where_the_dynamics_begins_to_yield():
         def yields(phi, rho=rho, c=c):
             run = [
                 integrate(
-                    b.axes,
-                    rho,
-                    b.omega,
-                    q,
-                    enc.t_start,
-                    enc.t_stop,
+                    body_state(b.axes, rho, b.omega, q, phi=phi, cohesion=c, surface=code_of("mohr-coulomb")),
+                    (enc.t_start, enc.t_stop),
                     enc.tide,
-                    phi=phi,
-                    cohesion=c,
-                    surface=code_of("mohr-coulomb"),
                 )
                 for b, q in zip(bodies, turns, strict=True)
             ]

@@ -22,7 +22,7 @@ import numpy as np
 from flybystab.body.body import Body, Material
 from flybystab.core.dynamics import rates as motion
 from flybystab.core.dynamics.moreau import follow_steps
-from flybystab.core.dynamics.run import integrate, parameters
+from flybystab.core.dynamics.run import LIMITS, body_state, integrate, parameters
 from flybystab.core.dynamics.state import FLOWING, empty_buffers
 from flybystab.core.dynamics.workspace import Limits
 from flybystab.core.ellipsoid.tide import TidePanels, tensor
@@ -72,11 +72,11 @@ def rows(figure: str | Path | None = None, repeat: int = 5) -> list[dict[str, An
     a0 = float(np.cbrt(np.prod(body.axes)))
     tide = TidePanels(e.tide.tau / t0, e.tide.start, e.tide.width, e.tide.coefficients * t0**2)
 
+    start = body_state(body.axes, body.rho, body.omega, np.eye(3), PHI)
+
     def default(tolerance: float, keep: int = 0) -> Any:
-        return integrate(
-            body.axes, body.rho, body.omega, np.eye(3), e.t_start, e.t_stop, e.tide,
-            phi=PHI, tolerance=tolerance, keep=keep,
-        )  # fmt: skip
+        limits = LIMITS._replace(tolerance=tolerance)
+        return integrate(start, (e.t_start, e.t_stop), e.tide, limits=limits, keep=keep)
 
     def kernel(tolerance: float, encounter: Encounter) -> Callable[[], None]:
         """The compiled run alone, as `flyby` and `flyby_many` call it for each row."""
@@ -104,9 +104,8 @@ def rows(figure: str | Path | None = None, repeat: int = 5) -> list[dict[str, An
     )
 
     def rigid(tolerance: float) -> Any:
-        return integrate(
-            body.axes, body.rho, body.omega, np.eye(3), far.t_start, far.t_stop, far.tide, phi=PHI, tolerance=tolerance
-        )  # fmt: skip
+        limits = LIMITS._replace(tolerance=tolerance)
+        return integrate(start, (far.t_start, far.t_stop), far.tide, limits=limits)
 
     gradients = [rigid(tolerance).velocity_gradient for tolerance in (1e-8, 1e-12)]
     out.append(

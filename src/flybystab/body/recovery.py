@@ -20,7 +20,7 @@ from flybystab.body.body import Body, check_body, refuse_cut_off
 from flybystab.body.equilibrium import equilibrium
 from flybystab.body.stability import unit_deviator
 from flybystab.constants import G
-from flybystab.core.dynamics.run import Run, integrate
+from flybystab.core.dynamics.run import LIMITS, Run, body_state, integrate
 from flybystab.core.ellipsoid.tide import components, no_tide, tensor
 from flybystab.core.energy.perturbation import LARGEST_AXIS_RATIO, ellipsoid, rate_of_strain, slope_of_flow
 from flybystab.core.energy.perturbation import direction as strain_direction
@@ -352,21 +352,14 @@ def _push(body: Body, direction: Any, energy: float, dilatancy: float, tolerance
     # K = tr(L I L^T)/2 with I = (m/5) S
     unit = body.mass.value / 10.0 * float(np.trace(gradient @ np.diag(squares) @ gradient.T))
     limit = max(LARGEST_AXIS_RATIO, 1.001 * body.axes[0] / body.axes[2])
+    cohesion = 0.0 if m.brittle and energy > 0.0 else m.c_pa
     return integrate(
-        body.axes,
-        body.rho,
-        body.omega,
-        np.eye(3),
-        0.0,
-        PATIENCE * body.dynamical_time,
+        body_state(
+            body.axes, body.rho, body.omega, np.eye(3), m.phi, cohesion, dilatancy, m.surface_code, m.brittle
+        ),
+        (0.0, PATIENCE * body.dynamical_time),
         no_tide(),
-        phi=m.phi,
-        cohesion=0.0 if m.brittle and energy > 0.0 else m.c_pa,
-        dilatancy=dilatancy,
-        surface=m.surface_code,
-        brittle=m.brittle,
-        tolerance=tolerance,
-        max_axis_ratio=limit,
+        limits=LIMITS._replace(tolerance=tolerance, axis_ratio=limit),
         deformation=gradient * np.sqrt(energy / unit) if energy > 0.0 else None,
     )
 

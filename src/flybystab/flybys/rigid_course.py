@@ -15,7 +15,8 @@ from astropy.units import Quantity
 
 from flybystab.body.body import Body, check_settled
 from flybystab.constants import G
-from flybystab.core.dynamics.run import integrate
+from flybystab.core.dynamics.regimes import Span
+from flybystab.core.dynamics.run import LIMITS, body_state, integrate
 from flybystab.core.dynamics.state import rotated_to_body, rotation_matrix
 from flybystab.core.ellipsoid.rigid_stress import overload, rigid_stress
 from flybystab.core.ellipsoid.tide import TidePanels, tensor, tide_at
@@ -124,20 +125,19 @@ def rigid_course(
     start, stop, limit = span_of(encounter)
     material = body.material
     run = integrate(
-        body.axes,
-        body.rho,
-        body.omega,
-        rotation,
-        start,
-        limit,
+        body_state(
+            body.axes,
+            body.rho,
+            body.omega,
+            rotation,
+            material.phi,
+            material.c_pa,
+            surface=material.surface_code,
+        ),
+        Span(start, stop, limit),
         encounter.tide,
-        t_rest=stop,
-        phi=material.phi,
-        cohesion=material.c_pa,
-        surface=material.surface_code,
+        limits=LIMITS._replace(tolerance=tolerance, axis_ratio=np.inf),
         unyielding=True,
-        tolerance=tolerance,
-        max_axis_ratio=np.inf,
         keep=ROWS,
         ground=ground_near(encounter, float(body.axes[0])),
     )

@@ -23,7 +23,7 @@ from flybystab.catalogues.asteroid import identity
 from flybystab.catalogues.catalogue import Asteroid
 from flybystab.catalogues.tumbling import attitude_matrix, isotropic_direction
 from flybystab.constants import G
-from flybystab.core.dynamics.run import integrate
+from flybystab.core.dynamics.run import LIMITS, body_state, integrate
 from flybystab.core.ellipsoid.yield_bound import quick_margins, tide_size
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
@@ -253,18 +253,11 @@ def _need(
 ) -> float:
     """Largest friction angle (rad) that the rigid body mobilises in a passage."""
     run = integrate(
-        body.axes,
-        rho,
-        body.omega,
-        turn,
-        encounter.t_start,
-        encounter.t_stop,
+        body_state(body.axes, rho, body.omega, turn, phi=0.5, cohesion=cohesion, surface=code),
+        (encounter.t_start, encounter.t_stop),
         encounter.tide,
-        phi=0.5,
-        cohesion=cohesion,
-        surface=code,
+        limits=LIMITS._replace(tolerance=_TOLERANCE),
         unyielding=True,
-        tolerance=_TOLERANCE,
     )
     return float(run.max_friction)
 

@@ -5,7 +5,7 @@ import inspect
 import numpy as np
 import pytest
 
-from flybystab.core.dynamics.run import integrate
+from flybystab.core.dynamics.run import LIMITS, body_state, integrate
 from flybystab.core.ellipsoid.tide import no_tide
 from flybystab.core.energy.flow_work import LARGEST_VOLUME, gauss, gauss_up_to, growth_at, volume_at
 from flybystab.core.energy.perturbation import (
@@ -64,18 +64,10 @@ def initial_powers(axes, spin, phi, cohesion, dilatancy, code, x, share, longest
     losses = []
     for t in (time, time / 2):
         run = integrate(
-            axes,
-            DENSITY,
-            spin,
-            np.eye(3),
-            0.0,
-            t,
+            body_state(axes, DENSITY, spin, np.eye(3), phi, cohesion * DENSITY, dilatancy, code),
+            (0.0, t),
             no_tide(),
-            phi=phi,
-            cohesion=cohesion * DENSITY,
-            dilatancy=dilatancy,
-            surface=code,
-            tolerance=1e-11,
+            limits=LIMITS._replace(tolerance=1e-11),
             deformation=size * gradient,
         )
         losses.append((kinetic_energy(run.shape, run.velocity_gradient) - start) / (size * t))
@@ -121,7 +113,7 @@ def test_first_power_of_random_bodies(code, dilatancy):
 
 
 def test_the_dilation_is_that_of_the_dynamics():
-    assert inspect.signature(integrate).parameters["expansion"].default == LARGEST_VOLUME
+    assert inspect.signature(body_state).parameters["expansion"].default == LARGEST_VOLUME
     for trace in (0.2, 1.1):
         t = np.linspace(0.0, 4.0, 40_001)
         volume = np.array([volume_at(trace, q) for q in t])

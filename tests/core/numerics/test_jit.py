@@ -41,11 +41,12 @@ def test_kernels_are_cached_where_they_can_be():
 
 FLOWN = """
 import numpy as np
-from flybystab.core.dynamics.run import integrate
+from flybystab.core.dynamics.run import LIMITS, body_state, integrate
 from flybystab.bench.flyby import PHI, case
 
 body, e = case()
-found = integrate(body.axes, body.rho, body.omega, np.eye(3), e.t_start, e.t_stop, e.tide, phi=PHI, tolerance=1e-3)
+state = body_state(body.axes, body.rho, body.omega, np.eye(3), PHI)
+found = integrate(state, (e.t_start, e.t_stop), e.tide, limits=LIMITS._replace(tolerance=1e-3))
 print(found.steps, *found.shape.ravel(), *found.velocity_gradient.ravel())
 """
 

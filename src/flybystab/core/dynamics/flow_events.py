@@ -1,7 +1,8 @@
 """Event functions of plastic flow, and the location of the first event in a step.
 
 The event functions are continuous, and positive while the flow goes on. They are sampled on the dense output of a step;
-where no sample is negative, a minimum between the samples is looked for.
+where no sample is negative, a minimum between the samples is looked for. An explicit step at whose stages all of them
+remain far from zero has no event: it needs neither samples nor dense output.
 """
 
 from __future__ import annotations
@@ -49,6 +50,12 @@ from flybystab.typing import Array
 # from the end of the part of the yield section.
 _RATIO, _DENOMINATOR, _STRENGTH, _PART = range(4)
 
+# Columns of `Workspace.stages`.
+_LEAST, _LARGEST = range(2)
+
+#: An event function that remains above this share of its largest value at the stages of a step has no zero in the step.
+_CLEAR = 0.5
+
 
 class Flow(NamedTuple):
     """Parameters of a flow, and where it ends."""
@@ -76,18 +83,11 @@ def axis_ratio2(y: Array, ws: Workspace) -> float:
 
 
 @kernel
-def least_event(t: float, y: Array, dy: Array, flow: Flow, ws: Workspace) -> tuple[float, int]:
-    """Least of the event functions of flow, negative once the flow has ended, and its code. Sets the rate `dy`.
-
-    The event functions are the strength ``k P + k c`` (the pressure of a fluid), the denominator of the pressure, the
-    distance from the axis ratio where the model is left, from the volume where the dilatancy begins to fade, and on
-    Mohr-Coulomb from the end of the face or of the fan of the corner where the stress is.
-    """
-    par = flow.par
-    material = par.material
+def _event_functions(denominator: float, y: Array, flow: Flow, ws: Workspace) -> None:
+    """Write the event functions of a state just after its rate, with the `denominator` of the pressure."""
+    material = flow.par.material
     work, ends = ws.work, ws.ends
     s = work.s
-    denominator = rate(FLOWING, t, y, dy, par, flow.tide, work)
     strength = s[STRENGTH]
     if material.sin_phi == 0.0 and material.cohesion == 0.0:
         strength = s[PRESSURE]
@@ -111,17 +111,67 @@ def least_event(t: float, y: Array, dy: Array, flow: Flow, ws: Workspace) -> tup
         strength,
         inside,
     )
-    least, code = below, BEYOND
+
+
+@kernel
+def least_event(t: float, y: Array, dy: Array, flow: Flow, ws: Workspace) -> tuple[float, int]:
+    """Least of the event functions of flow, negative once the flow has ended, and its code. Sets the rate `dy`.
+
+    The event functions are the strength ``k P + k c`` (the pressure of a fluid), the denominator of the pressure, the
+    distance from the axis ratio where the model is left, from the volume where the dilatancy begins to fade, and on
+    Mohr-Coulomb from the end of the face or of the fan of the corner where the stress is.
+    """
+    denominator = rate(FLOWING, t, y, dy, flow.par, flow.tide, ws.work)
+    _event_functions(denominator, y, flow, ws)
+    ends = ws.ends
+    least, code = ends[_RATIO, -1], BEYOND
     if denominator < least:
         least, code = denominator, JAM
-    if strength < least:
-        least, code = strength, LOSS
-    if inside < least:
-        least, code = inside, SWITCH
-    ahead = flow.fade_volume - s[VOLUME]
+    if ends[_STRENGTH, -1] < least:
+        least, code = ends[_STRENGTH, -1], LOSS
+    if ends[_PART, -1] < least:
+        least, code = ends[_PART, -1], SWITCH
+    ahead = flow.fade_volume - ws.work.s[VOLUME]
     if ahead < least:
         least, code = ahead, FADE
     return least, code
+
+
+@kernel
+def begin_stages(ws: Workspace) -> None:
+    """Start the range of the event functions over the stages of a step with their values at its start."""
+    for i in range(4):
+        ws.stages[i, _LEAST] = ws.stages[i, _LARGEST] = ws.ends[i, 0]
+
+
+@kernel
+def add_stage(denominator: float, y: Array, flow: Flow, ws: Workspace) -> None:
+    """Extend the range by the state of a stage, just after its rate, with the `denominator` of the pressure."""
+    _event_functions(denominator, y, flow, ws)
+    for i in range(4):
+        value = ws.ends[i, -1]
+        # not min and max: a nan has to remain
+        if not value >= ws.stages[i, _LEAST]:
+            ws.stages[i, _LEAST] = value
+        if not value <= ws.stages[i, _LARGEST]:
+            ws.stages[i, _LARGEST] = value
+
+
+@kernel
+def clear_of_events(flow: Flow, ws: Workspace) -> bool:
+    """Whether no event function can vanish in the step just made, whose last stage is its end.
+
+    The event functions at the end become the first of the next step.
+    """
+    for i in range(4):
+        least = ws.stages[i, _LEAST]
+        if not (least > 0.0 and least >= _CLEAR * ws.stages[i, _LARGEST]):
+            return False
+    # The volume of a flow only grows.
+    if not ws.work.s[VOLUME] < flow.fade_volume:
+        return False
+    sample(-1, 0, ws)
+    return True
 
 
 @kernel

@@ -9,6 +9,9 @@ import numpy as np
 from flybystab.core.dynamics.flow_events import (
     Flow,
     FlowStep,
+    add_stage,
+    begin_stages,
+    clear_of_events,
     first_event,
     least_event,
     record_end,
@@ -16,13 +19,14 @@ from flybystab.core.dynamics.flow_events import (
     record_inside,
     sample,
 )
-from flybystab.core.dynamics.ground import Ground, Step, contact_time
+from flybystab.core.dynamics.ground import Ground, Step, contact_time, may_touch
 from flybystab.core.dynamics.jacobian import flow_jacobian
 from flybystab.core.dynamics.rates import rate
 from flybystab.core.dynamics.state import BEYOND_FACE, FLOWING, N_FULL, PLACE, W_N, Parameters
-from flybystab.core.dynamics.steppers import explicit_dense, explicit_step, implicit_step
+from flybystab.core.dynamics.steppers import explicit_dense, implicit_step
 from flybystab.core.dynamics.workspace import (
     ARREST,
+    BEYOND,
     D_REST,
     DONE,
     FADE,
@@ -43,6 +47,7 @@ from flybystab.core.ellipsoid.tide import TidePanels
 from flybystab.core.material.flow_rule import fade_start
 from flybystab.core.material.mohr_coulomb_hexagon import on_hexagon, part_of_flow, restore_flow_rule
 from flybystab.core.material.parameters import FACE, SMOOTH, on_part
+from flybystab.core.numerics.dop853 import N_STAGES, NODE, error_norm, error_sums, stage_state
 from flybystab.core.numerics.jit import inlined, kernel
 from flybystab.core.numerics.tensors import determinant, deviator
 from flybystab.typing import Array
@@ -106,12 +111,25 @@ def _begin_flow(
     return Flow(par, tide, limits.axis_ratio * limits.axis_ratio, fading)
 
 
+@kernel
+def _explicit_step(t: float, h: float, flow: Flow, ws: Workspace) -> float:
+    """`explicit_step` of flow, which leaves the range of the event functions over its stages in ``ws.stages``."""
+    begin_stages(ws)
+    y1, k = ws.y1, ws.k
+    for s in range(1, N_STAGES + 1):
+        stage_state(s, ws.y, N_FULL, h, k, y1)
+        denominator = rate(FLOWING, t + NODE[s] * h, y1, k[s], flow.par, flow.tide, ws.work)
+        add_stage(denominator, y1, flow, ws)
+    five, three = error_sums(N_FULL, k, ws.scale)
+    if not np.isfinite(five + three):
+        return np.inf
+    return error_norm(five, three, N_FULL, h)
+
+
 @inlined
 def _step(explicit: bool, t: float, h: float, flow: Flow, ws: Workspace) -> float:
     """One step of flow from ``ws.y`` to ``ws.y1``; an explicit one has its first rate in ``ws.k[0]``."""
-    if explicit:
-        return explicit_step(FLOWING, t, N_FULL, h, flow.par, flow.tide, ws)
-    return implicit_step(t, h, flow.par, flow.tide, ws)
+    return _explicit_step(t, h, flow, ws) if explicit else implicit_step(t, h, flow.par, flow.tide, ws)
 
 
 @kernel
@@ -185,8 +203,6 @@ def _accepted_step(
         error = _step(explicit, t, h, flow, ws)
         count_step(log)
         if error <= 1.0:
-            if explicit:
-                explicit_dense(FLOWING, t, N_FULL, h, flow.par, flow.tide, ws)
             return FlowStep(explicit, t, h), error, growth
         count_rejected(log)
         # Near onset the error falls slower than the order says: a second rejection at least halves the step.
@@ -257,12 +273,46 @@ def _step_to_event(
     return step
 
 
-@kernel
+@inlined
 def _after_event(reason: int, t: float, near: float, flow: Flow, ws: Workspace) -> Flow:
     """The flow that goes on after SWITCH, on another part of the yield section, or FADE, with less dilatancy."""
     if reason == FADE:
         return Flow(flow.par, flow.tide, flow.limit2, np.inf)
     return Flow(_choose_part(t, near, flow.par, flow.tide, ws), flow.tide, flow.limit2, flow.fade_volume)
+
+
+@inlined
+def _first_length(reason: int, step: FlowStep, end: float, method: Method) -> tuple[float, Method]:
+    """Length and method of the first step after an event at the fraction `end` of a step, repeated as `step`."""
+    if reason == FADE:
+        return step.h / end, method
+    return max(step.h, 1e-4), Method(False, method.pull, method.slow, _BETWEEN)
+
+
+@inlined
+def _first_values(t: float, f0: Array, flow: Flow, ws: Workspace) -> tuple[float, int]:
+    """`least_event` of the state ``ws.y``, whose event functions become the first of the next step."""
+    least, reason = least_event(t, ws.y, f0, flow, ws)
+    sample(-1, 0, ws)
+    return least, reason
+
+
+@inlined
+def _find_event(step: FlowStep, clear: bool, f0: Array, flow: Flow, ws: Workspace) -> tuple[float, int]:
+    """`first_event`, or its result for an explicit step that is `clear` of events."""
+    if not clear:
+        return first_event(step, f0, flow, ws)
+    copy(ws.k[N_STAGES], f0, N_FULL)
+    return 2.0, BEYOND
+
+
+@kernel
+def _reach_rest(t: float, d: float, trend: float, f0: Array, y: Array) -> float:
+    """Advance ``y[15]`` to the time, which is returned, at which ``|D|`` = `d` vanishes at its present rate."""
+    time = d / -trend
+    for i in range(N_FULL):
+        y[i] += time * f0[i]
+    return t + time
 
 
 @kernel
@@ -298,22 +348,19 @@ def follow_flow(
     near = 1e-6 + 10.0 * tol  # the direction of D is known no better
     h = 1e-4
     method = Method(False, 0.0, 0.0, 0)
-    touched = False
     fastest = 0.0
     flow = _begin_flow(t, near, par, tide, limits, ws)
-    least, reason = least_event(t, y, f0, flow, ws)
+    least, reason = _first_values(t, f0, flow, ws)
     if least < 0.0:
         return reason, t
-    sample(-1, 0, ws)
+    touched = False
     while t < t1:
         # Here f0 and the stress in `ws.work` belong to (t, y).
         record_flow(t, y, flow.par, ws, log)
         d, trend = _strain_rate(y, f0, ws.stress)
         fastest = max(fastest, d)
         if _near_rest(d, trend, fastest, tol):
-            for i in range(N_FULL):
-                y[i] += d / -trend * f0[i]
-            return ARREST, t + d / -trend
+            return ARREST, _reach_rest(t, d, trend, f0, y)
         method = _choose_method(method, t, h, d, f0, flow, ws)
         if method.explicit:
             copy(f0, ws.k[0], N_FULL)
@@ -324,15 +371,20 @@ def follow_flow(
             return STUCK, t
         h = step.h
         last = h >= t1 - t
-        if not touched:
-            end_time = contact_time(Step(FLOWING, step.explicit, t, h, par.rigid), ground, ws)
+        way = Step(FLOWING, step.explicit, t, h, par.rigid)
+        low = not touched and may_touch(way, ground, ws)
+        clear = step.explicit and not (low or keeps_history(log)) and clear_of_events(flow, ws)
+        if step.explicit and not clear:
+            explicit_dense(FLOWING, t, N_FULL, h, flow.par, flow.tide, ws)
+        if low:
+            end_time = contact_time(way, ground, ws)
             if end_time < np.inf:  # repeat the step up to the contact
                 touched = True
                 t1 = end_time
                 drop_last_row(log)
                 least_event(t, y, f0, flow, ws)
                 continue
-        end, reason = first_event(step, f0, flow, ws)
+        end, reason = _find_event(step, clear, f0, flow, ws)
         if end <= 1.0:
             goes_on = reason in (SWITCH, FADE)
             step = _step_to_event(step, end, goes_on, flow, ws, log)
@@ -341,15 +393,10 @@ def follow_flow(
                 record_end(t, y, f0, flow, ws, log)
                 return reason, t
             flow = _after_event(reason, t, near, flow, ws)
-            if reason == FADE:
-                h = step.h / end
-            else:
-                h = max(step.h, 1e-4)
-                method = Method(False, method.pull, method.slow, _BETWEEN)
-            least, reason = least_event(t, y, f0, flow, ws)
+            h, method = _first_length(reason, step, end, method)
+            least, reason = _first_values(t, f0, flow, ws)
             if least < 0.0:
                 return reason, t
-            sample(-1, 0, ws)
             continue
         t = t1 if last else t + h
         if _end_step(step, t, flow, ws, log) < D_REST:

@@ -131,15 +131,9 @@ def _crossing(low: float, high: float, size: float, ground: Ground, n: Array) ->
 
 
 @kernel
-def contact_time(step: Step, ground: Ground, ws: Workspace) -> float:
-    """Time at which the body first touches the ground in a step; infinite if it does not.
-
-    Overwrites ``ws.ys``.
-    """
-    if ground.coefficients.shape[0] == 0:
-        return np.inf
+def _extent(step: Step, ground: Ground, ws: Workspace) -> tuple[float, float]:
+    """Largest distance of a point of the body from its centre in a step (m), and the rate at which it turns."""
     y, y1 = ws.y, ws.y1
-    t = step.t
     if step.regime == RIGID:
         size = max(step.rigid.s1, step.rigid.s2, step.rigid.s3)
         turn = np.sqrt(y1[4] ** 2 + y1[5] ** 2 + y1[6] ** 2)
@@ -150,14 +144,32 @@ def contact_time(step: Step, ground: Ground, ws: Workspace) -> float:
         for i in range(6, 15):
             turn += y1[i] ** 2
         turn = np.sqrt(turn)
-    size = ground.unit * np.sqrt(size)
-    if size < ground.least:
+    return ground.unit * np.sqrt(size), turn
+
+
+@kernel
+def may_touch(step: Step, ground: Ground, ws: Workspace) -> bool:
+    """Whether the centre of the body comes so low in a step that the body may touch the ground."""
+    if ground.coefficients.shape[0] == 0:
+        return False
+    size, _ = _extent(step, ground, ws)
+    lowest = min(max(0.0, step.t), step.t + step.h)
+    return size >= ground.least and _direction(lowest, ground, np.empty(3)) < size
+
+
+@kernel
+def contact_time(step: Step, ground: Ground, ws: Workspace) -> float:
+    """Time at which the body first touches the ground in a step; infinite if it does not.
+
+    Overwrites ``ws.ys``; reads the interpolant of the step only where it `may_touch` the ground.
+    """
+    if not may_touch(step, ground, ws):
         return np.inf
-    n = np.empty(3)
+    size, turn = _extent(step, ground, ws)
+    t = step.t
     end = t + step.h
     lowest = min(max(0.0, t), end)
-    if _direction(lowest, ground, n) >= size:
-        return np.inf
+    n = np.empty(3)
     a, b = t, end
     if _direction(t, ground, n) >= size:
         a = _crossing(t, lowest, size, ground, n)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from flybystab.core.dynamics.ground import Ground, Step, contact_time
@@ -17,6 +19,7 @@ from flybystab.core.dynamics.steppers import (
 from flybystab.core.dynamics.workspace import (
     DONE,
     N_SAMPLE,
+    N_SUMMITS,
     ONSET,
     STUCK,
     TOUCH,
@@ -46,6 +49,21 @@ _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
 #: Fraction of a step at which the slope at its ends is probed: a maximum nearer than this is missed by its square.
 _BESIDE = 1e-4
+
+#: Largest excess of the mobilised friction over the parabola through three samples, in ranges of the samples of a step.
+_SLACK = 0.25
+
+# Columns of `Workspace.summits`.
+_BOUND, _TIME, _LENGTH, _FROM, _TO = range(5)
+
+
+class RigidStep(NamedTuple):
+    """A step of rigid motion from the state `y` at `t` over `h`, with its interpolant."""
+
+    t: float
+    h: float
+    y: Array
+    dense: Array
 
 
 @kernel
@@ -107,27 +125,28 @@ def _rigid_values(t: float, y: Array, par: Parameters, tide: TidePanels, ws: Wor
 
 @kernel
 def _largest(
-    a: float, b: float, t: float, h: float, par: Parameters, tide: TidePanels, ws: Workspace, which: int
+    a: float, b: float, step: RigidStep, par: Parameters, tide: TidePanels, ws: Workspace, which: int
 ) -> tuple[float, float]:
     """Golden-section maximum over the fractions [a, b] of a rigid step: where, and how large."""
+    t, h, y, dense = step.t, step.h, step.y, step.dense
     x1 = b - _GOLDEN * (b - a)
     x2 = a + _GOLDEN * (b - a)
-    explicit_at(x1, ws.y, N_RIGID, ws.dense, ws.ys)
+    explicit_at(x1, y, N_RIGID, dense, ws.ys)
     f1 = _rigid_values(t + x1 * h, ws.ys, par, tide, ws, which)
-    explicit_at(x2, ws.y, N_RIGID, ws.dense, ws.ys)
+    explicit_at(x2, y, N_RIGID, dense, ws.ys)
     f2 = _rigid_values(t + x2 * h, ws.ys, par, tide, ws, which)
     for _ in range(20):  # the place to 1e-4 of the interval, the maximum to its square
         if f1 < f2:
             a = x1
             x1, f1 = x2, f2
             x2 = a + _GOLDEN * (b - a)
-            explicit_at(x2, ws.y, N_RIGID, ws.dense, ws.ys)
+            explicit_at(x2, y, N_RIGID, dense, ws.ys)
             f2 = _rigid_values(t + x2 * h, ws.ys, par, tide, ws, which)
         else:
             b = x2
             x2, f2 = x1, f1
             x1 = b - _GOLDEN * (b - a)
-            explicit_at(x1, ws.y, N_RIGID, ws.dense, ws.ys)
+            explicit_at(x1, y, N_RIGID, dense, ws.ys)
             f1 = _rigid_values(t + x1 * h, ws.ys, par, tide, ws, which)
     return (x1, f1) if f1 > f2 else (x2, f2)
 
@@ -197,7 +216,7 @@ def _sample_step(
     for j in range(N_SAMPLE + 1):
         if onset[j] + margin > 0.0 and _summit(onset, j, N_SAMPLE, t, h, par, tide, ws, _ONSET):
             a, b = _interval(j, N_SAMPLE)
-            x, value = _largest(a, b, t, h, par, tide, ws, _ONSET)
+            x, value = _largest(a, b, RigidStep(t, h, ws.y, ws.dense), par, tide, ws, _ONSET)
             if value > 0.0:
                 return x, int(np.floor(x * N_SAMPLE))
     return 2.0, N_SAMPLE
@@ -215,22 +234,74 @@ def _record_samples(
         record(t + x * h, RIGID, ws.ys, par, p, norm, det, ws, log)
 
 
+@kernel
+def _summit_bound(f: Array, j: int, last: int) -> float:
+    """Upper bound of the friction in the interval around sample `j` of ``f[: last + 1]``; infinite if a sample is.
+
+    It is the maximum of the parabola through the three samples nearest to `j`, with a margin for the difference between
+    the parabola and the function.
+    """
+    span = f[: last + 1].max() - f[: last + 1].min()
+    if not span < np.inf:
+        return np.inf
+    if last < 2:
+        return f[j] + span
+    k = min(max(j, 1), last - 1)
+    top = max(f[k - 1], max(f[k], f[k + 1]))
+    if _vertex_inside(f[k - 1], f[k], f[k + 1]):
+        top = max(top, f[k] - (f[k + 1] - f[k - 1]) ** 2 / (8.0 * (f[k - 1] - 2.0 * f[k] + f[k + 1])))
+    return min(f[j] + span, top + _SLACK * span)
+
+
+@kernel
+def _keep_summit(bound: float, a: float, b: float, step: RigidStep, least: float, ws: Workspace) -> bool:
+    """Store an interval to be searched at the end of the motion, if there is room; `least` is the peak so far."""
+    for k in range(N_SUMMITS):
+        row = ws.summits[k]
+        if row[_BOUND] <= least:
+            row[_BOUND], row[_TIME], row[_LENGTH], row[_FROM], row[_TO] = bound, step.t, step.h, a, b
+            copy(step.y, ws.summit_states[k], N_RIGID)
+            for i in range(ws.summit_dense.shape[1]):
+                copy(step.dense[i], ws.summit_dense[k, i], N_RIGID)
+            return True
+    return False
+
+
+@kernel
+def _search_summits(par: Parameters, tide: TidePanels, peak: Peak, ws: Workspace) -> Peak:
+    """The largest of `peak` and the friction in the stored intervals, those with the largest bounds first."""
+    while True:
+        k = np.argmax(ws.summits[:, _BOUND])
+        row = ws.summits[k]
+        if not row[_BOUND] > peak.friction:
+            return peak
+        row[_BOUND] = -np.inf
+        step = RigidStep(row[_TIME], row[_LENGTH], ws.summit_states[k], ws.summit_dense[k])
+        x, value = _largest(row[_FROM], row[_TO], step, par, tide, ws, _FRICTION)
+        peak = larger(peak, value, step.t + x * step.h)
+
+
 @inlined
 def _friction_peak(
     t: float, h: float, n: int, par: Parameters, tide: TidePanels, peak: Peak, ws: Workspace
 ) -> Peak:
-    """The larger of `peak` and the largest mobilised friction up to sample `n` of a step."""
+    """The larger of `peak` and the mobilised friction at the samples up to `n` of a step.
+
+    An interval between samples whose maximum may be larger is stored in ``ws.summits``: only those that still may hold
+    the largest friction at the end of the motion are searched.
+    """
     f = ws.sample[_FRICTION]
-    margin = f[: n + 1].max() - f[: n + 1].min()
+    for j in range(1, n + 1):
+        if f[: n + 1].max() < np.inf:
+            peak = larger(peak, f[j], t + h * j / N_SAMPLE)
     for j in range(n + 1):
-        if (
-            f[j] < np.inf
-            and f[j] + margin > peak.friction
-            and _summit(f, j, n, t, h, par, tide, ws, _FRICTION)
-        ):
+        bound = _summit_bound(f, j, n)
+        if f[j] < np.inf and bound > peak.friction and _summit(f, j, n, t, h, par, tide, ws, _FRICTION):
             a, b = _interval(j, n)
-            x, value = _largest(a, b, t, h, par, tide, ws, _FRICTION)
-            peak = larger(peak, value, t + x * h)
+            step = RigidStep(t, h, ws.y, ws.dense)
+            if bound == np.inf or not _keep_summit(bound, a, b, step, peak.friction, ws):
+                x, value = _largest(a, b, step, par, tide, ws, _FRICTION)
+                peak = larger(peak, value, t + x * h)
     for j in range(1, n + 1):
         peak = larger(peak, f[j], t + h * j / N_SAMPLE)
     return peak
@@ -300,7 +371,7 @@ def _record_state(
 
 
 @kernel
-def follow_rigid(
+def _follow(
     t: float,
     t1: float,
     first_step: float,
@@ -313,22 +384,7 @@ def follow_rigid(
     ws: Workspace,
     log: Log,
 ) -> tuple[int, float, float, Peak]:
-    """Rigid motion of ``ws.y[:7]`` up to yield, the ground or `t1`.
-
-    Parameters
-    ----------
-    first_step : float
-        Length of the first step; 0 for a default.
-    unyielding : bool
-        Do not stop at yield.
-    peak : Peak
-        Largest mobilised friction up to `t`.
-
-    Returns
-    -------
-    reason, time, step, peak
-        The end, its time, the length of the next step (0 unless it ends at yield), and the largest mobilised friction.
-    """
+    """`follow_rigid` with the stored intervals of friction not searched yet."""
     y, k, tol = ws.y, ws.k, limits.tolerance
     h = min(0.05 if first_step <= 0.0 else first_step, t1 - t, _longest_step(t, tol, tide))
     rate(RIGID, t, y, k[0], par, tide, ws.work)
@@ -369,6 +425,41 @@ def follow_rigid(
         k[0] = k[N_STAGES]
         h = min(h * explicit_growth(error), _longest_step(t, tol, tide))
     return TOUCH if touched else DONE, t, 0.0, peak
+
+
+@kernel
+def follow_rigid(
+    t: float,
+    t1: float,
+    first_step: float,
+    par: Parameters,
+    tide: TidePanels,
+    ground: Ground,
+    limits: Limits,
+    unyielding: bool,
+    peak: Peak,
+    ws: Workspace,
+    log: Log,
+) -> tuple[int, float, float, Peak]:
+    """Rigid motion of ``ws.y[:7]`` up to yield, the ground or `t1`.
+
+    Parameters
+    ----------
+    first_step : float
+        Length of the first step; 0 for a default.
+    unyielding : bool
+        Do not stop at yield.
+    peak : Peak
+        Largest mobilised friction up to `t`.
+
+    Returns
+    -------
+    reason, time, step, peak
+        The end, its time, the length of the next step (0 unless it ends at yield), and the largest mobilised friction.
+    """
+    ws.summits[:, _BOUND] = -np.inf
+    reason, t, step, peak = _follow(t, t1, first_step, par, tide, ground, limits, unyielding, peak, ws, log)
+    return reason, t, step, _search_summits(par, tide, peak, ws)
 
 
 @kernel

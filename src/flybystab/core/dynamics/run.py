@@ -31,6 +31,9 @@ EVENTS = (
 #: ``V/V0`` at which dilation has ended.
 EXPANSION = 1.5
 
+#: Limits of :func:`integrate` unless others are given.
+LIMITS = Limits(1e-9, 6.0, 200_000)
+
 
 class BodyState(NamedTuple):
     """A body at the start of a run, in SI units.
@@ -63,6 +66,33 @@ class BodyState(NamedTuple):
     surface: int
     brittle: bool
     expansion: float
+
+
+def body_state(
+    axes: Array,
+    rho: float,
+    omega: Array,
+    attitude: Array,
+    phi: float,
+    cohesion: float = 0.0,
+    dilatancy: float = 0.0,
+    surface: int = 0,
+    brittle: bool = False,
+    expansion: float = EXPANSION,
+) -> BodyState:
+    """A :class:`BodyState` for :func:`integrate`, from arrays of any kind."""
+    return BodyState(
+        np.array(axes, dtype=float),
+        rho,
+        np.array(omega, dtype=float),
+        np.array(attitude, dtype=float, order="C"),
+        phi,
+        cohesion,
+        dilatancy,
+        surface,
+        brittle,
+        expansion,
+    )
 
 
 class FinalState(NamedTuple):
@@ -272,25 +302,12 @@ _evolve_rigid: Any = getattr(evolve_rigid, "py_func", evolve_rigid)
 
 
 def integrate(
-    axes: Array,
-    rho: float,
-    omega: Array,
-    attitude: Array,
-    t_start: float,
-    t_stop: float,
+    body: BodyState,
+    span: Span | tuple[float, float],
     tide: TidePanels,
     *,
-    t_rest: float | None = None,
-    phi: float,
-    cohesion: float = 0.0,
-    dilatancy: float = 0.0,
-    surface: int = 0,
-    brittle: bool = False,
-    expansion: float = EXPANSION,
+    limits: Limits = LIMITS,
     unyielding: bool = False,
-    tolerance: float = 1e-9,
-    max_axis_ratio: float = 6.0,
-    max_steps: int = 200_000,
     keep: int = 0,
     deformation: Array | None = None,
     ground: Ground | None = None,
@@ -299,26 +316,17 @@ def integrate(
 
     Parameters
     ----------
-    axes, rho, omega : ndarray (3,), float, ndarray (3,)
-        Semi-axes (m), density (kg/m3), spin along the body axes (rad/s).
-    attitude : ndarray (3, 3)
-        Rotation matrix, body axes -> frame of the tide.
-    t_start, t_stop : float
-        Span, s, on the clock of the tide.
+    body : BodyState
+        Made by :func:`body_state`.
+    span : Span or (float, float)
+        Start and end, s, on the clock of the tide; a :class:`Span` also has the time from which a body at rest ends the
+        run.
     tide : TidePanels
         SI.
-    t_rest : float, optional
-        A body that is rigid at or after this time ends the run; `t_stop` by default.
-    phi, cohesion, dilatancy, surface, brittle, expansion
-        Material, as in :class:`BodyState`.
+    limits : Limits
+        Relative error allowed in a step, axis ratio beyond which the model is left, number of steps.
     unyielding : bool
         Stay rigid whatever the stress, for the friction that would be needed.
-    tolerance : float
-        Relative error allowed in a step.
-    max_axis_ratio : float
-        Axis ratio beyond which the homogeneous model is left.
-    max_steps : int
-        Steps after which the run is given up.
     keep : int
         Rows of history to keep at most; 0 for none.
     deformation : ndarray (3, 3), optional
@@ -328,26 +336,15 @@ def integrate(
     """
     shape, gradient = np.empty((3, 3)), np.empty((3, 3))
     log = new_log(keep, 64)
-    body = BodyState(
-        np.array(axes, dtype=float),
-        rho,
-        np.array(omega, dtype=float),
-        np.array(attitude, dtype=float, order="C"),
-        phi,
-        cohesion,
-        dilatancy,
-        surface,
-        brittle,
-        expansion,
-    )
-    span = Span(float(t_start), float(t_stop if t_rest is None else t_rest), float(t_stop))
+    start, stop = float(span[0]), float(span[-1])
+    times = Span(start, float(span.rest) if isinstance(span, Span) else stop, stop)
+    limits = Limits(float(limits.tolerance), float(limits.axis_ratio), int(limits.max_steps))
     below = no_ground() if ground is None else ground
-    limits = Limits(float(tolerance), float(max_axis_ratio), max_steps)
     if unyielding and deformation is None:
-        end = _evolve_rigid(body, span, tide, below, limits, True, shape, gradient, log)
+        end = _evolve_rigid(body, times, tide, below, limits, True, shape, gradient, log)
     else:
-        start = np.zeros((3, 3)) if deformation is None else np.array(deformation, dtype=float, order="C")
-        end = _evolve(body, span, tide, below, limits, unyielding, start, shape, gradient, log)
+        added = np.zeros((3, 3)) if deformation is None else np.array(deformation, dtype=float, order="C")
+        end = _evolve(body, times, tide, below, limits, unyielding, added, shape, gradient, log)
     counts = log.counts[0]
     return Run(
         EVENTS[end.reason],
@@ -358,7 +355,7 @@ def integrate(
         float(end.peak.friction),
         float(end.peak.time),
         event_log(log),
-        unpacked_history(log.history[: counts["rows"]], axes, rho) if keep > 1 else None,
+        unpacked_history(log.history[: counts["rows"]], body.axes, body.rho) if keep > 1 else None,
         int(counts["steps"]),
         int(counts["rejected"]),
     )

@@ -45,6 +45,9 @@ COUNTS = np.dtype([("rows", "i8"), ("events", "i8"), ("steps", "i8"), ("rejected
 #: Samples in a step: history rows, and the grid on which extrema of the yield function are looked for while rigid.
 N_SAMPLE = 4
 
+#: Intervals of rigid motion that may hold the largest mobilised friction, kept until the end of the motion.
+N_SUMMITS = 8
+
 #: Rate of strain, in dynamical units, below which the body is at rest.
 D_REST = 1e-10
 
@@ -102,6 +105,10 @@ class Workspace(NamedTuple):
     start_rate: Array  # flow: rate at the start of a step
     inner_rate: Array  # flow: rate at a point inside a step
     ends: Array  # flow: event functions (rows) at the samples of a step, and last
+    stages: Array  # flow: least and largest event functions (rows) over the stages of a step
+    summits: Array  # rigid, of `N_SUMMITS` intervals: bound of the friction, time and length of the step, fractions
+    summit_states: Array  # the states at the start of these steps
+    summit_dense: Array  # their interpolants
 
 
 @kernel
@@ -136,6 +143,10 @@ def workspace() -> Workspace:
         np.zeros(15),
         np.zeros(15),
         np.zeros((4, N_SAMPLE + 2)),
+        np.zeros((4, 2)),
+        np.zeros((N_SUMMITS, 5)),
+        np.zeros((N_SUMMITS, 7)),
+        np.zeros((N_SUMMITS, 7, 7)),
     )
 
 
@@ -158,6 +169,10 @@ def borrowed_workspace(ws: Workspace) -> Workspace:
         borrowed(ws.start_rate),
         borrowed(ws.inner_rate),
         borrowed(ws.ends),
+        borrowed(ws.stages),
+        borrowed(ws.summits),
+        borrowed(ws.summit_states),
+        borrowed(ws.summit_dense),
     )
 
 

@@ -23,7 +23,7 @@ depends on ``I1 I2/I3`` alone, to a few per cent (9 for a sphere).
 from __future__ import annotations
 
 import numpy as np
-from scipy.special import roots_legendre
+from numpy.polynomial.legendre import leggauss
 
 from flybystab.core.ellipsoid.potential import gravity_coefficients
 from flybystab.core.numerics.jit import kernel, summing_kernel
@@ -36,7 +36,7 @@ REACH = (13.0, 37.0, 175.0, 750.0)
 
 
 # the positive half of each symmetric rule
-_T, _WEIGHT = np.concatenate([np.array(roots_legendre(2 * n))[:, n:] for n in NODES], axis=1)
+_T, _WEIGHT = np.concatenate([np.array(leggauss(2 * n))[:, n:] for n in NODES], axis=1)
 _FIRST = np.concatenate([[0], np.cumsum(NODES)])
 _X = _T * _T
 # Q = Q_0 + j1 Q_1 + j2 Q_2 + j3 Q_3 with the invariants j of S/m
