@@ -2,7 +2,7 @@
 
 Three screenings, whose tables stay in ``out/results``: the embedded catalogue and, where the source tables are
 (``../shared/data`` by default), JPL's full-precision orbits of 4,056 asteroids until 2050, and the past. ``--keep``
-takes finished tables as they are and only writes the page again.
+reads finished tables and only writes the page again.
 """
 
 import argparse
@@ -36,7 +36,7 @@ OUT = ROOT / "out" / "results"
 NEW, OLD = "nea_sbdb_fullprec_2026-07.csv.gz", "nea_sbdb_fullprec_2020-09.csv.gz"
 MPC = "nea_mpc_2026-02.csv.gz"
 SAMPLES = 100
-#: A pile without strength that turns slowly: what the tide could do at most.
+#: Slowly rotating piles without cohesion, on which the tide has the largest effect.
 WEAK = {"cohesion_Pa": 0, "spin_period_h": {"kind": "uniform", "low": 4, "high": 12}, "replace_assumed": True}
 #: Name: catalogue (None: embedded), dates, largest distance (au), population.
 RUNS = {
@@ -47,9 +47,9 @@ RUNS = {
     "others": (None, "2002-01-01", "2020-01-01", 0.05, {}),
     "weak": (OLD, "2000-01-01", "2021-01-01", 0.001, WEAK),
 }
-#: Asteroids of passages to know that the other screenings do not have, by table.
+#: Asteroids of well-known encounters that the other screenings do not contain, by table.
 OTHERS = {MPC: ("2002 MN", "2008 TC3", "2019 OK"), NEW: ("2014 HQ124",)}
-#: Passages that a reader may look for: name and month.
+#: Encounters that a reader may look for: name and month.
 FAMOUS = [
     ("Apophis", "2029-04"),
     ("Toutatis", "2004-09"),
@@ -69,7 +69,7 @@ FAMOUS = [
 
 
 def run(name, data, jobs, keep):
-    """The table of one screening, and the seconds it took (nan if it was there)."""
+    """The table of one screening, and its time in s (nan if it was read from a file)."""
     file, start, stop, within, population = RUNS[name]
     path = OUT / f"{name}.ecsv"
     if keep and path.exists():
@@ -77,7 +77,7 @@ def run(name, data, jobs, keep):
     if name == "others":
         chosen = [find(catalogue(data / f), n, f) for f, names in OTHERS.items() for n in names]
         chosen = with_physical_data(chosen)
-    elif name == "weak":  # no period of the LCDB: all turn slowly
+    elif name == "weak":  # without the periods of the LCDB, so that all rotate slowly
         chosen = catalogue(data / file)
     else:
         chosen = listed(None if file is None else data / file)
@@ -103,16 +103,18 @@ def counts(table):
     s = summary(table)
     words = ", ".join(f"{n} {v}" for v, n in s.verdicts.items())
     return (
-        f"{s.rows} passages: {words}" + (f"; {s.failed} not computed" if s.failed else "") + f". {s.samples} "
-        f"samples, {s.samples_dynamic} of them ({100 * s.dynamic_share:.2g} %) by the dynamics."
+        f"{s.rows} encounters: {words}"
+        + (f"; {s.failed} not computed" if s.failed else "")
+        + f". {s.samples} "
+        f"samples, {s.samples_dynamic} of them ({100 * s.dynamic_share:.2g} %) integrated."
     )
 
 
 def passages(table, order):
-    """A table of passages in Markdown."""
+    """A table of encounters in Markdown."""
     head = (
-        "| asteroid | date (TDB) | distance (km) | v_inf (km/s) | verdict | margin (deg) | passage adds (deg) "
-        "| P(yield), 95 % | follows most |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
+        "| asteroid | date (TDB) | distance (km) | v_inf (km/s) | verdict | margin (deg) | encounter adds (deg) "
+        "| P(yield), 95 % | sensitive to |\n| --- | --- | --- | --- | --- | --- | --- | --- | --- |\n"
     )
     rows = []
     for k in order:
@@ -140,14 +142,14 @@ def standing(table):
 
 
 def closest(table, n=10):
-    """Passages of bodies that stand, nearest to failure first: by the probability to yield, then the margin."""
+    """Encounters of bodies in equilibrium, closest to failure first: by the probability of yield, then the margin."""
     p = np.nan_to_num(np.asarray(table["p_yield"], dtype=float))
     order = np.lexsort((table["margin"].value, -p))
     return [k for k in order if standing(table)[k]][:n]
 
 
 def loaded(table, n=10):
-    """Passages that add most; only what is computed counts, not upper limits."""
+    """Encounters that add most; only integrated ones, not upper bounds."""
     rise = np.nan_to_num(table["friction_rise"].to_value(u.deg), nan=-1.0, posinf=1e9)
     computed = standing(table) & (table["decided_by"] == "dynamics")
     return [k for k in np.argsort(-rise, kind="stable") if computed[k]][:n]
@@ -160,7 +162,7 @@ def reshaped(table):
 
 
 def famous(*tables):
-    """The passages to know, each from the first table that has it."""
+    """The well-known encounters, each from the first table that contains it."""
     text = ""
     for name, month in FAMOUS:
         for table in tables:
@@ -174,7 +176,7 @@ def famous(*tables):
                 text += "\n".join(body[:3] if not text else body[2:3]) + "\n"
                 break
         else:
-            sys.exit(f"no passage of {name} in {month}")
+            sys.exit(f"no encounter of {name} in {month}")
     return text
 
 
@@ -194,7 +196,7 @@ def against_cneos(table, data):
         if name not in OTHERS[MPC] or not row["time_tdb"].startswith(months[name]):
             continue
         if row["p_impact"] > 0.0:
-            words.append(f"{name} hits the Earth, as it did, in every sample that can exist")
+            words.append(f"{name} hits the Earth, as it did, in every sample that is in equilibrium")
         else:
             theirs = known[name, row["time_tdb"][:4]]
             words.append(f"{name} at {row['distance'].to_value(u.km):.0f} km (CNEOS: {theirs})")
@@ -202,7 +204,7 @@ def against_cneos(table, data):
 
 
 def bounds():
-    """What survival says of four bodies, with a figure of each."""
+    """Bounds from the survived encounters of four bodies, with a figure of each."""
     text = ""
     for name in ("Anteros", "Toutatis", "Duende", "Geographos"):
         asteroid = Asteroid.from_catalogue(name)
@@ -217,14 +219,14 @@ def bounds():
             for n in ("equilibrium", "any_attitude", "every_attitude")
         )
         what = (
-            "no passage within 0.05 au since 1950"
+            "no encounter within 0.05 au since 1950"
             if strongest is None
             else f"{strongest['passage']}: adds {strongest['adds_at_worst_attitude_deg']:.2f} deg at the worst "
-            f"attitude, {strongest['adds_at_any_attitude_deg']:.2f} deg whatever it was"
+            f"attitude, {strongest['adds_at_any_attitude_deg']:.2f} deg at the most favourable one"
         )
         text += f"| {asteroid.label} | {rest} | {any_} | {every} | {what} |\n"
     head = (
-        "| body | shape and spin | passages, whatever the attitude | enough at every attitude | strongest passage |"
+        "| body | required at rest | required at any attitude | sufficient at every attitude | strongest encounter |"
         "\n| --- | --- | --- | --- | --- |\n"
     )
     return head + text
@@ -236,7 +238,7 @@ def wall(name):
 
 
 def laws():
-    """The population, one law a line, by its keys in a TOML file."""
+    """The priors of the population, one line each, by their keys in a TOML file."""
     rows = "\n".join(f"| `{key}` | {law} |" for key, law in Population().stated().items())
     return f"| input | law |\n| --- | --- |\n{rows}"
 
@@ -260,14 +262,15 @@ def main():
     page = f"""# Results
 
 Made by `python docs/results.py` on orbits of {full["catalogue"][0].rsplit("/")[-1]} (JPL, epoch mostly
-JD 2461200.5) and the embedded catalogue, ephemeris {full["ephemeris"][0]}. Each passage: the catalogue body with
-35 deg of friction, no cohesion and the yield surface {full["yield_surface"][0]}, and {SAMPLES} samples of the
-uncertain inputs, seed 0. In the tables:
+JD 2461200.5) and the embedded catalogue, ephemeris {full["ephemeris"][0]}. Each row
+is an encounter of the catalogue body with 35 deg of friction, no cohesion and the yield surface
+{full["yield_surface"][0]}, and {SAMPLES} samples of the uncertain inputs, seed 0. In the tables:
 
 - *margin*: friction angle minus the largest mobilised one;
-- *passage adds*: increase of the mobilised angle by the encounter; both are bounds where the yield bound decides;
+- *encounter adds*: increase of the mobilised angle by the encounter; this and the margin are bounds where the
+  yield bound is conclusive;
 - *P(yield)*: fraction of the samples in equilibrium that yield or reach the planet, with its Wilson interval;
-- *follows most*: inputs to which the margin is most sensitive, with Spearman's rank correlation.
+- *sensitive to*: inputs to which the margin is most sensitive, with Spearman's rank correlation.
 
 Unmeasured inputs have these priors ([sampled inputs](screening.md#sampled-inputs)):
 
@@ -284,42 +287,43 @@ Unmeasured inputs have these priors ([sampled inputs](screening.md#sampled-input
 4,056 asteroids, Earth, within 0.05 au: {wall("full")}. {counts(full)}
 
 {passages(full, closest(full))}
-Passages that add more than 0.010 deg, as far as there are ten:
+Encounters that add more than 0.010 deg, at most ten:
 
 {passages(full, [k for k in loaded(full) if full["friction_rise"][k] > 0.01 * u.deg])}
-Bodies that the dynamics reshapes at any sampled attitude: {len(touched) or "none"}.
+Bodies that are reshaped at any sampled attitude: {len(touched) or "none"}.
 {passages(full, touched[:20]) if touched else ""}
-Not in equilibrium without cohesion, whatever passes by: {len(spun)} passages of
-{len({full["asteroid"][k] for k in spun})} bodies, which turn too fast for a cohesionless pile.
+Not in equilibrium without cohesion, even without an encounter: {len(spun)} encounters of
+{len({full["asteroid"][k] for k in spun})} bodies, which rotate too fast for a cohesionless pile.
 
 ![Full-precision catalogue](images/results_full.png)
 
-## Passages to know
+## Well-known encounters
 
 {famous(embedded, past, full, deep, others)}
-2002 MN, 2008 TC3 and 2019 OK are in no table of full precision; they are followed on the seven digits of the MPC
+2002 MN, 2008 TC3 and 2019 OK are in no table of full precision; their orbits are the seven-digit elements of the MPC
 ({MPC}): {against_cneos(others, args.data)}.
 
-Of the embedded catalogue since 1950 ({counts(past)[:-1].lower()}), these added most:
+Of the embedded catalogue since 1950 ({counts(past)[:-1].lower()}), these encounters added most:
 
 {passages(past, [k for k in loaded(past) if past["friction_rise"][k] > 0.01 * u.deg])}
-## Deep passages, 2000 to 2020
+## Deep encounters, 2000 to 2020
 
-{len(deep)} passages within 0.001 au (150,000 km) in JPL's catalogue of September 2020, mostly of bodies of a few to
-tens of metres whose shape, spin and density are drawn: {wall("deep")}. {counts(deep)}
-Bodies of that size turn in minutes and need cohesion to exist; the samples that have it, up to 100 Pa, feel nothing.
+{len(deep)} encounters within 0.001 au (150,000 km) in JPL's catalogue of September 2020, mostly of bodies of a few to
+tens of metres whose shape, spin and density are sampled: {wall("deep")}. {counts(deep)}
+Bodies of that size rotate in minutes and need cohesion to be in equilibrium;
+those samples that have enough, up to 100 Pa, never yield.
 
-What the tide could do at most is seen on slow piles without strength, no cohesion and a period drawn evenly
+The largest effect of the tide is that on slowly rotating piles without cohesion, with periods distributed uniformly
 from {WEAK["spin_period_h"]["low"]} to {WEAK["spin_period_h"]["high"]} h:
-{counts(weak)} Passages in which any sample yields ({len(hit)}), worst first:
+{counts(weak)} Encounters in which any sample yields ({len(hit)}), worst first:
 
 {passages(weak, hit[:20])}
-![Slow piles without strength in deep passages](images/results_weak.png)
+![Slowly rotating piles without cohesion in deep encounters](images/results_weak.png)
 
-## What survival says of four bodies
+## Bounds from survived encounters
 
-Least friction angle (deg) without cohesion at 2000 kg/m3 (`flybystab infer NAME --output FILE`); the figures give it
-over density and cohesion.
+Least friction angle (deg) without cohesion at 2000 kg/m3 (`flybystab infer NAME --output FILE`); the figures show it
+against density and cohesion.
 
 {bounds()}
 ![Anteros](images/infer_anteros.png)
