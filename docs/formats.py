@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from flybystab.catalogues.physical import PHYSICAL_READERS, physical_reader_names
-from flybystab.catalogues.readers import READERS, reader_names
+from flybystab.catalogues.physical import PHYSICAL_READERS
+from flybystab.catalogues.readers import READERS
 
 PAGE = Path(__file__).with_name("inputs.md")
 OWN = (
@@ -22,7 +22,7 @@ def orbits() -> str:
         "|---|---|---|---|---|",
         row(*OWN),
     ]
-    for name in sorted(reader_names(), key=str.lower):
+    for name in sorted(READERS.names, key=str.lower):
         c = READERS[name].contents
         label = f"{name}: {c.files}" if c.files else name
         lines.append(row(label, c.elements, c.covariance, c.nongravitational, c.physical))
@@ -32,7 +32,7 @@ def orbits() -> str:
 def physical() -> str:
     """The table of formats of physical parameters."""
     lines = ["| Format | Physical | Spin |", "|---|---|---|"]
-    for name in sorted(physical_reader_names(), key=str.lower):
+    for name in sorted(PHYSICAL_READERS.names, key=str.lower):
         found = PHYSICAL_READERS[name]
         lines.append(row(name, found.physical, found.spin))
     return "\n".join(lines)

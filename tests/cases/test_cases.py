@@ -176,8 +176,8 @@ def test_an_epoch_of_elements_in_utc_warns():
 
 
 def test_a_reader_is_one_registered_function(tmp_path, monkeypatch):
-    monkeypatch.setattr(readers, "READERS", dict(readers.READERS))
-    readers.reader_of("")  # loads the modules
+    readers.READERS.of("")  # imports the modules of the package
+    monkeypatch.setattr(readers.READERS, "_found", dict(readers.READERS._found))
 
     contents = readers.Contents("a, e, i, node, peri, M", "none", "none", "none")
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import flybystab as fs
-from flybystab.catalogues.physical import physical_reader_names, read_physical
+from flybystab.catalogues.physical import PHYSICAL_READERS, read_physical
 from flybystab.catalogues.spin_solutions import SpinSolution, chosen, solution_columns, solutions_of
 from flybystab.cli.main import main
 from flybystab.errors import InvalidInput
@@ -194,12 +194,10 @@ def test_solutions_survive_their_column():
 
 
 def test_formats_do_not_overlap_and_are_gzipped_or_named_as_they_like(tmp_path):
-    from flybystab.catalogues.physical import PHYSICAL_READERS
 
     texts = [json.dumps(CARD), SPIN, MIRROR, LCDB, RIVALS, json.dumps(ANSWER)]
-    physical_reader_names()
     for text in texts:
-        assert sum(r.identify(text.replace("\r\n", "\n")) for r in PHYSICAL_READERS.values()) == 1
+        assert sum(r.identify(text.replace("\r\n", "\n")) for r in PHYSICAL_READERS) == 1
         windows = text.replace("\r\n", "\n").replace("\n", "\r\n")
         (tmp_path / "x").write_bytes(gzip.compress(b"\xef\xbb\xbf" + windows.encode()))
         assert read_physical(tmp_path / "x")

@@ -1,5 +1,7 @@
 """Margins of verdicts, the self-consistent bound fraction, robustness, and one more class."""
 
+import json
+
 import astropy.units as u
 import numpy as np
 import pytest
@@ -7,6 +9,7 @@ from scenes import PILE, earth, material
 from scipy.spatial.transform import Rotation
 
 from flybystab.body.body import Body, Material
+from flybystab.cli.main import main
 from flybystab.constants import G
 from flybystab.errors import InvalidInput
 from flybystab.flybys import verdict as verdicts
@@ -131,14 +134,44 @@ def test_one_more_class_is_one_more_entry(monkeypatch):
     assert classed(0.05) == ("DISRUPTED", "T")
 
 
-def test_the_classes_are_those_of_a_flyby(monkeypatch):
-    """Both functions use the one table: a body that flowed, all of it bound, belongs to the first class."""
+def test_the_distance_to_an_edge_uses_the_edges_of_the_table(monkeypatch):
+    r = flyby(PILE, earth(1.7), max_axis_ratio=30.0, error=False)
+    assert 0.6 < r.bound_fraction < 0.8
+    assert abs(r.margins.relative["bound fraction"]) > 0.05
+    edge = r.bound_fraction - 0.01
+    added = MassClass(Verdict.MASS_LOSS, "C", edge)
+    monkeypatch.setattr(verdicts, "CLASSES", [*CLASSES[:2], added, *CLASSES[2:]])
+    again = flyby(PILE, earth(1.7), max_axis_ratio=30.0, error=False)
+    assert again.margins.relative["bound fraction"] == pytest.approx(0.01, abs=1e-12)
+
+
+def test_the_classes_are_those_of_a_flyby(monkeypatch, tmp_path, capsys):
+    """Functions and commands use the one table: a body that flowed, all of it bound, belongs to the first class."""
     assert flyby(PILE, earth(2.2)).verdict == flyby_many([PILE], [earth(2.2)]).verdict[0] == "RESHAPED"
     monkeypatch.setattr(verdicts, "CLASSES", [MassClass(Verdict.DISRUPTED, "S", -np.inf)])
     r = flyby(PILE, earth(2.2))
     assert (r.verdict, r.verdict_class) == ("DISRUPTED", "S")
     assert r.body.state == "partly unbound"
     assert flyby_many([PILE], [earth(2.2)]).verdict[0] == "DISRUPTED"
+    file = tmp_path / "pile.toml"
+    file.write_text(
+        """
+[body]
+semi_axes = "1400, 850, 750 m"
+density = "2000 kg/m3"
+spin_period = "6 h"
+[material]
+yield_surface = "drucker-prager"
+[encounter]
+planet = "earth"
+periapsis = "2.2 R_earth"
+v_inf = "5 km/s"
+start_distance = "10 R_earth"
+"""
+    )
+    assert main(["scenario", str(file), "--json"]) == 0
+    found = json.loads(capsys.readouterr().out)
+    assert (found["verdict"], found["verdict_class"]) == ("DISRUPTED", "S")
 
 
 def test_robustness_on_demand():

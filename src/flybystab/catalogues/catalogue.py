@@ -18,7 +18,7 @@ from flybystab.body.body import Material
 from flybystab.catalogues.asteroid import CATALOGUE_DATE, Asteroid
 from flybystab.catalogues.designations import name_columns, unpacked
 from flybystab.catalogues.objects import asteroids_of
-from flybystab.catalogues.readers import FRAME, reader_of, text_of
+from flybystab.catalogues.readers import FRAME, READERS, text_of
 from flybystab.catalogues.readers.native import read_native
 from flybystab.catalogues.record import TEXTS, UNITS, key_of
 from flybystab.errors import UnknownName
@@ -61,7 +61,7 @@ def _other_names(text: str) -> list[str]:
 
 def _read(text: str, file: str, name: str) -> tuple[Asteroid, ...]:
     """Asteroids of a text, read by the reader of its format."""
-    found = reader_of(text)
+    found = READERS.of(text)
     material = Material()  # checked once, which takes longer than reading a row
     if found is None:
         return tuple(Asteroid(row, material, file) for row, _ in read_native(text, file))

@@ -15,7 +15,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from flybystab.catalogues.readers import FRAME, reader_of
+from flybystab.catalogues.readers import FRAME, READERS
 from flybystab.catalogues.readers.element_table import entries_of
 from flybystab.errors import InvalidInput
 
@@ -78,7 +78,7 @@ def _entries(given: Any) -> list[Entry]:
 
 
 def _read(text: str) -> list[Entry]:
-    found = reader_of(text)
+    found = READERS.of(text)
     if found is None:
         raise InvalidInput(
             "catalogue", text[:60], "an object with elements: SBDB, MPC or Horizons of astroquery"

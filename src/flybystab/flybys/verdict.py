@@ -79,6 +79,11 @@ def verdict_of(code: int, bound: float) -> Verdict | None:
     return class_of(bound).verdict if code == codes.FLOWED else VERDICTS.get(code)
 
 
+def mass_edges() -> tuple[float, ...]:
+    """Bound mass fractions that separate the classes."""
+    return tuple(c.least for c in CLASSES if c.least > 0.0)
+
+
 def class_of(bound: float) -> MassClass:
     """Class of a body that has flowed."""
     return next(c for c in CLASSES if bound > c.least)

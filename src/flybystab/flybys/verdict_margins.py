@@ -12,7 +12,7 @@ from flybystab.errors import NotConverged
 from flybystab.flybys.batch import FlybyRun
 from flybystab.flybys.history import axes_of
 from flybystab.flybys.inputs import FlybyInputs
-from flybystab.flybys.verdict import CLASSES, Verdict, bound_fraction_upper
+from flybystab.flybys.verdict import Verdict, bound_fraction_upper, mass_edges
 from flybystab.tabular import Record
 
 #: A run that passes the largest axis ratio is followed to this multiple of it, to find the largest ratio it reaches.
@@ -75,8 +75,7 @@ def verdict_margins(inputs: FlybyInputs, run: FlybyRun) -> VerdictMargins:
     if run.verdict not in (Verdict.INTACT, Verdict.NOT_IN_EQUILIBRIUM, Verdict.IMPACT):
         relative["axis ratio"] = 1.0 - ratio / limit
         if bound < 1.0:
-            edges = [c.least for c in CLASSES if c.least > 0.0]
-            relative["bound fraction"] = min((bound - e for e in edges), key=abs)
+            relative["bound fraction"] = min((bound - edge for edge in mass_edges()), key=abs)
     return VerdictMargins(
         friction_angle=np.rad2deg(phi - run.friction) * u.deg,
         axis_ratio=ratio,

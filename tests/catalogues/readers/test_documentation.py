@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-from flybystab.catalogues.physical import physical_reader_names
-from flybystab.catalogues.readers import READERS, reader_names
+from flybystab.catalogues.physical import PHYSICAL_READERS
+from flybystab.catalogues.readers import READERS
 from flybystab.catalogues.readers.format_tables import FORMATS
 from flybystab.catalogues.readers.parameters import MODELLED, NOT_MODELLED
 
@@ -22,11 +22,11 @@ def test_the_tables_are_those_of_the_registries():
     spec.loader.exec_module(formats)
     text = DOCS.read_text(encoding="utf-8")
     assert formats.page(text) == text
-    assert all(f"| {name}" in text for name in (*reader_names(), *physical_reader_names()))
+    assert all(f"| {name}" in text for name in (*READERS.names, *PHYSICAL_READERS.names))
 
 
 def test_every_reader_says_what_it_reads():
-    names = reader_names()
+    names = READERS.names
     assert all(
         all((c.elements, c.covariance, c.nongravitational, c.physical))
         for c in (READERS[n].contents for n in names)

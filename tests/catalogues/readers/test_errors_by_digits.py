@@ -8,7 +8,7 @@ from orbit_files import PLAIN, UNKNOWN
 
 import flybystab as fs
 from flybystab.catalogues.catalogue import Asteroid, catalogue
-from flybystab.catalogues.readers import READERS, reader_names
+from flybystab.catalogues.readers import READERS
 from flybystab.orbit.predictability import deviations_of
 
 APOPHIS = Asteroid.from_catalogue("Apophis").row
@@ -17,7 +17,7 @@ APOPHIS = Asteroid.from_catalogue("Apophis").row
 def test_every_reader_has_such_a_file():
     """But for the covariance of Find_Orb, which is nothing else."""
     assert (
-        set(PLAIN) == set(reader_names()) - {"Find_Orb covariance"} == set(UNKNOWN) - {"Find_Orb covariance"}
+        set(PLAIN) == set(READERS.names) - {"Find_Orb covariance"} == set(UNKNOWN) - {"Find_Orb covariance"}
     )
 
 

@@ -8,7 +8,7 @@ from orbit_files import COMET, EXTENDED, MPC, NEOWS, OPENORB, SERVICE, UNKNOWN, 
 
 from flybystab.catalogues import readers
 from flybystab.catalogues.catalogue import Asteroid, catalogue
-from flybystab.catalogues.readers import READERS, reader_names
+from flybystab.catalogues.readers import READERS
 from flybystab.catalogues.readers.native import read_native
 from flybystab.catalogues.readers.parameters import MODELLED, NOT_MODELLED
 from flybystab.errors import InvalidInput, UnknownName
@@ -16,14 +16,14 @@ from flybystab.orbit.forces import NonGravitational
 
 
 def test_every_reader_has_such_a_file():
-    assert set(UNKNOWN) == set(reader_names())
+    assert set(UNKNOWN) == set(READERS.names)
 
 
 @pytest.mark.parametrize("name", UNKNOWN)
 def test_an_unknown_parameter_is_refused_by_name(tmp_path, name):
     path = tmp_path / "file"
     path.write_text(UNKNOWN[name])
-    assert readers.reader_of(UNKNOWN[name]).name == name
+    assert readers.READERS.of(UNKNOWN[name]).name == name
     with pytest.raises(InvalidInput, match=r"(?s)non-gravitational parameters.*(XYZ|parameter [37])"):
         catalogue(path)
 
@@ -54,7 +54,7 @@ def test_the_same_file_without_it_is_read(tmp_path, name):
 def test_formats_do_not_overlap():
     """Each file is recognised by one reader alone."""
     for name, content in UNKNOWN.items():
-        assert [r.name for r in READERS.values() if r.identify(content)] == [name]
+        assert [r.name for r in READERS if r.identify(content)] == [name]
 
 
 def test_the_table_of_parameters_is_consistent():

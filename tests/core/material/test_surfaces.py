@@ -5,6 +5,7 @@ import shutil
 import subprocess
 import sys
 import textwrap
+from importlib import resources
 from pathlib import Path
 
 import numpy as np
@@ -43,6 +44,8 @@ def run_with_table(tmp_path, changes, script, **environment):
     """Output of a script with a copy of the package whose table of yield surfaces is changed."""
     package = tmp_path / "flybystab"
     shutil.copytree(SOURCE, package, ignore=shutil.ignore_patterns("__pycache__"))
+    if not (package / "data").exists():  # an editable install
+        shutil.copytree(Path(str(resources.files("flybystab.data"))), package / "data")
     table = package / "core/material/surfaces.py"
     text = table.read_text()
     for old, new in changes:
@@ -88,6 +91,59 @@ def test_a_row_is_enough_for_a_new_cone(tmp_path):
     assert out == ["INTACT", "True"]
 
 
+SCENARIO = """
+[body]
+semi_axes = "500, 450, 400 m"
+density = "2000 kg/m3"
+spin_period = "6 h"
+[encounter]
+planet = "earth"
+periapsis = "5 R_earth"
+v_inf = "5 km/s"
+[material]
+"""
+
+
+@pytest.mark.slow
+def test_stability_and_commands_use_a_new_cone(tmp_path):
+    """The compression cone by another name has its energies; a cone between the two known ones has values between."""
+    rows = """    YieldSurface("same-cone", CONE, 1.0, ()),
+    YieldSurface("middle-cone", CONE, 0.0, ()),
+"""
+    before = '    YieldSurface("mohr-coulomb"'
+    script = (
+        """
+        import contextlib, io, json
+        import astropy.units as u, flybystab as fs
+        from flybystab.cli.main import main
+        SCENARIO = """
+        + repr(SCENARIO)
+        + """
+        body = fs.Body([500, 450, 400] * u.m, 2 * u.g / u.cm**3, spin_period=4 * u.h)
+        energy = {}
+        for name in ("drucker-prager", "same-cone", "middle-cone", "drucker-prager-extension"):
+            made = fs.stability(body.with_(material=fs.Material(friction_angle=30 * u.deg, yield_surface=name)))
+            energy[name] = made.critical_energy.barrier.to_value(u.J)
+        assert energy["same-cone"] == energy["drucker-prager"], energy
+        assert energy["drucker-prager-extension"] < energy["middle-cone"] < energy["drucker-prager"], energy
+        needed = {}
+        for name in ("drucker-prager", "same-cone", "middle-cone", "drucker-prager-extension"):
+            with open("s.toml", "w") as file:
+                file.write(SCENARIO + f'yield_surface = "{name}"')
+            out = io.StringIO()
+            with contextlib.redirect_stdout(out):
+                assert main(["scenario", "s.toml", "--json"]) == 0
+            found = json.loads(out.getvalue())
+            assert next(iter(found["verdict_by_surface"])) == name, found["verdict_by_surface"]
+            needed[name] = found["max_required_friction_angle_deg"]
+        a, same, b, c = needed.values()
+        assert a == same and a < b < c, needed
+        print("done")
+    """
+    )
+    assert run_with_table(tmp_path, [(before, rows + before)], script, NUMBA_DISABLE_JIT="1") == ["done"]
+
+
 #: Gauge of a section that is a cubic in 1/k: ``r cos(acos(-b sin(3 theta))/3)``, with its first two derivatives.
 CUBIC = """
 def {name}(sin_phi, theta):
@@ -128,6 +184,7 @@ def test_a_row_is_enough_for_another_dependence_on_the_lode_angle(tmp_path):
     gauges = CUBIC.format(name="lade_duncan", coefficients=LADE_DUNCAN)
     gauges += CUBIC.format(name="by_gauge", coefficients=MATSUOKA_NAKAI)
     script = """
+        import contextlib, io, json
         import astropy.units as u, numpy as np, flybystab as fs
         from numba import config
         from scipy.optimize import brentq
@@ -153,6 +210,18 @@ def test_a_row_is_enough_for_another_dependence_on_the_lode_angle(tmp_path):
         stable = {s: fs.stability(b) for s, b in bodies.items()}
         energy = {s: e.critical_energy.second.to_value(u.J) for s, e in stable.items()}
         np.testing.assert_allclose(energy["by-gauge"], energy["matsuoka-nakai"], rtol=1e-7)
+        from flybystab.cli.main import main
+        command = ["flyby", "Apophis", "--date", "2029-04-13", "--attitudes", "2", "--json", "--surface"]
+        needed = {}
+        for name in names:
+            text = io.StringIO()
+            with contextlib.redirect_stdout(text):
+                assert main([*command, name]) == 0
+            found = json.loads(text.getvalue())
+            assert next(iter(found["verdict_by_surface"])) == name
+            needed[name] = found["max_required_friction_angle_deg"]
+        assert needed["drucker-prager"] < needed["lade-duncan"] < needed["matsuoka-nakai"], needed
+        assert abs(needed["by-gauge"] - needed["matsuoka-nakai"]) < 1e-6, needed
         print(runs["lade-duncan"].verdict)
     """
     changes = [

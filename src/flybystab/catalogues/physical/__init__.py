@@ -5,15 +5,13 @@ A module of this package registers a function with :func:`physical_reader`; noth
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from flybystab.catalogues.readers import decoded
+from flybystab.catalogues.registry import Formats
 from flybystab.catalogues.spin_solutions import SpinSolution, solution_columns
 from flybystab.errors import InvalidInput
 from flybystab.files import read_bytes
@@ -63,7 +61,8 @@ class PhysicalReader:
     spin: str
 
 
-PHYSICAL_READERS: dict[str, PhysicalReader] = {}
+#: The formats, in the order in which they are tried.
+PHYSICAL_READERS: Formats[PhysicalReader] = Formats(__name__)
 
 _Read = Callable[[str, str], list[PhysicalData]]
 
@@ -74,22 +73,10 @@ def physical_reader(
     """Register the decorated function as the reader of a format."""
 
     def register(read: _Read) -> _Read:
-        PHYSICAL_READERS[name] = PhysicalReader(name, identify, read, physical, spin)
+        PHYSICAL_READERS.add(PhysicalReader(name, identify, read, physical, spin))
         return read
 
     return register
-
-
-@lru_cache(maxsize=1)
-def _load() -> None:
-    for module in pkgutil.iter_modules(__path__):
-        importlib.import_module(f"{__name__}.{module.name}")
-
-
-def physical_reader_names() -> tuple[str, ...]:
-    """Names of the formats."""
-    _load()
-    return tuple(PHYSICAL_READERS)
 
 
 def read_physical(path: str | Path) -> list[PhysicalData]:
@@ -102,12 +89,11 @@ def read_physical(path: str | Path) -> list[PhysicalData]:
     """
     raw = read_bytes(path, "file of physical parameters")
     text = decoded(raw, "file of physical parameters", path)
-    for reader in (PHYSICAL_READERS[name] for name in physical_reader_names()):
-        if reader.identify(text):
-            return reader.read(text, Path(path).name)
-    raise InvalidInput(
-        "file of physical parameters", path, f"a file of one of: {', '.join(physical_reader_names())}"
-    )
+    found = PHYSICAL_READERS.of(text)
+    if found is None:
+        known = ", ".join(PHYSICAL_READERS.names)
+        raise InvalidInput("file of physical parameters", path, f"a file of one of: {known}")
+    return found.read(text, Path(path).name)
 
 
 def with_physical(asteroid: Asteroid, *paths: str | Path) -> Asteroid:

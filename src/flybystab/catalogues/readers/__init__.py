@@ -5,15 +5,13 @@ A module of this package registers its function with :func:`reader`; a further f
 
 from __future__ import annotations
 
-import importlib
-import pkgutil
 import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from flybystab.catalogues.registry import Formats
 from flybystab.errors import InvalidInput
 from flybystab.files import csv_rows, read_bytes
 
@@ -67,7 +65,8 @@ class Reader:
     contents: Contents
 
 
-READERS: dict[str, Reader] = {}
+#: The formats, in the order in which they are tried.
+READERS: Formats[Reader] = Formats(__name__)
 
 _Read = Callable[[str, str], "list[Entry]"]
 
@@ -76,28 +75,10 @@ def reader(name: str, identify: Callable[[str], bool], contents: Contents) -> Ca
     """Register the decorated function as the reader of a format."""
 
     def register(read: _Read) -> _Read:
-        READERS[name] = Reader(name, identify, read, contents)
+        READERS.add(Reader(name, identify, read, contents))
         return read
 
     return register
-
-
-@lru_cache(maxsize=1)
-def _load() -> None:
-    for module in pkgutil.iter_modules(__path__):
-        importlib.import_module(f"{__name__}.{module.name}")
-
-
-def reader_of(text: str) -> Reader | None:
-    """The reader for the format of a text; None if no reader recognises it."""
-    _load()
-    return next((r for r in READERS.values() if r.identify(text)), None)
-
-
-def reader_names() -> tuple[str, ...]:
-    """Names of the formats."""
-    _load()
-    return tuple(READERS)
 
 
 def text_of(path: str | Path) -> str:

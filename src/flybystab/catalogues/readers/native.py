@@ -6,7 +6,7 @@ from difflib import get_close_matches
 from typing import TYPE_CHECKING
 
 from flybystab.catalogues.designations import is_comet
-from flybystab.catalogues.readers import header_of, reader_names, rows_of
+from flybystab.catalogues.readers import READERS, header_of, rows_of
 from flybystab.catalogues.readers.sbdb import comet_orbit
 from flybystab.catalogues.record import TEXTS, UNITS
 from flybystab.errors import InvalidInput, UnknownName
@@ -30,7 +30,7 @@ def read_native(text: str, file: str) -> list[Entry]:
         raise InvalidInput(
             "catalogue file",
             file,
-            f"the columns of the catalogue, or a file of one of {', '.join(reader_names())}",
+            f"the columns of the catalogue, or a file of one of {', '.join(READERS.names)}",
         )
     for c in columns:
         if c not in known:
