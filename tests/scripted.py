@@ -65,6 +65,14 @@ def slow(asteroid, settings):
     return three(asteroid, settings)
 
 
+def greedy(asteroid, settings):
+    """The same, but the eleventh asteroid takes memory until its process is ended, as by a limit on memory."""
+    held = []
+    while asteroid.name == "copy 10":
+        held.append(np.ones(2**22))
+    return three(asteroid, settings)
+
+
 def screening(n=6, finder=three, **options):
     """A screening of the first `n` names, or of copies of Anteros under other names."""
     asteroids = [Asteroid.from_catalogue(x) for x in NAMES[:n]]

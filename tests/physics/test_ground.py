@@ -8,10 +8,10 @@ import astropy.units as u
 import numpy as np
 import pytest
 from numpy.typing import NDArray
+from scenes import PILE
 from scipy.interpolate import CubicSpline
 from scipy.optimize import brentq, minimize_scalar
 from scipy.spatial.transform import Rotation
-from tests.scenes import PILE
 
 from flybystab import Body, Encounter, Material, flyby, flyby_many
 from flybystab.core.dynamics.run import LIMITS, body_state, integrate

@@ -3,17 +3,20 @@
 import os
 import re
 import signal
+import socket
 import subprocess
 import sys
 import threading
 import time
+import warnings
 from collections import Counter
+from contextlib import ExitStack, suppress
 from pathlib import Path
 
 import pytest
-from scripted import same, screening, slow, three
+from scripted import greedy, same, screening, slow, three
 
-from flybystab.errors import InvalidInput, WorkersLost
+from flybystab.errors import FlybystabWarning, InvalidInput, WorkersLost
 from flybystab.screening import executors
 from flybystab.screening.classification import classification
 from flybystab.screening.executors import open_executor
@@ -131,12 +134,151 @@ def test_workers_end_with_a_killed_parent(tmp_path):
 def test_workers_are_checked():
     with pytest.raises(InvalidInput, match="workers"), open_executor(0):
         pass
+
+
+def refused_scheduler(where, error, text, timeout=1):
+    """Connecting ends in a named error within the time limit."""
     pytest.importorskip("distributed")
-    with (
-        pytest.raises(WorkersLost, match="no dask scheduler"),
-        open_executor(dask="tcp://127.0.0.1:9", timeout=1),
-    ):
+    began = time.monotonic()
+    with pytest.raises(error, match=text), open_executor(dask=str(where), timeout=timeout):
         pass
+    assert (
+        time.monotonic() - began < timeout + 60
+    )  # distributed itself may wait without end; machines may be busy
+
+
+@pytest.mark.parametrize(
+    ("where", "text"),
+    [
+        ("tcp://127.0.0.1:9", "no dask scheduler answers at tcp://127.0.0.1:9"),
+        ("127.0.0.1", "missing port"),
+        ("nonsense://127.0.0.1:9", "unknown address scheme"),
+        ("tls://127.0.0.1:9", "tls needs certificates: distributed.comm.tls.ca-file"),
+    ],
+)
+def test_a_dask_scheduler_that_does_not_answer_is_named(where, text):
+    refused_scheduler(where, WorkersLost, text)
+    refused_scheduler(
+        where, WorkersLost, "Nothing was computed; results of an earlier, unfinished run are kept"
+    )
+
+
+@pytest.mark.parametrize(
+    ("reply", "text"),
+    [
+        (b"", "no answer within 1 s"),
+        (b"HTTP/1.1 400 Bad Request\r\n\r\n", "no dask scheduler"),
+        (bytes(64), "no dask"),
+    ],
+)
+def test_a_server_that_is_no_dask_scheduler_is_named_within_the_time_limit(reply, text):
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        held = []
+
+        def serve():
+            with suppress(OSError):  # closed at the end of the test
+                while True:
+                    held.append(server.accept()[0])
+                    held[-1].sendall(reply)
+
+        threading.Thread(target=serve, daemon=True).start()
+        refused_scheduler(f"tcp://127.0.0.1:{server.getsockname()[1]}", WorkersLost, text)
+
+
+@pytest.mark.parametrize(
+    ("content", "error", "text"),
+    [
+        (None, WorkersLost, "does not exist: start the scheduler first"),
+        ("", InvalidInput, "a JSON document"),
+        ("{}", InvalidInput, 'the "address" of the scheduler'),
+        ('{"address": 3}', InvalidInput, 'the "address" of the scheduler'),
+        ("[" * 1000, InvalidInput, "nested at most"),
+        ('{"address": "tcp://127.0.0.1:9"}', WorkersLost, "no dask scheduler answers"),
+    ],
+)
+def test_a_wrong_dask_scheduler_file_is_named(tmp_path, content, error, text):
+    file = tmp_path / "scheduler.json"
+    if content is not None:
+        file.write_text(content)
+    refused_scheduler(file, error, text)
+
+
+@pytest.fixture
+def cluster(tmp_path, monkeypatch):
+    """A function that starts a dask cluster on this machine: one worker of one thread, which is not started again."""
+    distributed = pytest.importorskip("distributed")
+    dask = pytest.importorskip("dask")
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(HERE), os.environ.get("PYTHONPATH", "")]))
+    stack = ExitStack()
+    stack.enter_context(dask.config.set({"distributed.scheduler.allowed-failures": 0}))
+
+    def start(workers=1, memory="2GB"):
+        return stack.enter_context(
+            distributed.LocalCluster(
+                n_workers=workers, threads_per_worker=1, processes=True, host="127.0.0.1", memory_limit=memory,
+                dashboard_address=None, silence_logs=50, local_directory=str(tmp_path / "dask"),
+            )
+        )  # fmt: skip
+
+    with stack:
+        yield start
+
+
+@pytest.mark.slow
+def test_dask_workers_out_of_memory_are_named_and_the_run_goes_on(tmp_path, reference, cluster):
+    out = tmp_path / "d.ecsv"
+    with (
+        open_executor(dask=cluster(memory="1GB").scheduler_address) as executor,
+        pytest.raises(WorkersLost, match=r"too little memory.*KilledWorker.*the same call continues the run"),
+    ):
+        screening(16, greedy, samples=3, seed=4).run(out, executor=executor, chunk=1)
+    done = len(lines_of_tasks(out))
+    states = []
+    screening(16, three, samples=3, seed=4).run(out, progress=states.append)
+    assert states[0].resumed == done > 0
+    same(read_results(out), reference)
+
+
+def lines_of_tasks(out):
+    """Records of finished tasks in the journal of a run."""
+    journal = out.with_name(out.name + ".journal")
+    return [
+        line
+        for line in journal.read_bytes().splitlines()
+        if line.startswith(b'{"task"') and b'"first"' not in line
+    ]
+
+
+@pytest.mark.slow
+def test_dask_workers_without_the_package_and_schedulers_without_workers_are_named(
+    tmp_path, cluster, monkeypatch
+):
+    hidden = tmp_path / "hidden"
+    hidden.mkdir()
+    (hidden / "sitecustomize.py").write_text(
+        "import sys\n\n\nclass Hide:\n    def find_spec(self, name, path=None, target=None):\n"
+        "        if name.partition('.')[0] == 'flybystab':\n            raise ModuleNotFoundError(name)\n\n\n"
+        "sys.meta_path.insert(0, Hide())\n"
+    )
+    address = cluster(workers=0).scheduler_address
+    with pytest.warns(FlybystabWarning, match="has no workers"), open_executor(dask=address):
+        pass
+    worker = subprocess.Popen(
+        [sys.executable, "-m", "distributed.cli.dask_worker", address, "--nthreads", "1", "--no-nanny",
+         "--no-dashboard", "--local-directory", tmp_path / "w"],
+        env=os.environ | {"PYTHONPATH": str(hidden)}, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL,
+    )  # fmt: skip
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", FlybystabWarning)  # the worker may not have connected yet
+            with (
+                open_executor(dask=address) as executor,
+                pytest.raises(WorkersLost, match=r"same version of flybystab .*; in progress: "),
+            ):
+                screening(3).run(tmp_path / "d.ecsv", executor=executor)
+    finally:
+        worker.kill()
+        worker.wait()
 
 
 @pytest.mark.parametrize("suffix", ["ecsv", "parquet"])

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import asyncio
+import logging
 import os
 import signal
 import warnings
 from collections.abc import Iterator
-from concurrent.futures import Executor, ProcessPoolExecutor
+from concurrent.futures import Executor, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import AbstractContextManager, contextmanager
 from multiprocessing import get_context, parent_process
 from multiprocessing.connection import wait
 from pathlib import Path
 from threading import Thread
+from typing import Any
 
-from flybystab.errors import MissingExtra, WorkersLost
+from flybystab.errors import FlybystabWarning, InvalidInput, MissingExtra, WorkersLost
+from flybystab.files import parse_json, read_text
 from flybystab.units import whole
 
 
@@ -65,15 +69,21 @@ def open_executor(
     Raises
     ------
     InvalidInput
-        `workers` is not a positive integer.
+        `workers` is not a positive integer, or the scheduler file gives no address.
     MissingExtra
         dask.distributed is not installed.
     WorkersLost
-        The scheduler does not answer, or its scheduler file does not exist.
+        The scheduler file does not exist, or the scheduler does not answer within `timeout`.
+
+    Warns
+    -----
+    FlybystabWarning
+        The scheduler has no workers yet: calls wait for them.
     """
     whole(workers, "workers", 1)
     if dask is not None:
-        with _dask_client(dask, timeout) as client:
+        _import_distributed()
+        with _quiet_dask(), _dask_client(dask, timeout) as client:
             yield client.get_executor()
     elif workers == 1:
         yield None
@@ -97,22 +107,94 @@ def _terminate(pool: ProcessPoolExecutor) -> None:
         process.terminate()
 
 
-def _dask_client(where: str, timeout: float) -> AbstractContextManager:
-    """A connected client of a dask scheduler."""
+def _import_distributed() -> None:
+    """Import distributed, which also sets up its loggers."""
     try:
-        from distributed import Client
+        import distributed  # noqa: F401
     except ImportError:
         raise MissingExtra("distributed", "dask", "a dask cluster") from None
-    file = where.endswith(".json")
-    if file and not Path(where).is_file():
-        # distributed itself waits for such a file without a time limit.
-        raise WorkersLost(f"no dask scheduler at {where}: the scheduler file does not exist")
+
+
+def _dask_client(where: str, timeout: float) -> AbstractContextManager:
+    """A connected client of a dask scheduler."""
+    from distributed import Client
+
+    address = _address(where)
     try:
-        return Client(**{"scheduler_file" if file else "address": where}, timeout=timeout)
-    except (OSError, ValueError, TypeError, KeyError, RuntimeError) as error:
-        # TypeError: tls:// without certificates; KeyError, ValueError: not a scheduler file.
-        hint = " (tls:// needs certificates in the dask configuration)" if where.startswith("tls") else ""
-        raise WorkersLost(f"no dask scheduler at {where}: {error}{hint}") from None
+        # In a thread of its own: the calling thread may run an event loop, as in a notebook.
+        with ThreadPoolExecutor(1) as thread:
+            found = thread.submit(asyncio.run, _identity(address, timeout)).result()
+        client = Client(address, timeout=timeout)
+    except Exception as error:  # of any type, where the answer does not come from a dask scheduler
+        raise WorkersLost(
+            f"no dask scheduler answers at {where} ({_reason(error, timeout)}){_certificates(address)}. Nothing was "
+            "computed; results of an earlier, unfinished run are kept"
+        ) from None
+    if not found.get("workers"):
+        warnings.warn(
+            f"the dask scheduler at {where} has no workers: the run waits for them", FlybystabWarning, 4
+        )
+    return client
+
+
+@contextmanager
+def _quiet_dask() -> Iterator[None]:
+    """Keep tracebacks that distributed logs off the terminal: lost connections are raised as `WorkersLost`."""
+
+    def critical(record: logging.LogRecord) -> bool:
+        return record.levelno >= logging.CRITICAL
+
+    handlers = [h for name in ("distributed", "distributed.client") for h in logging.getLogger(name).handlers]
+    for handler in handlers:
+        handler.addFilter(critical)
+    try:
+        yield
+    finally:
+        for handler in handlers:
+            handler.removeFilter(critical)
+
+
+def _address(where: str) -> str:
+    """The address of a scheduler, from its scheduler file if `where` is one."""
+    if not where.endswith(".json"):
+        return where
+    # Checked first: distributed waits for a missing file without a time limit.
+    if not Path(where).exists():
+        raise WorkersLost(f"the dask scheduler file {where} does not exist: start the scheduler first")
+    content = parse_json(read_text(where, "dask scheduler file"), "dask scheduler file", where)
+    address = content.get("address") if isinstance(content, dict) else None
+    if not isinstance(address, str):
+        raise InvalidInput("dask scheduler file", where, 'a JSON object with the "address" of the scheduler')
+    return address
+
+
+async def _identity(address: str, timeout: float) -> dict[str, Any]:
+    """What a scheduler says of itself; asked first because ``Client`` may wait longer than its timeout."""
+    from distributed.comm import connect
+    from distributed.security import Security
+
+    async def ask() -> dict[str, Any]:
+        comm = await connect(address, timeout=timeout, **Security().get_connection_args("client"))
+        try:
+            await comm.write({"op": "identity", "reply": True})
+            return dict(await comm.read())
+        finally:
+            comm.abort()
+
+    return await asyncio.wait_for(ask(), timeout)
+
+
+def _reason(error: Exception, timeout: float) -> str:
+    if isinstance(error, TimeoutError) and not str(error):
+        return f"no answer within {timeout:g} s"
+    return str(error) or type(error).__name__
+
+
+def _certificates(address: str) -> str:
+    if not address.startswith(("tls", "wss")):
+        return ""
+    settings = "distributed.comm.tls.ca-file and distributed.comm.tls.client"
+    return f"; tls needs certificates: {settings} in the dask configuration"
 
 
 def workers(

@@ -8,6 +8,7 @@ from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
 from dataclasses import dataclass
 from itertools import islice
+from pickle import PickleError
 from typing import Any, NamedTuple, Protocol
 
 from flybystab.catalogues.catalogue import Asteroid
@@ -139,13 +140,12 @@ def scheduled(
                 try:
                     answer = future.result()
                 except Exception as error:
-                    if not _lost(error):
-                        raise
                     names = ", ".join(asteroids[i].name for i in _positions(call))
+                    if (reason := _failed_workers(error, executor)) is None:
+                        raise
                     raise WorkersLost(
-                        f"workers died or were lost ({type(error).__name__}: {error}); in progress: {names}. Finished "
-                        "asteroids are kept: the same call continues the run"
-                    ) from None
+                        f"{reason}; in progress: {names}. Finished asteroids are kept: the same call continues the run"
+                    ) from error
                 if isinstance(call, _Piece):
                     call.passage.take(call.first, answer)
                     asteroid = call.asteroid
@@ -195,10 +195,27 @@ def _grain_pieces(
         yield _Piece(asteroid, number, passage, k), sample
 
 
-def _lost(error: Exception) -> bool:
-    """Whether an error means that workers were lost: of concurrent.futures, or of dask (KilledWorker, comm errors)."""
-    kinds = {kind.__module__.partition(".")[0] for kind in type(error).__mro__}
-    return isinstance(error, BrokenExecutor | CancelledError) or "distributed" in kinds
+def _failed_workers(error: Exception, executor: Executor) -> str | None:
+    """What happened to the workers; None for an error of the computation itself.
+
+    Errors of lost workers come from concurrent.futures or from dask (``KilledWorker``, closed connections).
+    """
+    modules = {kind.__module__.partition(".")[0] for kind in type(error).__mro__}
+    said = ": ".join(filter(None, (type(error).__name__, " ".join(str(error).split()))))
+    if type(error).__name__ == "KilledWorker":
+        return (
+            "workers died, in most cases because they had too little memory (dask worker --memory-limit) or not the "
+            f"same version of flybystab as this process ({said})"
+        )
+    if isinstance(error, BrokenExecutor | CancelledError) or "distributed" in modules:
+        return f"workers died or were lost ({said})"
+    if not isinstance(executor, SerialExecutor) and isinstance(error, _DESERIALISATION):
+        return f"workers could not load the tasks: they need the same version of flybystab as this process ({said})"
+    return None
+
+
+#: Raised where a worker has no flybystab or another version of it; dask reports them as RuntimeError.
+_DESERIALISATION = (ImportError, AttributeError, PickleError, RuntimeError)
 
 
 def _positions(call: list[int] | _Piece) -> list[int]:
