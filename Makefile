@@ -38,10 +38,13 @@ check: .venv/.test
 docs: .venv/.docs
 	$(PY) -m sphinx -E -W --keep-going -b html -q docs out/docs
 
-# Wheel and sdist, installed in clean environments and tried outside the repository.
+# Wheel and sdist, installed in clean environments and tried outside the repository. The wheel is built in a tree with
+# a file of an earlier build, which must not reach it.
 dist: .venv/.test
 	rm -rf dist build
-	$(PY) -m build --outdir dist . > /dev/null
+	mkdir -p build/lib/flybystab && touch build/lib/flybystab/left_over.py
+	$(PY) -m build --sdist --wheel --outdir dist . > /dev/null
+	rm -rf build
 	$(PY) scripts/smoke_test.py dist
 
 # Declared minimum versions, in an environment of their own.

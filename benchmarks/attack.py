@@ -4,13 +4,17 @@ python benchmarks/attack.py journal [N]    bits of a journal flipped: is the tab
 python benchmarks/attack.py power [N]      journal and tables cut at any byte, as a power cut leaves them; cost of fsync
 python benchmarks/attack.py fuzz [N]       N calls of every public function with valid and invalid arguments
 python benchmarks/attack.py bombs          files that are too large, too deep or too long
+python benchmarks/attack.py table [N]      all of these, N calls of every function and the tests of each kind of attack:
+                                           the table of docs/reliability.md
 """
 
 from __future__ import annotations
 
 import gzip
 import random
+import re
 import shutil
+import subprocess
 import sys
 import tempfile
 import time
@@ -122,11 +126,11 @@ def cost() -> None:
     journals.SYNC_INTERVAL = 1.0
 
 
-def fuzz(n: int) -> None:
+def fuzz(n: int) -> Counter[str]:
+    """Outcomes of `n` calls of every public callable; raw errors and slow calls are printed with their arguments."""
     total: Counter[str] = Counter()
     for name, (_, pools) in fuzzed.calls().items():
         valid = {k: pool[0] for k, pool in pools.items()}
-        fuzzed.outcome(name, valid, limit=600)  # compiles the kernels
         counts, example = fuzzed.fuzz(name, n)
         good = counts["result"], counts["named error"]
         print(
@@ -140,9 +144,12 @@ def fuzz(n: int) -> None:
                 odd = {a: v for a, v in example[found].items() if v is not valid[a]}
                 print(f"    {k} x {found}: {str(odd)[:200]}", flush=True)
     print(dict(total))
+    return total
 
 
-def bombs() -> None:
+def bombs() -> Counter[str]:
+    """How reading files that are too large ends: "refused", "read", or a raw error."""
+    counts: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         huge = folder / "gzip.csv.gz"
@@ -169,12 +176,116 @@ def bombs() -> None:
                 began = time.perf_counter()
                 try:
                     reader(file)
-                    end = "READ"
+                    end = kind = "read"
                 except FlybystabError as error:
-                    end = str(error).replace(str(folder) + "/", "")[:90]
+                    end, kind = str(error).replace(str(folder) + "/", "")[:90], "refused"
                 except BaseException as error:
-                    end = f"RAW {type(error).__name__}"
+                    end = kind = f"raw {type(error).__name__}"
+                counts[kind] += 1
                 print(f"{file.name:14s} {time.perf_counter() - began:6.2f} s  {end}")
+    return counts
+
+
+#: Attack -> its tests, and what the version before the corrections lost.
+TESTED = {
+    "SIGKILL, Ctrl-C once and twice, dead workers, killed parent, full disk, stopped at any asteroid": (
+        ["screening/test_executors.py", "screening/test_screening.py"],
+        "ctrl_c or dead_process or killed_parent or killed_run or fills_up or stopped",
+        "2 of 11 runs did not end at a second Ctrl-C",
+    ),
+    "files and links of the user with the names of temporary files, names that appear meanwhile, FIFOs, names of 249 "
+    "bytes, equal output names, two runs on one file": (
+        ["screening/test_results.py", "screening/test_screening.py"],
+        "files_of_the_user or follow_links or long_names or two_tables or two_runs or another_run or overwritten or "
+        "bad_outputs",
+        "files replaced and truncated",
+    ),
+    "impossible values in a row, unexpected errors, endless integration": (
+        ["screening/test_screening.py"],
+        "bad_row or time_limit or endless",
+        "the run",
+    ),
+    "dask: wrong and missing scheduler files, servers that are no scheduler, tls without certificates, workers killed, "
+    "out of memory or without the package": (
+        ["screening/test_executors.py"],
+        "dask or scheduler",
+        "raw errors; a server that does not answer was waited for without end",
+    ),
+    "damaged orbit files": (["catalogues/readers/test_damaged_files.py"], "", "not tried"),
+    "escape sequences, formulas and markup in names and cells": (
+        ["cli/test_terminal.py", "cli/test_csv.py", "plots/test_labels.py", "screening/test_results.py"],
+        "control or formulas or labels or spreadsheet or mathtext or dollar",
+        "reached the terminal, figures and spreadsheets",
+    ),
+    "package that cannot be written, no home folder, `python -OO`, a fork while threads compute": (
+        ["core/numerics/test_installation.py", "cli/test_terminal.py", "core/numerics/test_threads.py"],
+        "installed or package_that or without or fork",
+        "the fork hung without a word",
+    ),
+}
+
+
+def tested(files: list[str], chosen: str) -> tuple[int, int]:
+    """Tests that passed, and those that did not."""
+    tests = Path(fuzzed.__file__).parent
+    done = subprocess.run(
+        [sys.executable, "-m", "pytest", "-q", "--tb=short", "-p", "no:cacheprovider", "-k", chosen]
+        + [str(tests / file) for file in files],
+        cwd=tests.parent,
+        capture_output=True,
+        text=True,
+    )
+    last = done.stdout.strip().splitlines()[-1]
+    found = {word: int(k) for k, word in re.findall(r"(\d+) (passed|failed|error)", last)}
+    if done.returncode:
+        print(done.stdout, file=sys.stderr)
+    return found.get("passed", 0), found.get("failed", 0) + found.get("error", 0) + (not found)
+
+
+def table(n: int) -> None:
+    """The table of docs/reliability.md."""
+
+    def row(attack: str, tried: int, survived: int, before: str, command: str) -> None:
+        rows.append(
+            f"| {attack} | {tried:,} | {survived:,} | {tried - survived or 'none'} | {before} | {command} |"
+        )
+        print(rows[-1], file=sys.stderr, flush=True)
+
+    rows: list[str] = []
+    flips, cuts, tables = damaged(60, flipped), damaged(60, cut), cut_tables(500)
+    for attack, counts, before, command in (
+        ("one bit of a journal flipped", flips, "24 of 60 gave a wrong table", "journal"),
+        (
+            "journal cut at any byte, as by a power cut",
+            cuts,
+            "journals and tables that were not on the disk",
+            "power",
+        ),
+    ):
+        survived = sum(k for end, k in counts.items() if end.startswith(("same table", "refused")))
+        row(attack, counts.total(), survived, before, f"`benchmarks/attack.py {command}`")
+    row(
+        "finished table cut at any byte", tables.total(), tables["refused with a named error"],
+        "a table without rows was read as complete", "`benchmarks/attack.py power`",
+    )  # fmt: skip
+    ends = bombs()
+    row(
+        "gzip of 1 GB, cells of 200 kB, nesting of 100,000, 5,000 digits, keys of 50,000 dots", ends.total(),
+        ends["refused"], "raw errors", "`benchmarks/attack.py bombs`",
+    )  # fmt: skip
+    for attack, (files, chosen, before) in TESTED.items():
+        passed, failed = tested(files, chosen)
+        named = ", ".join(f"`tests/{file}`" for file in files)
+        row(attack, passed + failed, passed, before, named)
+    calls = fuzz(n)
+    row(
+        f"calls of all {len(fuzzed.calls())} public callables with valid, borderline and invalid arguments",
+        calls.total(), calls["result"] + calls["named error"], "481 of 32,000 raw", f"`benchmarks/attack.py fuzz {n}`",
+    )  # fmt: skip
+    print(
+        "\n| tried | times | survived | lost | lost before | repeated by |\n| --- | --- | --- | --- | --- | --- |"
+    )
+    print("\n".join(rows))
 
 
 def main() -> None:
@@ -190,6 +301,8 @@ def main() -> None:
         fuzz(n or 200)
     elif kind == "bombs":
         bombs()
+    elif kind == "table":
+        table(n or 20)
     else:
         print(__doc__)
     shutil.rmtree(".hypothesis", ignore_errors=True)

@@ -1,7 +1,8 @@
 """Install the wheel and the sdist in clean environments and try them outside the repository.
 
 ``python scripts/smoke_test.py dist`` takes the newest of each out of that folder. The wheel must answer from the
-shell and from Python; the wheel made from the sdist must hold the same files.
+shell and from Python, and hold the files of the source tree and no others; the wheel made from the sdist must hold the
+same files.
 """
 
 import json
@@ -27,6 +28,13 @@ def run(*command, cwd):
     return done.stdout
 
 
+def sources():
+    """Paths in the wheel of the modules in the source tree."""
+    root = Path(__file__).resolve().parents[1]
+    found = {p.relative_to(root / "src").as_posix() for p in (root / "src" / "flybystab").rglob("*.py")}
+    return found | {f"flybystab/{p.relative_to(root).as_posix()}" for p in (root / "data").rglob("*.py")}
+
+
 def main(folder):
     wheel = max(folder.glob("flybystab-*.whl"), key=lambda p: p.stat().st_mtime)
     sdist = max(folder.glob("flybystab-*.tar.gz"), key=lambda p: p.stat().st_mtime)
@@ -50,6 +58,8 @@ def main(folder):
         again = next((place / "again").glob("*.whl"))
         files = [sorted(zipfile.ZipFile(w).namelist()) for w in (wheel, again)]
         assert files[0] == files[1], set(files[0]) ^ set(files[1])
+        modules = {name for name in files[0] if name.endswith(".py")}
+        assert modules == sources(), modules ^ sources()
     print(f"{wheel.name} answers in a clean environment; {sdist.name} makes the same {len(files[0])} files")
 
 

@@ -68,10 +68,10 @@ def test_documents_are_refused_by_depth_digits_and_size(monkeypatch):
 
 
 def test_the_check_of_a_long_word_takes_linear_time():
-    begin = time.perf_counter()
+    begin = time.process_time()
     with pytest.raises(InvalidInput, match="valid TOML"):
         parse_toml("a" * 2**20 + "\n" + "a " * 2**19, "file", "x")
-    assert time.perf_counter() - begin < 10.0
+    assert time.process_time() - begin < 10.0
 
 
 def test_brackets_and_digits_inside_strings_do_not_count():

@@ -160,7 +160,7 @@ def browse(site, script, *, size="1200,900", where=""):
         ],
         capture_output=True,
         text=True,
-        timeout=120,
+        timeout=600,
         check=True,
     )
     copy.unlink()

@@ -100,7 +100,7 @@ def test_figures_are_drawn_anew_for_a_phone(page):
 
 def chromium(*arguments):
     command = [CHROMIUM, "--headless", "--no-sandbox", "--disable-gpu", "--enable-logging=stderr", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=True)
+    return subprocess.run(command, capture_output=True, text=True, timeout=600, check=True)
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")

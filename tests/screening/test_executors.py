@@ -32,7 +32,7 @@ def reference(tmp_path_factory):
     return read_results(path)
 
 
-def wait_for(condition, seconds=120.0):
+def wait_for(condition, seconds=600.0):
     end = time.monotonic() + seconds
     while not condition():
         assert time.monotonic() < end, "waited too long"
@@ -86,7 +86,7 @@ def test_ctrl_c_leaves_a_valid_file(tmp_path, reference):
     wait_for(lambda: lines(tmp_path / "c.ecsv.journal") > 5)
     os.killpg(run.pid, signal.SIGINT)  # as a terminal does: to all processes
     hold.touch()
-    _, said = run.communicate(timeout=120)
+    _, said = run.communicate(timeout=600)
     assert run.returncode != 0
     assert said.count("KeyboardInterrupt") == 1
     part = read_results(out)
@@ -110,7 +110,7 @@ def test_a_second_ctrl_c_ends_a_run_at_once_and_nothing_is_lost(tmp_path, refere
     for _ in range(2):
         os.killpg(run.pid, signal.SIGINT)
         time.sleep(pause)
-    _, said = run.communicate(timeout=120)  # the workers wait for a file that never comes
+    _, said = run.communicate(timeout=600)  # the workers wait for a file that never comes
     assert run.returncode != 0
     # No traceback of a worker. That of the parent may name multiprocessing, where the second signal meets its exit.
     assert not re.search("SpawnProcess|spawn_main", said), said
@@ -142,9 +142,8 @@ def refused_scheduler(where, error, text, timeout=1):
     began = time.monotonic()
     with pytest.raises(error, match=text), open_executor(dask=str(where), timeout=timeout):
         pass
-    assert (
-        time.monotonic() - began < timeout + 60
-    )  # distributed itself may wait without end; machines may be busy
+    # distributed itself may wait without end; the rest is for a machine that is busy
+    assert time.monotonic() - began < timeout + 300
 
 
 @pytest.mark.parametrize(
@@ -334,8 +333,8 @@ def test_dask_with_a_killed_worker_gives_the_same_rows(tmp_path, reference):
             )
             for k in range(2)
         ]  # fmt: skip
-        with distributed.Client(scheduler_file=str(address), timeout=60) as client:
-            client.wait_for_workers(2, timeout=60)
+        with distributed.Client(scheduler_file=str(address), timeout=600) as client:
+            client.wait_for_workers(2, timeout=600)
 
             def kill():
                 wait_for(lambda: lines(tmp_path / "d.ecsv.journal") > 4 and len(list(marks.iterdir())) == 2)
