@@ -1,7 +1,7 @@
-"""Piles of grains through an encounter: the most detailed model, for bodies that do not survive in one piece.
+"""Encounters with piles of grains: the most detailed model, for bodies that do not survive in one piece.
 
-Every seed is another pile with the body's shape, density, spin and friction angle. Outcomes scatter from pile to pile,
-so that a result is a distribution.
+Every seed gives a different pile with the body's shape, density, spin and friction angle. The outcomes scatter from
+pile to pile, so that a result is a distribution.
 
 The class (Richardson et al. 1998) is that of the largest clump at the end: S up to half of the mass, B up to 0.9, M
 above if mass escapes. Satellites, which are bound to the largest clump but apart from it, count in the bound mass only.
@@ -57,14 +57,14 @@ def grains_flyby(
     keep: bool = True,
     progress: Progressing = None,
 ) -> GrainsOutcome:
-    """Carry piles of grains through an encounter.
+    """Compute an encounter with piles of grains.
 
     Parameters
     ----------
     body : Body
         With a friction angle and a cohesion in the calibrated range.
     encounter : Encounter
-        One whose path clears the planet.
+        With a path that does not reach the planet.
     rotation : ndarray (3, 3)
         Body axes -> frame of the encounter, at its start.
     grains : int
@@ -88,9 +88,7 @@ def grains_flyby(
     check_grains(body, grains)
     chosen = seeds_of(seeds)
     if encounter.impact:
-        raise InvalidInput(
-            "encounter", encounter, "one whose path clears the planet: nothing is left for grains"
-        )
+        raise InvalidInput("encounter", encounter, "one with a path that does not reach the planet")
     warn_of_few(grains)
     begun = clock.perf_counter()
     cores = os.cpu_count() or 1

@@ -1,6 +1,6 @@
-"""One pile of grains through an encounter.
+"""Integration of one pile of grains through an encounter.
 
-A run goes on after the encounter until its clumps have not changed for :data:`QUIET` (every clump of at least
+A run continues after the encounter until its clumps have not changed for :data:`QUIET` (every clump of at least
 :data:`flybystab.flybys.grain_clumps.SMALLEST` of the mass has kept its mass to that fraction), or to a limit.
 """
 
@@ -52,9 +52,9 @@ def one_pile(
     seed: int = 0,
     tick: Callable[[], None] = lambda: None,
 ) -> GrainsRun:
-    """Carry one pile through an encounter (see :func:`flybystab.flybys.grains_flyby.grains_flyby`).
+    """Integrate one pile through an encounter (see :func:`flybystab.flybys.grains_flyby.grains_flyby`).
 
-    `tick` is called at every frame of its course.
+    `tick` is called at every frame of its course. The simulation of `pile` is changed.
     """
     begun = clock.perf_counter()
     sim, unit = pile.simulation, pile.time
@@ -95,7 +95,7 @@ def one_pile(
 def _carry(
     sim: Simulation, start: float, stop: float, longest: float, tick: Callable[[], None]
 ) -> tuple[list[LargestClump], list[Array]]:
-    """Carry the grains from `start` to `stop`, and on until the clumps are quiet or to `longest`.
+    """Integrate from `start` to `stop`, and on until the clumps no longer change or to `longest`.
 
     Returns the largest clump and the positions of the grains at each row of the course.
     """

@@ -41,9 +41,9 @@ class Simulation:
     gravity_interval : float
         Time between evaluations of gravity; zero for every step.
     gravity_error : float
-        Error of gravity where a tree sums it (:func:`flybystab.core.grains.tree.opening`).
+        Error of gravity by a tree (:func:`flybystab.core.grains.tree.opening`).
     tree_from : int
-        Number of grains from which it does.
+        Number of grains from which gravity is computed by a tree.
     skin : float
         Skin of the neighbour list, mean radii.
     """
