@@ -1,7 +1,7 @@
 """What digits and U of a catalogue say of its orbits, held against later and better orbits, as tables.
 
-Usage: ``python benchmarks/orbit_errors.py [runoff] [digits] [impacts] [model] [coverage] [growth]``. Reference data are
-read from ``../shared/data`` (or ``$FLYBYSTAB_SHARED/data``); nothing is downloaded.
+Usage: ``python benchmarks/orbit_errors.py [runoff] [digits] [impacts] [model] [factor] [coverage] [growth]``. Reference
+data are read from ``../shared/data`` (or ``$FLYBYSTAB_SHARED/data``); nothing is downloaded.
 """
 
 from __future__ import annotations
@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import sys
 import time
+import zlib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -19,8 +20,10 @@ from astropy.table import QTable
 from astropy.time import Time
 from numpy.typing import NDArray
 
+from flybystab.catalogues import orbit_errors
 from flybystab.catalogues.asteroid import Asteroid
 from flybystab.catalogues.catalogue import catalogue
+from flybystab.catalogues.orbit_errors import SHARE
 from flybystab.catalogues.orbit_errors import runoff as sigma_of_code
 from flybystab.constants import AU, YEAR
 from flybystab.encounter.encounter import Encounter
@@ -118,7 +121,7 @@ def runoff() -> list[str]:
         "JPL's orbits of 2020-09 at the epoch of those of 2026-07: distance over semi-major axis, arcsec in ten years",
         "code orbits    sigma   median     68 %     95 %  within sigma  2 sigma",
     ]
-    ratio = np.array([r / (sigma_of_code(int(c)) / 3.0) for r, c in zip(rate, code, strict=True)])
+    ratio = np.array([r / (sigma_of_code(int(c)) * SHARE) for r, c in zip(rate, code, strict=True)])
     for c in [*range(10), None]:
         here = np.isfinite(rate) & (code == c if c is not None else code >= 0)
         shares = f"{100 * np.mean(ratio[here] < 1.0):11.0f} % {100 * np.mean(ratio[here] < 2.0):6.0f} %"
@@ -126,7 +129,7 @@ def runoff() -> list[str]:
             out.append(f" all {here.sum():6d} {'':35s} {shares}")
         elif here.any():
             measured = np.percentile(rate[here] * unit, [50, 68, 95])
-            numbers = " ".join(f"{x:8.3g}" for x in (sigma_of_code(c) / 3.0 * unit, *measured))
+            numbers = " ".join(f"{x:8.3g}" for x in (sigma_of_code(c) * SHARE * unit, *measured))
             out.append(f"{c:4d} {here.sum():6d} {numbers} {shares}")
     return out
 
@@ -193,6 +196,10 @@ def deviation(orbit: Orbit, truth: Orbit, time: Time, window: Window) -> float:
     return float((points[-1] - points[-2]) @ axes[:, -1] / np.sqrt(values[-1]))
 
 
+def _reliable(orbit: Orbit) -> bool:
+    return orbit.covariance is not None and orbit.covariance.reliable
+
+
 def pairs(size: int = 200) -> dict[str, list[tuple[Orbit, Orbit]]]:
     """Orbits with their stated errors, and later or better orbits of the same asteroids, by source of the errors."""
     old, new, mpc = read(OLD), read(NEW), read(MPC)
@@ -219,20 +226,55 @@ def pairs(size: int = 200) -> dict[str, list[tuple[Orbit, Orbit]]]:
         chosen = some(code)
         out[f"JPL 2020, 1-sigmas, code {label}"] = [(old[k].orbit, late[k]) for k in chosen]
         out[f"JPL 2020, code {label} alone"] = [(plain(old[k]), late[k]) for k in chosen]
-    for label, low, high in (("0", 0, 0), ("1-2", 1, 2), ("3-5", 3, 5), ("6-9", 6, 9)):
-        keys = [k for k in mpc if k in late and mpc[k].row["condition_code"].isdigit()]
-        keys = [
-            k for k in keys if low <= int(mpc[k].row["condition_code"]) <= high and mpc[k].row["observed_jd"]
-        ]
-        ago = {k: (MEETING.jd - float(mpc[k].row["observed_jd"])) / 365.25 for k in keys}
-        for when, among in (
-            ("< 8 yr", [k for k in keys if ago[k] < 8.0]),
-            ("> 8 yr", [k for k in keys if ago[k] >= 8.0]),
-        ):
-            out[f"MPC 2026, U {label}, {when}"] = [(mpc[k].orbit, late[k]) for k in some(among)]
+    keys = [k for k in mpc if k in late and mpc[k].row["condition_code"].isdigit()]
+    reliable = {k for k in keys if _reliable(mpc[k].orbit)}
+    for which, group in (("", reliable), ("weak, old, ", set(keys) - reliable)):
+        for low, high in ((0, 0), (1, 2), (3, 5), (6, 9)):
+            among = [k for k in keys if k in group and low <= int(mpc[k].row["condition_code"]) <= high]
+            label = f"U {low}" if low == high else f"U {low}-{high}"
+            out[f"MPC 2026, {which}{label}"] = [(mpc[k].orbit, late[k]) for k in some(among)]
     files = sorted((DATA / "neocc").glob("*.ke1"))
     own = [catalogue(f)[0] for f in files]
     out["NEOCC, covariances"] = [(a.orbit, late[identity(a)]) for a in own if identity(a) in late]
+    return out
+
+
+def factor(size: int = 500) -> list[str]:
+    """Shares within 1 and 3 sigma by the part of the runoff that is called one sigma, for two halves of the asteroids.
+
+    The first half is that of the choice of ``orbit_errors.SHARE``; `size` limits the asteroids with U = 0.
+    """
+    new, mpc = read(NEW), read(MPC)
+    late = {k: a.orbit for k, a in new.items() if abs(seconds(a.epoch, MEETING)) < 2.0 * YEAR}
+    keys = [k for k in mpc if k in late and mpc[k].row["condition_code"].isdigit()]
+    best = [k for k in keys if mpc[k].row["condition_code"] == "0"]
+    kept = {best[i] for i in np.random.default_rng(0).permutation(len(best))[:size]}
+    keys = [k for k in keys if mpc[k].row["condition_code"] != "0" or k in kept]
+    window = ephemeris("de440").window(MEETING, -8.0 * YEAR, 2.0 * YEAR)
+    known = {k: _reliable(mpc[k].orbit) for k in keys}
+    out = [
+        "Orbits of the MPC of 2026-02 against JPL's of 2026-07, by the part of the runoff that is one sigma",
+        "                         choice, half of the asteroids          the other half",
+        "orbits      sigma/runoff   number  1 sigma       3 sigma   number  1 sigma       3 sigma",
+    ]
+    for label, reliable in (("others", True), ("weak, old", False)):
+        for share in (1.0 / 3.0, 0.5, 2.0 / 3.0, 1.0):
+            orbit_errors.SHARE = orbit_errors.SHARE_UNRELIABLE = share
+            cells = []
+            for half in (0, 1):
+                some = [k for k in keys if known[k] is reliable and zlib.crc32(k.encode()) % 2 == half]
+                found = [Asteroid(mpc[k].row, file=mpc[k].file).orbit for k in some]
+                z = [
+                    abs(deviation(o, late[k], later(MEETING, 1.0), window))
+                    for o, k in zip(found, some, strict=True)
+                ]
+                shares = [float(np.nanmean(np.array(z) < n)) for n in (1.0, 3.0)]
+                error = np.sqrt(0.99 * 0.01 / len(z))
+                cells.append(
+                    f"{len(z):6d} {100 * shares[0]:6.0f} % {100 * shares[1]:6.1f} +- {100 * error:3.1f} %"
+                )
+            out.append(f"{label:11s} {share:12.2f}   " + "   ".join(cells))
+    orbit_errors.SHARE, orbit_errors.SHARE_UNRELIABLE = SHARE, 1.0
     return out
 
 
@@ -241,7 +283,7 @@ def coverage() -> list[str]:
     window = ephemeris("de440").window(MEETING, -8.0 * YEAR, 2.0 * YEAR)
     out = [
         "Stated errors against JPL's orbits of 2026-07 at their epoch, along the direction least known",
-        "(years: of the MPC, since the middle of the observed arc)",
+        "(weak, old: one opposition or U of 3 and more, observed more than four years before; never called determined)",
         "source                          orbits  median |z|  within 1 sigma  within 3 sigma",
         "normal distribution                          0.67            68 %            99.7 %",
     ]
@@ -334,6 +376,7 @@ def main(arguments: list[str]) -> int:
         "digits": digits,
         "impacts": impacts,
         "model": model,
+        "factor": factor,
         "coverage": coverage,
         "growth": growth,
     }

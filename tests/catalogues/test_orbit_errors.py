@@ -8,7 +8,7 @@ from astropy.time import Time
 
 import flybystab as fs
 from flybystab.catalogues.asteroid import Asteroid
-from flybystab.catalogues.orbit_errors import error_of, runoff
+from flybystab.catalogues.orbit_errors import SHARE, error_of, runoff
 from flybystab.catalogues.readers.mpc import from_mpc
 from flybystab.constants import AU, YEAR
 from flybystab.orbit.elements import GM_SUN
@@ -72,7 +72,7 @@ def test_the_longitude_is_known_where_it_was_observed():
         gap = np.linalg.norm(
             np.subtract(*(two_body(GM_SUN, covariance.values + k * way, t)[:3] for k in (0.0, 1.0)))
         )
-        assert gap == pytest.approx(share * axis * runoff(2) / 3.0 * 10.0 * YEAR, rel=0.2, abs=1e3)
+        assert gap == pytest.approx(share * axis * runoff(2) * SHARE * 10.0 * YEAR, rel=0.2, abs=1e3)
 
 
 @pytest.mark.parametrize("name", ["2023 CX1", "2024 BX1"])

@@ -1,12 +1,16 @@
 """Uncertainty of an orbit without a published covariance: the digits of its elements, and its parameter U.
 
-The Minor Planet Center prints elements to the decimals of MPCORB and no errors. What it says of them is U, a class
-of the runoff in longitude after ten years (https://minorplanetcenter.net/iau/info/UValue.html), which it does not
-offer as a predictor for near-Earth asteroids. Here a third of the runoff in the middle of its class (three being the
-factor by which the MPC widens formal errors) counts as one sigma of the mean motion, of an asteroid that was where it
-was observed, in the middle of the arc. Held against later orbits that is about what it is called: 82 % of JPL's orbits
-of 2020 were within one sigma and 91 % within two (``python benchmarks/orbit_errors.py runoff``). For short arcs of one
-apparition it is too small after eight years (``python benchmarks/orbit_errors.py coverage``).
+The Minor Planet Center prints elements to the decimals of MPCORB and no errors. U (JPL: condition code) is a class of
+the runoff in longitude after ten years (https://minorplanetcenter.net/iau/info/UValue.html). Here two thirds of the
+runoff at the centre of its class count as one sigma of the mean motion of an asteroid that was at its observed place in
+the middle of the arc. The factor was chosen on half of the asteroids with a later orbit of JPL: it is the least of 1/3,
+1/2, 2/3 and 1 with which three sigma cover 99 % within the error of the sample. On the other half they cover 99 %
+(``python benchmarks/orbit_errors.py factor``). The errors have wider tails than a normal distribution, so that one
+sigma covers more than 68 %.
+
+Of weak orbits (one opposition, or U of 3 and more) from observations that are years old, U says little: no such factor
+makes three sigma cover 99 %. The whole runoff is their sigma, which covers 68 %, and the covariance is marked as not
+reliable, so that no encounter of them is called determined.
 """
 
 from __future__ import annotations
@@ -17,7 +21,7 @@ import numpy as np
 from astropy.time import Time
 
 from flybystab.constants import AU, DAY, YEAR
-from flybystab.orbit.covariance import SETS, Covariance
+from flybystab.orbit.covariance import SETS, UNRELIABLE, Covariance
 from flybystab.orbit.elements import GM_SUN, state_from_elements
 from flybystab.orbit.kepler import two_body
 from flybystab.typing import Array
@@ -25,6 +29,11 @@ from flybystab.typing import Array
 #: Half a unit in the last decimal of MPCORB: a (from the mean motion, deg/d), e, i, node, peri, M (deg).
 _HALF_UNITS = {"n": 5e-9, "e": 5e-8, "angle": 5e-6}
 _STEP = np.log(648000.0) / 9.0
+#: One sigma in units of the runoff: of an orbit, and of one for which U is not reliable.
+SHARE, SHARE_UNRELIABLE = 2.0 / 3.0, 1.0
+#: Age of observations, from the middle of the arc to the epoch of the elements, beyond which U of a weak orbit is not
+#: reliable, s, and the largest U of other orbits.
+_RECENT, _WELL_KNOWN = 4.0 * YEAR, 2
 
 
 def runoff(u: int) -> float:
@@ -39,7 +48,8 @@ def error_of(row: Mapping[str, str], epoch: Time) -> Covariance | None:
     ----------
     row : mapping
         A catalogue row. ``condition_code`` is U; ``observed_jd`` the middle of the observed arc (the epoch if
-        unknown); digits are used where the row comes from the MPC or the SBDB.
+        unknown); ``single_opposition`` is "Y" for an arc of one opposition; digits are used where the row comes from
+        the MPC or the SBDB.
     epoch : Time
         Of its elements.
     """
@@ -53,6 +63,7 @@ def error_of(row: Mapping[str, str], epoch: Time) -> Covariance | None:
     motion = np.sqrt(GM_SUN / axis**3)
     ways = []
     said = []
+    reliable = True
     if row.get("orbit_source", "").startswith("MPC ("):
         half = np.array([0.0, _HALF_UNITS["e"], *[_HALF_UNITS["angle"] * one] * 4])
         half[0] = 2.0 / 3.0 * axis * _HALF_UNITS["n"] * one / DAY / motion
@@ -64,15 +75,23 @@ def error_of(row: Mapping[str, str], epoch: Time) -> Covariance | None:
         said.append("digits")
     if row.get("condition_code", "").isdigit():
         ago = (epoch.tdb.jd - float(row.get("observed_jd") or epoch.tdb.jd)) * DAY
-        drift = runoff(int(row["condition_code"])) / 3.0
+        reliable = u_is_reliable(row, ago)
+        drift = runoff(int(row["condition_code"])) * (SHARE if reliable else SHARE_UNRELIABLE)
         ways.append(_kicked(middle, axis, ago, -drift / motion) - middle)
         said.append("U")
     if not said:
         return None
     words = " and ".join(said)
-    source, caveat = f"{words} of {row.get('orbit_source') or 'the row'}", f"by the {words} of its elements"
+    source = f"{words} of {row.get('orbit_source') or 'the row'}"
+    caveat = f"by the {words} of its elements" if reliable else UNRELIABLE
     matrix = np.transpose(ways) @ np.array(ways)
     return Covariance(epoch, SETS["cartesian"], middle, matrix, source, False, caveat)
+
+
+def u_is_reliable(row: Mapping[str, str], ago: float) -> bool:
+    """Whether U covers the error of an orbit whose arc has its middle `ago` s before the epoch."""
+    weak = row.get("single_opposition") == "Y" or int(row["condition_code"]) > _WELL_KNOWN
+    return not weak or ago < _RECENT
 
 
 def printed_half_units(row: Mapping[str, str]) -> Array:

@@ -44,6 +44,8 @@ _SI: Mapping[str, u.UnitBase] = (
 )
 #: Caveat of a covariance by the printed digits of an orbit, which says nothing of the error of the orbit itself.
 DIGITS = "by the digits of its elements"
+#: Caveat of a covariance by the uncertainty parameter of few old observations, whose errors have no known law.
+UNRELIABLE = "by the digits and U of its elements; U is not reliable for a weak orbit from old observations"
 #: Largest negative eigenvalue of the correlation matrix that is attributed to rounding of the published digits.
 _ROUNDING = 1e-6
 
@@ -182,6 +184,11 @@ class Covariance:
     def digits_alone(self) -> bool:
         """Whether it holds the rounding of printed elements alone: the error of the orbit is not known then."""
         return self.caveat == DIGITS
+
+    @property
+    def reliable(self) -> bool:
+        """Whether its errors are known to cover those of the orbit; an encounter is not called determined otherwise."""
+        return self.caveat not in (DIGITS, UNRELIABLE)
 
     @property
     def elements(self) -> str:

@@ -76,7 +76,7 @@ class Deviations:
         Description.
     known : bool
         False where the orbit has no covariance, so that a shift of one metre away from the Sun takes the place of
-        sigma, or one by its printed digits alone.
+        sigma, or one that is not reliable (:attr:`Covariance.reliable`).
     scale : float
         Factor from the points to one sigma or one metre.
     """
@@ -110,4 +110,4 @@ def deviations_of(orbit: Orbit, ephemeris: str | Ephemeris | None = None) -> Dev
     found = [covariance.deviations(covariance.values + sign * covariance.factor.T) for sign in (1.0, -1.0)]
     states, pushes = (np.array(x) for x in zip(*found, strict=True))
     label = "one sigma in the direction least known" + (f", {covariance.caveat}" if covariance.caveat else "")
-    return Deviations(there, states, pushes, label, not covariance.digits_alone)
+    return Deviations(there, states, pushes, label, covariance.reliable)

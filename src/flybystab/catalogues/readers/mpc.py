@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 
 from flybystab.catalogues.designations import names_of, unpacked, unpacked_date
 from flybystab.catalogues.readers import FRAME, Contents, header_of, reader, rows_of
+from flybystab.catalogues.readers.arcs import arc_columns
 from flybystab.catalogues.readers.parameters import (
     check_parameters,
     looks_like_parameter,
@@ -47,6 +48,9 @@ def from_mpc(row: Mapping[str, str], file: str) -> dict[str, str]:
     # TT and TDB differ by less than 2 ms.
     out["epoch_jd_tdb"] = row["epoch_jd_tt"]
     out["observed_jd"] = _middle(row.get("arc", ""), row.get("last_obs", ""))
+    if out["observed_jd"]:  # of one opposition the MPC gives the length in days, otherwise the years
+        out["single_opposition"] = "Y" if row["arc"].endswith("d") else "N"
+    out |= arc_columns(row.get("first_obs"), row.get("last_obs"))
     try:  # the mean motion determines the semi-major axis to more digits than its own column
         axis = (_GAUSS / float(row["n_deg_d"])) ** (2.0 / 3.0)
         if abs(axis - float(row["a_au"])) < 1e-7:

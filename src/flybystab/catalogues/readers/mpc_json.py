@@ -32,6 +32,7 @@ _SERVICE = {
     "argument_of_perihelion": "peri_deg", "ascending_node": "node_deg", "inclination": "i_deg",
     "eccentricity": "e", "mean_daily_motion": "n_deg_d", "semimajor_axis": "a_au",
     "orbit_uncertainty": "U", "last_observation_date_used": "last_obs", "name": "name",
+    "first_observation_date_used": "first_obs",
     "designation": "principal_desig", "number": "number",
 }  # fmt: skip
 _PERIHELION = (

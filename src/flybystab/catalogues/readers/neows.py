@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from flybystab.catalogues.designations import is_comet, name_columns
 from flybystab.catalogues.readers import Contents, reader
+from flybystab.catalogues.readers.arcs import arc_columns
 from flybystab.catalogues.readers.conversion import (
     COLUMN_OF,
     KEPLERIAN,
@@ -82,6 +83,7 @@ def _entry(thing: Mapping[str, Any], file: str) -> Entry:
     if thing.get("absolute_magnitude_h") is not None:
         row["H_mag"] = str(thing["absolute_magnitude_h"])
     code = str(data.get("orbit_uncertainty") or "")
+    row |= arc_columns(data.get("first_observation_date"), data.get("last_observation_date"))
     row["condition_code"] = code if code.isdigit() and not is_comet(row["designation"]) else ""
     if str(data.get("equinox", "J2000")) != "J2000":
         raise InvalidInput("equinox", data["equinox"], f"J2000 in {file}")

@@ -16,6 +16,7 @@ import numpy as np
 
 from flybystab.catalogues.designations import is_comet, name_columns, names_of
 from flybystab.catalogues.readers import FRAME, Contents, header_of, reader, rows_of
+from flybystab.catalogues.readers.arcs import arc_columns
 from flybystab.catalogues.readers.conversion import (
     MJD,
     axis_of,
@@ -102,6 +103,7 @@ def from_sbdb(row: Mapping[str, str], file: str) -> dict[str, str]:
     law = "comet" if comet else "asteroid"  # a query does not list the constants
     out |= nongravitational_columns({c: row[c] for c in _PARAMETERS if row.get(c)}, comet, file, law=law)
     out |= _names(row, full, key)
+    out |= arc_columns(row.get("first_obs"), row.get("last_obs"))
     out["pha"] = {"True": "Y", "False": "N"}.get(row.get("pha", ""), row.get("pha", ""))
     taxonomy = row.get("spec_B") or row.get("spec_T")
     if taxonomy:

@@ -15,6 +15,7 @@ import numpy as np
 
 from flybystab.catalogues.designations import name_columns
 from flybystab.catalogues.readers import FRAME, Contents, reader
+from flybystab.catalogues.readers.arcs import arc_columns
 from flybystab.catalogues.readers.conversion import (
     COLUMN_OF,
     KEPLERIAN,
@@ -76,6 +77,7 @@ def from_sbdb_answer(text: str, file: str) -> tuple[dict[str, str], Covariance |
     row |= physical(record.get("phys_par") or [], file)
     solution = str(orbit.get("orbit_id", ""))
     row |= {"frame": FRAME, "orbit_solution": f"JPL {solution}", "orbit_source": f"JPL SBDB ({file})"}
+    row |= arc_columns(orbit.get("first_obs"), orbit.get("last_obs"))
     row["condition_code"] = str(orbit.get("condition_code") or "")
     pushes = {name: p for name, p in model.items() if name in COLUMN_OF_PARAMETER}
     row |= nongravitational_columns({name: p["value"] for name, p in model.items()}, comet, file)
