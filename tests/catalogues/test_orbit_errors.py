@@ -8,13 +8,15 @@ from astropy.time import Time
 
 import flybystab as fs
 from flybystab.catalogues.asteroid import Asteroid
-from flybystab.catalogues.orbit_errors import SHARE, error_of, runoff
+from flybystab.catalogues.orbit_errors import SHARE, SHARE_UNRELIABLE, error_of, runoff
+from flybystab.catalogues.readers.arcs import arc_columns
 from flybystab.catalogues.readers.mpc import from_mpc
 from flybystab.constants import AU, YEAR
 from flybystab.orbit.elements import GM_SUN
 from flybystab.orbit.epochs import later
 from flybystab.orbit.kepler import two_body
 from flybystab.orbit.osculating_state import heliocentric
+from flybystab.orbit.predictability import deviations_of, predictability
 from flybystab.screening.clones import orbit_sampling
 from flybystab.screening.encounters import Passage
 
@@ -138,6 +140,53 @@ def test_a_screening_says_what_is_known():
         Passage(rock, "earth", Time("2029-04-13 21:46", scale="tdb"), 3.8e7, 5.8e3), 10, 0
     ).note
     assert note == "orbit without errors (known only by the digits and U of its elements)"
+
+
+@pytest.mark.parametrize(
+    ("arc", "last", "code", "reliable"),
+    [
+        ("20 d", "2025-06-01", "5", True),  # one opposition, this year
+        ("20 d", "2015-06-01", "5", False),
+        ("20 d", "2015-06-01", "2", False),
+        ("1998-2012", "2012-06-01", "4", False),  # several oppositions, but weak
+        ("1998-2012", "2012-06-01", "1", True),
+    ],
+)
+def test_u_of_weak_orbits_from_old_observations_is_not_reliable(arc, last, code, reliable):
+    """No encounter of theirs is determined: of JPL's later orbits more than 1 % are beyond three sigma."""
+    rock = mpc("Apophis", U=code, arc=arc, last_obs=last)
+    covariance = rock.orbit.covariance
+    assert covariance.reliable is reliable
+    assert not covariance.digits_alone
+    assert deviations_of(rock.orbit).known is reliable
+    assert predictability(1e9, 1.0, known=covariance.reliable) == ("determined" if reliable else "unknown")
+
+
+def test_one_sigma_is_a_part_of_the_runoff():
+    """The whole runoff for an orbit whose U is not reliable."""
+    good, weak = (
+        np.linalg.norm(mpc("Apophis", U="2", arc=arc, last_obs="2015-06-01").orbit.covariance.sigma[3:])
+        for arc in ("2014-2016", "20 d")
+    )
+    assert weak / good == pytest.approx(SHARE_UNRELIABLE / SHARE, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("first", "last", "single"),
+    [
+        ("2004-03-15", "2004-04-14", "Y"),
+        ("2004-Mar-15", "2021-05-20.25", "N"),
+        ("1893-10-29", "2026-02-10", "N"),
+    ],
+)
+def test_arcs_by_their_first_and_last_observation(first, last, single):
+    columns = arc_columns(first, last)
+    middle = Time([first.replace("Mar", "03"), last.partition(".")[0]], scale="tdb").jd.mean()
+    assert float(columns["observed_jd"]) == middle
+    assert columns["single_opposition"] == single
+    assert not arc_columns(first, None)
+    assert not arc_columns("", last)
+    assert not arc_columns(last, first)
 
 
 def test_a_row_that_says_nothing_has_no_covariance():

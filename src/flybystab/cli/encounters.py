@@ -174,6 +174,10 @@ def _lines(table: QTable, many: bool) -> list[str]:
         if row["impact"]:
             said.append("impact: time of entry" + _place(row))
         out.append(f"{line}  {', '.join(said)}".rstrip())
+    if any(v == 0.0 for v in table["v_inf"].value):
+        out.append("bound: slower than the escape speed at closest approach, without an asymptote")
+    if count and not known:
+        out.append("errors of the orbits are not propagated with --all")
     if count > SHOWN:
         out.append(f"the closest {SHOWN} of {count}; --output FILE writes all")
     if not known:
@@ -183,8 +187,6 @@ def _lines(table: QTable, many: bool) -> list[str]:
         f"sigma: displacement at the encounter of an orbit {neighbours}; "
         "model: error by ephemeris, tolerance and forces left out"
     )
-    if any(v == 0.0 for v in table["v_inf"].value):
-        out.append("bound: slower than the escape speed at closest approach, without an asymptote")
     if clones:
         lost = int((table["clones"] - table["clones_found"]).max())
         out.append(

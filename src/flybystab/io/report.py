@@ -239,6 +239,7 @@ def _probability_rows(row: Row) -> Rows:
         ),
         ("not in equilibrium", f"{float(row['p_not_in_equilibrium']):.3g} of the samples"),
         *([("drawn from distributions", str(row["drawn"]))] if row["drawn"] else []),
+        *(("not drawn", t) for t in str(row["assumed"]).split("; ") if t.startswith("orbit without errors")),
         *(
             [("margin most sensitive to (Spearman rho)", str(row["contributors"]))]
             if row["contributors"]

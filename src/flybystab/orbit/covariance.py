@@ -45,7 +45,7 @@ _SI: Mapping[str, u.UnitBase] = (
 #: Caveat of a covariance by the printed digits of an orbit, which says nothing of the error of the orbit itself.
 DIGITS = "by the digits of its elements"
 #: Caveat of a covariance by the uncertainty parameter of few old observations, whose errors have no known law.
-UNRELIABLE = "by the digits and U of its elements; U is not reliable for a weak orbit from old observations"
+UNRELIABLE = "by the digits and U of its elements, not reliable for a weak orbit from old observations"
 #: Largest negative eigenvalue of the correlation matrix that is attributed to rounding of the published digits.
 _ROUNDING = 1e-6
 
