@@ -29,6 +29,7 @@ TABLES = {
     "many": "flybystab bench many",
     "memory": "python benchmarks/screen.py memory",
     "orbit_coverage": "python benchmarks/orbit_errors.py coverage",
+    "orbit_factor": "python benchmarks/orbit_errors.py factor",
     "orbit_errors": "python benchmarks/orbit_errors.py runoff digits impacts",
     "other_planets": "python benchmarks/encounters.py planets",
     "outcomes": "python benchmarks/piles.py map",

@@ -81,6 +81,7 @@ def run(options: argparse.Namespace) -> None:
     many = len(asteroids) > 1
     source = ", ".join(options.name) or options.catalogue or "embedded catalogue"
     head = f"{len(table)} encounters within {options.within:g} au"
+    head += ", without the errors of the orbits" if options.all else ""
     show(
         options,
         lambda: table_document(table),
@@ -176,8 +177,6 @@ def _lines(table: QTable, many: bool) -> list[str]:
         out.append(f"{line}  {', '.join(said)}".rstrip())
     if any(v == 0.0 for v in table["v_inf"].value):
         out.append("bound: slower than the escape speed at closest approach, without an asymptote")
-    if count and not known:
-        out.append("errors of the orbits are not propagated with --all")
     if count > SHOWN:
         out.append(f"the closest {SHOWN} of {count}; --output FILE writes all")
     if not known:
