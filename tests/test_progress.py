@@ -188,3 +188,38 @@ def test_a_log_gets_a_line_every_half_minute(monkeypatch):
     lines = out.getvalue().splitlines()
     assert [line.split()[1] for line in lines] == ["30/100", "60/100", "90/100", "100/100"]
     assert "1.00 rows/s, 01:10 left" in lines[0]
+
+
+NOTEBOOK = [
+    "import time, threading\nfrom flybystab.progress import progress_bar",
+    """
+def steps(asked, n):
+    with progress_bar(asked, n, "steps", "test") as tick:
+        for k in range(n):
+            time.sleep(0.1)
+            tick(k + 1)
+steps(None, 32)
+""",
+    "steps(None, 3)",
+    "steps(True, 10)",
+    "thread = threading.Thread(target=steps, args=(None, 25)); thread.start(); thread.join()",
+    "steps(False, 25)",
+]
+
+
+def test_bars_in_a_notebook():
+    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    pytest.importorskip("ipykernel")
+    book = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(c) for c in NOTEBOOK])
+    nbclient.NotebookClient(book, timeout=120, kernel_name="python3").execute()
+    texts = ["".join(o.text for o in cell.outputs) for cell in book.cells]
+    assert all(o.output_type == "stream" and o.name == "stderr" for c in book.cells for o in c.outputs)
+    _, long, short, asked, threaded, none = texts
+    assert "test [" in long
+    assert "/32 steps" in long
+    assert 2 <= long.count("steps,") <= 4  # after two seconds, every half second
+    assert not long.split("\r")[-1].strip()  # erased at the end
+    assert asked.endswith("\n")
+    assert "[####################] 10/10 steps" in asked.split("\r")[-1]
+    assert short == threaded == none == ""
+    assert "arning" not in "".join(texts)

@@ -260,6 +260,9 @@ def test_json_follows_its_schema(results, name, tmp_path):
         "BinarySample",
         "GrainsOutcome",
         "GrainsCourse",
+        "GrainsRun",
+        "LinearPlane",
+        "Push",
     ],
 )
 def test_plots(results, name):

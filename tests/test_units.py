@@ -8,6 +8,7 @@ from scenes import PILE, R_E, earth
 
 import flybystab as fs
 from flybystab.errors import InvalidInput, UnitMismatch
+from flybystab.units import checked_time
 
 KMS = u.km / u.s
 GCC = u.g / u.cm**3
@@ -174,3 +175,36 @@ def test_dates_as_text_are_tdb():
     for wrong in ("April", "2029-13-01", ""):
         with pytest.raises(InvalidInput, match="read as TDB"):
             fs.find_encounters(orbit, wrong, "2029-04-15")
+
+
+@pytest.mark.parametrize(
+    ("text", "iso"),
+    [
+        ("2029-04-13", "2029-04-13 00:00:00.000"),
+        ("2029-04-13T21:46", "2029-04-13 21:46:00.000"),
+        ("2029-04-13 21:46:12.5", "2029-04-13 21:46:12.500"),
+        ("2029-Apr-13 21:46", "2029-04-13 21:46:00.000"),
+        ("2029-apr-13", "2029-04-13 00:00:00.000"),
+        ("2029-4-3 9:05", "2029-04-03 09:05:00.000"),
+        ("2029-04-13.25", "2029-04-13 06:00:00.000"),
+        ("2029-04", "2029-04-01 00:00:00.000"),
+        ("2029", "2029-01-01 00:00:00.000"),
+        (" JD 2462240.40703 ", "2029-04-13 21:46:07.392"),
+        ("jd2462239.5", "2029-04-13 00:00:00.000"),
+        ("2029-04-13 21:45:03 UTC", "2029-04-13 21:46:12.184"),
+        ("2029:103:12:00", "2029-04-13 12:00:00.000"),
+    ],
+)
+def test_dates_as_text(text, iso):
+    found = checked_time(text, "start")
+    assert found.tdb.iso[:-2] == iso[:-2]
+    if "UTC" not in text:
+        assert found.scale == "tdb"
+
+
+@pytest.mark.parametrize(
+    "text", ["", "soon", "2029-13-01", "2029-Abc-13", "2029-04-31", "13.4.2029", "2029-04 12:00", "JD", "12"]
+)
+def test_texts_that_are_no_dates(text):
+    with pytest.raises(InvalidInput, match="a date such as 2029-04-13"):
+        checked_time(text, "start")

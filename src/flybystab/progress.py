@@ -24,8 +24,8 @@ Progressing = bool | Callable[[int, int], None] | None
 DELAY = 2.0
 #: Seconds between two lines where there is no terminal.
 QUIET = 30.0
-#: Seconds between two updates of a bar.
-FRAME = 0.1
+#: Seconds between two updates of a bar, on a terminal and in a notebook, which may keep all of them.
+FRAME, NOTEBOOK_FRAME = 0.1, 0.5
 _FORMAT = "{desc}[{bar:20}] {n_fmt}/{total_fmt}{unit}, {rate_fmt}, {remaining} left{postfix}"
 _LINE = "{desc}{n_fmt}/{total_fmt}{unit}, {rate_fmt}, {remaining} left{postfix}"
 #: Held while a bar is shown; calculations nested in that one show none.
@@ -65,6 +65,7 @@ class Bar:
     ) -> None:
         self.stream = sys.stderr if stream is None else stream
         self.drawn = draws(self.stream)
+        self._frame = NOTEBOOK_FRAME if in_notebook() else FRAME
         self.total, self.initial = total, initial
         self._begun = time.monotonic()
         self._next = self._begun + (delay if self.drawn else QUIET)
@@ -81,7 +82,7 @@ class Bar:
             now = time.monotonic()
             if now < self._next:
                 return
-            self._next = now + (FRAME if self.drawn else QUIET)
+            self._next = now + (self._frame if self.drawn else QUIET)
             self._show()
 
     def _show(self) -> None:

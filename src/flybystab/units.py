@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import astropy.units as u
@@ -94,8 +95,46 @@ def whole(value: Any, name: str, least: int) -> int:
     return int(value)
 
 
+#: Months in the dates of JPL and CNEOS.
+_MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct", "nov", "dec")
+#: Year, month, day with decimals, time of day, scale.
+_DATE = re.compile(
+    r"(?P<year>[+-]?\d{4,5})(-(?P<month>\d{1,2}|[A-Za-z]{3})(-(?P<day>\d{1,2})(?P<part>\.\d+)?)?)?"
+    r"([T ]\s*(?P<clock>\d{1,2}:\d{2}(:\d{2}(\.\d*)?)?))?\s*(?P<scale>TDB|TT|TAI|UTC)?",
+    re.IGNORECASE,
+)
+_JULIAN = re.compile(r"JD\s*(\d+)(\.\d*)?\s*(TDB|TT|TAI|UTC)?", re.IGNORECASE)
+DATES = "a date such as 2029-04-13, 2029-Apr-13 21:46, 2029-04 or JD 2462240.4, read as TDB"
+
+
+def parsed_time(text: str) -> Time:
+    """The time that a text gives, TDB if it does not end in another scale.
+
+    Dates with months as numbers or names (2029-04-13, 2029-Apr-13), with decimals of the day or a time of day, a
+    month or a year alone (its beginning), and Julian dates after "JD".
+
+    Raises
+    ------
+    ValueError
+        Another text.
+    """
+    plain = text.strip()
+    if julian := _JULIAN.fullmatch(plain):
+        day, part, scale = julian.groups()
+        return Time(float(day), float(part or 0.0), format="jd", scale=(scale or "tdb").lower())
+    found = _DATE.fullmatch(plain)
+    if found is None or (found["clock"] and (not found["day"] or found["part"])):
+        return Time(plain, scale="tdb")  # another format of astropy
+    month = (found["month"] or "1").lower()
+    number = _MONTHS.index(month) + 1 if month.isalpha() else int(month)
+    scale = (found["scale"] or "tdb").lower()
+    clock = found["clock"] or "00:00"
+    time = Time(f"{found['year']}-{number:02d}-{int(found['day'] or 1):02d} {clock:0>5}", scale=scale)
+    return time + float(found["part"]) * u.d if found["part"] else time
+
+
 def checked_time(value: Any, name: str) -> Time:
-    """One astropy Time that converts to TDB without tables of the Earth's rotation; text is a date in TDB.
+    """One astropy Time that converts to TDB without tables of the Earth's rotation; text as in :func:`parsed_time`.
 
     Raises
     ------
@@ -104,11 +143,9 @@ def checked_time(value: Any, name: str) -> Time:
     """
     if isinstance(value, str):
         try:
-            value = Time(value, scale="tdb")
+            value = parsed_time(value)
         except ValueError:
-            raise InvalidInput(
-                name, value, "a date such as 2029-04-13, read as TDB, or an astropy Time"
-            ) from None
+            raise InvalidInput(name, value, f"{DATES}, or an astropy Time") from None
     if not isinstance(value, Time) or value.shape != ():
         raise InvalidInput(name, value, "one astropy Time, or a date such as 2029-04-13 (TDB)")
     if value.scale in ("local", "ut1"):

@@ -181,6 +181,10 @@ AXES = {
     "distributions.grains_course_plot": lambda a: distributions.grains_course_plot(
         a, kept(grained).grains.median.course
     ),
+    "distributions.linear_plane_plot": lambda a: distributions.linear_plane_plot(a, kept(clones).linear),
+    "distributions.push_plot": lambda a: distributions.push_plot(
+        a, fs.push(BODY, np.diag([1.0, 0.0, -1.0]), np.linspace(0.0, 0.2, 21))
+    ),
     "screening.rise_plot": lambda a: tables.rise_plot(a, kept(screened)),
     "screening.margin_plot": lambda a: tables.margin_plot(a, kept(screened)),
     "screening.bounds_plot": lambda a: tables.bounds_plot(a, kept(bounded), "friction_equilibrium"),

@@ -9,7 +9,6 @@ from typing import Any
 
 import astropy.units as u
 import numpy as np
-from astropy.time import Time
 from astropy.units import Quantity
 from scipy.spatial.transform import Rotation
 
@@ -22,7 +21,7 @@ from flybystab.errors import InvalidInput, UnknownName
 from flybystab.files import DOCUMENT_LIMIT, parse_toml, read_text
 from flybystab.orbit.planets import planet
 from flybystab.plots.formats import FIGURES, FILMS
-from flybystab.units import to_si
+from flybystab.units import DATES, parsed_time, to_si
 
 #: Allowed keys of each table.
 KEYS: dict[str, tuple[str, ...]] = {
@@ -219,9 +218,9 @@ def _encounter(section: dict[str, Any], asteroid: Asteroid | None) -> Encounter:
         if orbiting is None:
             raise InvalidInput("encounter.date", section["date"], "an asteroid, in [body] or [encounter]")
         try:
-            time = Time(str(section["date"]), scale="tdb")
+            time = parsed_time(str(section["date"]))
         except ValueError:
-            raise InvalidInput("encounter.date", section["date"], "a date such as 2029-04-13") from None
+            raise InvalidInput("encounter.date", section["date"], DATES) from None
         ephemeris = _typed(section, "encounter", "ephemeris", str, None)
         return Encounter.from_orbit(orbiting.orbit, where, time, ephemeris=ephemeris, **options)
     for key in _REAL:

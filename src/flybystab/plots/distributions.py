@@ -12,10 +12,11 @@ import numpy as np
 from astropy.units import Quantity
 
 from flybystab.body.bounds import Requirements
+from flybystab.body.stability import Push
 from flybystab.body.surface_history import SurfaceHistory
 from flybystab.body.surface_slope import SlopeChange, SurfaceSlopes
 from flybystab.encounter.distribution import EncounterDistribution
-from flybystab.encounter.linear_target_plane import ellipse
+from flybystab.encounter.linear_target_plane import LinearPlane, ellipse
 from flybystab.flybys.binary import BinarySample
 from flybystab.flybys.grains_outcome import GrainsCourse, GrainsOutcome
 from flybystab.flybys.spin_forecast import SpinForecast
@@ -75,14 +76,7 @@ def distribution_plot(axes: Any, distribution: EncounterDistribution) -> Any:
         axes.plot(*points[hit].T, "x", color=RED, ms=4, label=f"clones that hit ({hit.sum()})")
     linear = distribution.linear
     if linear is not None:
-        long, short, direction = ellipse(linear.covariance)
-        around = np.linspace(0.0, 2.0 * np.pi, 181)
-        x, y = long.to_value(u.km) * np.cos(around), short.to_value(u.km) * np.sin(around)
-        c, s = np.cos(direction.to_value(u.rad)), np.sin(direction.to_value(u.rad))
-        centre = linear.centre.to_value(u.km)
-        axes.plot(
-            centre[0] + c * x - s * y, centre[1] + s * x + c * y, color=BLACK, lw=1, label="1-sigma ellipse"
-        )
+        axes.plot(*_ellipse_points(linear, 1.0), color=BLACK, lw=1, label="1-sigma ellipse")
     speed = np.median(distribution.v_inf[distribution.found].to_value(u.m / u.s)) if len(points) else np.nan
     radius = distribution.planet.impact_distance
     if speed > 0.0 and np.linalg.norm(np.median(points, axis=0)) < 30.0 * radius / 1e3:
@@ -96,6 +90,40 @@ def distribution_plot(axes: Any, distribution: EncounterDistribution) -> Any:
     axes.set(xlabel="B.T (km)", ylabel="B.R (km)")
     axes.legend()
     axes.set_title(f"{distribution.planet.name.capitalize()}, {distribution.time.tdb.iso[:10]}")
+    return axes
+
+
+def linear_plane_plot(axes: Any, plane: LinearPlane) -> Any:
+    """Plot the target plane of a linear map: the 1-sigma and the 3-sigma ellipse about the nominal point."""
+    for sigmas, line in ((1.0, "-"), (3.0, "--")):
+        outline = _ellipse_points(plane, sigmas)
+        axes.plot(*outline, color=BLUE, ls=line, label=f"{sigmas:g} sigma")
+    axes.plot(*plane.centre.to_value(u.km), "+", color=BLACK, label="nominal orbit")
+    axes.set(xlabel="B.T (km)", ylabel="B.R (km)")
+    axes.legend()
+    return axes
+
+
+def _ellipse_points(plane: LinearPlane, sigmas: float) -> Array:
+    """Points (2, n) of an ellipse of a linear map on the target plane, km."""
+    long, short, direction = ellipse(plane.covariance)
+    around = np.linspace(0.0, 2.0 * np.pi, 181)
+    x = sigmas * long.to_value(u.km) * np.cos(around)
+    y = sigmas * short.to_value(u.km) * np.sin(around)
+    c, s = np.cos(direction.to_value(u.rad)), np.sin(direction.to_value(u.rad))
+    return np.asarray(plane.centre.to_value(u.km)[:, None] + np.stack([c * x - s * y, s * x + c * y]))
+
+
+def push_plot(axes: Any, found: Push) -> Any:
+    """Plot the kinetic energy that a perturbation has lost against its strain: two expansions and the whole path."""
+    for values, name, colour, line in (
+        (found.loss.second, "to second order", BLUE, ":"),
+        (found.loss.third, "to third order", ORANGE, "--"),
+        (found.loss.barrier, "on the whole path", BLACK, "-"),
+    ):
+        axes.plot(found.strain, values.to_value(u.J), color=colour, ls=line, label=name)
+    axes.set(xlabel="strain", ylabel="kinetic energy lost (J)")
+    axes.legend()
     return axes
 
 

@@ -10,14 +10,15 @@ import astropy.units as u
 import numpy as np
 
 from flybystab.body.bounds import Requirements
-from flybystab.body.stability import Stability
+from flybystab.body.stability import Push, Stability
 from flybystab.body.surface_history import SurfaceHistory
 from flybystab.body.surface_slope import SlopeChange, SurfaceSlopes
 from flybystab.encounter.distribution import EncounterDistribution
+from flybystab.encounter.linear_target_plane import LinearPlane
 from flybystab.errors import InvalidInput
 from flybystab.flybys.binary import BinarySample
 from flybystab.flybys.critical import CriticalValues
-from flybystab.flybys.grains_outcome import GrainsCourse, GrainsOutcome
+from flybystab.flybys.grains_outcome import GrainsCourse, GrainsOutcome, GrainsRun
 from flybystab.flybys.history import History
 from flybystab.flybys.outcome_map import OutcomeMap, TargetMap
 from flybystab.flybys.result import FlybyResult
@@ -27,6 +28,7 @@ from flybystab.flybys.survival import Survival
 from flybystab.flybys.table import FlybyTable
 from flybystab.plots import distributions, screening
 from flybystab.plots.flyby import BLUE, axes_plot, described, flyby_panels, friction_plot, spin_plot
+from flybystab.plots.grains import grains_plot
 from flybystab.plots.outcome_map import outcome_plot, target_plot
 from flybystab.plots.population import rate_plot, verdict_plot
 from flybystab.plots.stability import barrier_plot
@@ -153,6 +155,8 @@ _DISTRIBUTIONS: dict[type, Callable[[Any, Any], Any]] = {
     BinarySample: distributions.binary_plot,
     GrainsOutcome: distributions.grains_outcome_plot,
     GrainsCourse: distributions.grains_course_plot,
+    LinearPlane: distributions.linear_plane_plot,
+    Push: distributions.push_plot,
     Requirements: distributions.requirements_plot,
 }
 
@@ -165,6 +169,14 @@ def _register(kind: type, function: Callable[[Any, Any], Any]) -> None:
 
 for _kind, _function in _DISTRIBUTIONS.items():
     _register(_kind, _function)
+
+
+@_plot.register
+def _(result: GrainsRun, axes: Any) -> Any:
+    grains_plot(axes, result, len(result.course) - 1)
+    axes.set_ylabel("y (km)")
+    axes.set_title(f"{result.largest_fraction:.0%} of the mass in the largest clump, colours by clump")
+    return axes
 
 
 @_plot.register
