@@ -48,7 +48,7 @@ figure = Figure(figsize=(6.4, 4.2), layout="constrained")
 d = PLANETS["earth"].impact_distance
 disc = d * np.sqrt(1 + 2 * GM_EARTH / (d * SPEED**2))
 axes = verdict_points(figure.subplots(), points * u.m, verdict, disc * u.m)
-axes.set_aspect("equal")
+axes.set(aspect="equal", title="Earth, 300 clones: verdicts over the target plane")
 Path("out").mkdir(exist_ok=True)
 figure.savefig("out/target_plane.png", dpi=150)
 inside = int(np.count_nonzero(np.hypot(*points.T) < disc))

@@ -8,7 +8,6 @@ import astropy.units as u
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
-from matplotlib.patches import Patch
 
 from flybystab.body.body import DEFAULT_SURFACE, Body, Material
 from flybystab.body.fluids import roche_limit
@@ -19,6 +18,7 @@ from flybystab.plots.stability import (
     BLACK,
     barrier_plot,
     failure_distance_plot,
+    regions_legend,
     regions_plot,
     spin_plot,
 )
@@ -56,12 +56,9 @@ def regions_figure(bodies: Mapping[str, Body], surface: str = DEFAULT_SURFACE, c
     w2 = {name: float(b.omega @ b.omega) * b.dynamical_time**2 for name, b in bodies.items()}
     for axes, spin in zip(figure.subplots(2, 2).flat, SPINS, strict=True):
         near = {n: b for n, b in bodies.items() if min(SPINS, key=lambda s: abs(s - w2[n])) == spin}
-        regions_plot(axes, spin, yield_surface=surface, bodies=near, named=KNOWN, cells=cells)
+        regions_plot(axes, spin, yield_surface=surface, bodies=near, named=KNOWN, cells=cells, legend=False)
     handles = [
-        Patch(facecolor="0.8", label="no friction angle suffices"),
-        Patch(
-            facecolor="none", edgecolor="0.55", hatch="////", label="unstable at the required friction angle"
-        ),
+        *regions_legend(),
         Line2D([], [], color=BLACK, ls="", marker="o", ms=4, mec="white", label="asteroids of the catalogue"),
     ]
     figure.legend(handles=handles, loc="outside lower center", ncols=3)

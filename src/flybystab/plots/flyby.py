@@ -23,6 +23,10 @@ BLACK, ORANGE, SKY, GREEN, BLUE, RED = "#000000", "#E69F00", "#56B4E9", "#009E73
 STYLES = ("-", "--", ":")
 
 
+#: Label of the time axis of histories.
+TIME = "time from closest approach (h)"
+
+
 def _hours(history: History) -> Any:
     return history.time_from_periapsis.to_value(u.h)
 
@@ -54,43 +58,48 @@ def distance_plot(axes: Any, history: History, encounter: Encounter) -> Any:
     axes.semilogy(_hours(history), history.distance.to_value(u.km), color=BLACK)
     radius = encounter.planet.radius / 1e3
     axes.axhline(radius, color=BLUE, ls="--", label=f"radius of {encounter.planet.name.capitalize()}")
-    axes.set_ylabel("distance (km)")
+    axes.set(xlabel=TIME, ylabel="distance (km)")
     _shade(axes, history, labels=True)
     axes.legend()
     return axes
 
 
-def friction_plot(axes: Any, history: History, limit: u.Quantity) -> Any:
-    """Plot the mobilised friction angle against time, with the friction angle of the material."""
+def friction_plot(axes: Any, history: History, limit: u.Quantity, *, regimes: bool = True) -> Any:
+    """Plot the mobilised friction angle against time, with the friction angle of the material.
+
+    Without `regimes` the shading of plastic flow is not in the legend; so in the two functions below.
+    """
     phi = history.required_friction_angle.to_value(u.deg)
     axes.plot(_hours(history), np.where(np.isfinite(phi), phi, np.nan), color=RED, label="mobilised")
     axes.axhline(limit.to_value(u.deg), color=BLACK, ls="--", label="material")
     axes.set_ylim(0.0, 1.15 * limit.to_value(u.deg))
-    axes.set_ylabel("friction angle (deg)")
-    axes.legend(loc="center right")
-    _shade(axes, history)
+    axes.set(xlabel=TIME, ylabel="friction angle (deg)")
+    _shade(axes, history, labels=regimes)
+    axes.legend(loc="center left" if regimes else "center right")
     return axes
 
 
-def spin_plot(axes: Any, history: History) -> Any:
+def spin_plot(axes: Any, history: History, *, regimes: bool = True) -> Any:
     """Plot the spin rate against time."""
     rate = np.linalg.norm(history.spin.to_value(u.rad / u.s), axis=1)
     axes.plot(_hours(history), rate * 86400.0 / (2.0 * np.pi), color=GREEN)
-    axes.set_ylabel("spin rate (rev/day)")
+    axes.set(xlabel=TIME, ylabel="spin rate (rev/day)")
     axes.set_ylim(bottom=0.0)
-    _shade(axes, history)
+    _shade(axes, history, labels=regimes)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(loc="lower left")
     return axes
 
 
-def axes_plot(axes: Any, history: History) -> Any:
+def axes_plot(axes: Any, history: History, *, regimes: bool = True) -> Any:
     """Plot the semi-axes against time."""
     a = history.semi_axes.to_value(u.m)
     for i, (colour, style) in enumerate(zip((BLUE, ORANGE, BLACK), STYLES, strict=True)):
         axes.plot(_hours(history), a[:, i], color=colour, ls=style, label=f"$a_{i + 1}$")
     axes.set_ylim(0.0, 1.15 * a.max())
-    axes.set_ylabel("semi-axes (m)")
+    axes.set(xlabel=TIME, ylabel="semi-axes (m)")
+    _shade(axes, history, labels=regimes)
     axes.legend(ncols=3)
-    _shade(axes, history)
     return axes
 
 
@@ -100,10 +109,11 @@ def flyby_panels(panels: Sequence[Any], result: FlybyResult) -> Sequence[Any]:
     if history is None:
         raise InvalidInput("result", "without history", "the result of flyby(..., history=True)")
     distance_plot(panels[0], history, result.encounter)
-    friction_plot(panels[1], history, result.body.material.friction_angle)
-    spin_plot(panels[2], history)
-    axes_plot(panels[3], history)
-    panels[3].set_xlabel("time from closest approach (h)")
+    friction_plot(panels[1], history, result.body.material.friction_angle, regimes=False)
+    spin_plot(panels[2], history, regimes=False)
+    axes_plot(panels[3], history, regimes=False)
+    for panel in panels[:3]:
+        panel.set_xlabel("")
     return panels
 
 

@@ -109,7 +109,7 @@ def verdict_points(axes: Any, b: Quantity, verdict: Sequence[str], radius: Quant
     if radius is not None:
         from matplotlib.patches import Circle
 
-        axes.add_patch(Circle((0, 0), radius.to_value(u.km), fill=False))
+        axes.add_patch(Circle((0, 0), radius.to_value(u.km), fill=False, label="disc of impacts"))
     axes.set(xlabel="B.T (km)", ylabel="B.R (km)")
     axes.legend()
     return axes

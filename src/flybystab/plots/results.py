@@ -95,7 +95,6 @@ def _(result: History, axes: Any, what: str = "semi-axes", limit: u.Quantity | N
         _HISTORY[what](axes, result)
     else:
         raise InvalidInput("what", what, f"one of {', '.join(_HISTORY)}, friction angle")
-    axes.set_xlabel("time from closest approach (h)")
     return axes
 
 
@@ -212,5 +211,6 @@ def _counts(axes: Any, verdict: Any) -> Any:
     names, counts = np.unique(np.asarray(verdict, dtype=str), return_counts=True)
     bars = axes.barh(names, counts, color=BLUE)
     axes.bar_label(bars, padding=2)
+    axes.margins(x=0.1)  # room for the numbers
     axes.set_xlabel("number of rows")
     return axes

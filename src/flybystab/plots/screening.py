@@ -250,13 +250,21 @@ def encounters_plot(axes: Any, table: QTable, names: int = 6) -> Any:
             axes.vlines(day[chosen], low, high, color=PLANETS[k % 6], lw=1)
     if hits.any():
         axes.plot(day[hits], distance[hits], "x", color="black", ms=6, label=f"impacts ({hits.sum()})")
-    axes.xaxis_date()
+    _date_axis(axes)
     axes.set(yscale="log", xlabel="date (TDB)", ylabel="distance at closest approach (km)")
     if len(table):
         axes.legend()
     rows = np.argsort(distance, kind="stable")[:names]
     points = [(day[k], distance[k], str(table["asteroid"][k])) for k in rows]
     return label_points(axes, points, np.column_stack([day, distance]), fontsize="x-small")
+
+
+def _date_axis(axes: Any) -> None:
+    from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
+
+    locator = AutoDateLocator(maxticks=7)
+    axes.xaxis.set_major_locator(locator)
+    axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))
 
 
 def impacts_plot(axes: Any, table: QTable) -> Any:
@@ -266,10 +274,11 @@ def impacts_plot(axes: Any, table: QTable) -> Any:
     day = date2num(np.asarray(table["time"].tdb.isot, dtype="datetime64[ms]"))
     probability = np.asarray(table["probability"], dtype=float)
     axes.plot(day, probability, "D", color=BLUE, ms=4)
-    axes.xaxis_date()
+    _date_axis(axes)
     axes.set(yscale="log", xlabel="date (TDB)", ylabel="impact probability")
     planet = str(table.meta.get("planet", ""))
-    axes.set_title(f"{planet.capitalize()}: {len(table)} possible impacts".removeprefix(": "))
+    count = f"{len(table)} possible impact{'' if len(table) == 1 else 's'}"
+    axes.set_title(f"{planet.capitalize()}: {count}".removeprefix(": "))
     if len(table):
         axes.vlines(day, 0.5 * probability.min(), probability, color=BLUE, lw=1)
         axes.set_ylim(bottom=0.5 * probability.min())

@@ -162,15 +162,15 @@ def surface_history_figure(
     hours = history.time.to_value(u.h)
     curves = (grid[3, :], grid[4, :]) if narrow else (grid[3, :2], grid[3, 2])
     left, right = figure.add_subplot(curves[0]), figure.add_subplot(curves[1])
-    for percent in (1, 50, 99):
-        left.plot(hours, np.percentile(change, percent, axis=1), label=f"{percent} %")
-    left.axvline(0.0, color="0.5", lw=0.8, ls="--")
+    for percent, line in ((1, ":"), (50, "-"), (99, "--")):
+        left.plot(hours, np.percentile(change, percent, axis=1), ls=line, label=f"{percent} %")
+    left.axvline(0.0, color="0.8", lw=0.8, zorder=0)
     left.set_xlabel("time from closest approach (h)")
     left.set_ylabel("change of\nslope (deg)" if narrow else "change of slope (deg)")
     if narrow:
         left.legend(title="percentile of the facets", loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
     else:
-        left.legend(title="percentile of the facets", loc="lower right")
+        left.legend(title="percentile of the facets", loc="upper right")
     right.plot(hours, 100.0 * history.share_past(repose))
     right.set_xlabel("time (h)")
     right.set_ylabel(f"area above{chr(10) if narrow else ' '}{repose.to_value(u.deg):g} deg (%)")

@@ -45,6 +45,7 @@ def regions_plot(
     bodies: Mapping[str, Body] | None = None,
     named: Sequence[str] | None = None,
     cells: int = 200,
+    legend: bool = True,
 ) -> Any:
     """Plot the required friction angle at one spin ``w2 = omega^2/(pi G rho)`` over the plane of axis ratios.
 
@@ -84,7 +85,20 @@ def regions_plot(
     axes.set_ylabel("axis ratio $a_3/a_1$")
     axes.set_title(rf"friction angle required, $\omega^2/\pi G\rho = {w2:g}$")
     _mark(axes, axis_ratios(bodies or {}), named)
+    if legend:
+        axes.legend(handles=regions_legend(), loc="upper left")
     return axes
+
+
+def regions_legend() -> list[Any]:
+    """Entries of the legend for the areas of :func:`regions_plot`."""
+    from matplotlib.patches import Patch
+
+    unstable = "unstable at the required friction angle"
+    return [
+        Patch(facecolor="0.8", label="no friction angle suffices"),
+        Patch(facecolor="none", edgecolor="0.55", hatch="////", label=unstable),
+    ]
 
 
 def critical_energy_plot(
