@@ -23,17 +23,20 @@ import astropy.units as u
 import numpy as np
 import flybystab as fs
 from flybystab.constants import GM_EARTH
-from flybystab.plots import figures, flyby, grains, outcome_map, population, scene, screening, shape_map, stability
+from flybystab.plots import figures, flyby, grains, outcome_map, population
+from flybystab.plots import scene, screening, shape_map, stability
 
 body = fs.Body([1400, 850, 750] * u.m, 2000 * u.kg / u.m**3, spin_period=6 * u.h)
 passage = lambda radii: fs.Encounter.hyperbolic("earth", radii * fs.R_earth, 5 * u.km / u.s)
 near, far = passage(2.0), passage(3.0)
+radii, speeds = np.linspace(1.2, 3.2, 9) * fs.R_earth, np.linspace(0, 20, 6) * u.km / u.s
 result = fs.flyby(body, near)
 pile = fs.flyby(body, passage(1.5), grains=300, seeds=6, model="grains")
 shape = fs.Shape.perturbed([1400, 850, 750] * u.m, amplitude=0.05, seed=2)
 solid = fs.Body.from_shape(shape, density=2000 * u.kg / u.m**3, spin_period=6 * u.h)
 slopes = fs.surface_history(solid, far, shape=shape)
 apophis, anteros = (fs.Asteroid.from_catalogue(name) for name in ("Apophis", "Anteros"))
+yr4 = fs.catalogue("examples/2024YR4.ke1")[0].orbit
 april = fs.Encounter.from_orbit(apophis.orbit, "earth", "2029-04-13")
 clones = fs.encounter_distribution(apophis, "earth", "2029-04-13", n=300, seed=1)
 orbits = fs.known_population()
@@ -54,7 +57,7 @@ SECTIONS = {
         ("body_plot", "The body at the end", "scene.body_plot(solid_axes, result.history, -1)"),
     ],
     "Many flybys": [
-        ("outcome_map", "`OutcomeMap`: most severe verdict over periapsis and speed", "fs.outcome_map(body, np.linspace(1.2, 3.2, 9) * fs.R_earth, np.linspace(0, 20, 6) * u.km / u.s, phases=6).plot(axes)"),
+        ("outcome_map", "`OutcomeMap`: most severe verdict over periapsis and speed", "fs.outcome_map(body, radii, speeds, phases=6).plot(axes)"),
         ("target_map", "`TargetMap`: verdicts over the target plane", "fs.target_map(body, 8 * u.km / u.s, np.linspace(1.2, 3.2, 7) * fs.R_earth, 24).plot(axes)"),
         ("flyby_table", "`FlybyTable`: number of each verdict", "fs.flyby_many([body] * 30, [passage(q) for q in np.linspace(1.1, 3.5, 30)]).plot(axes)"),
         ("spin_sample", "`SpinSample`: change of the spin over attitudes", "fs.spin_sample(apophis, april, n=200).plot(axes)"),
@@ -76,11 +79,11 @@ SECTIONS = {
         ("verdict_points", "Verdicts on the target plane", 'outcome_map.verdict_points(axes, clones.b, fs.survival(apophis, clones).verdict)'),
     ],
     "Encounters and screenings": [
-        ("encounters", "Table of `find_encounters`", 'fs.find_encounters([apophis, anteros], "2026-01-01", "2060-01-01", ["earth", "venus"], within=0.2 * u.au).plot(axes)'),
+        ("encounters", "Table of `find_encounters`", 'fs.find_encounters([apophis, anteros], "2026", "2060", ["earth", "venus"], within=0.2 * u.au).plot(axes)'),
         ("screening", "Table of `screen`", 'fs.screen(None, "2026-01-01", "2040-01-01").plot(axes)'),
         ("margins", "Margin of each encounter of a screening", 'screening.margin_plot(axes, fs.screen(None, "2026-01-01", "2040-01-01"))'),
         ("bounds", "Table of `infer`", "fs.infer(anteros, []).plot(axes)"),
-        ("impacts", "Table of `virtual_impactors`", 'fs.virtual_impactors(fs.catalogue("examples/2024YR4.ke1")[0].orbit, "2030-01-01", "2050-01-01", planet="moon").plot(axes)'),
+        ("impacts", "Table of `virtual_impactors`", 'fs.virtual_impactors(yr4, "2030", "2050", planet="moon").plot(axes)'),
     ],
     "Surfaces": [
         ("slopes", "`SurfaceSlopes`", "fs.shape_slopes(shape, solid).plot(axes)"),
