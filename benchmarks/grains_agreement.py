@@ -240,7 +240,7 @@ def draw(found: Cases, known: Cases, target: Path) -> None:
     """Mean and range of the largest clump and of the stretch: this code against the other one."""
     from matplotlib.figure import Figure
 
-    picture = Figure(figsize=(8.0, 4.0), layout="constrained")
+    picture = Figure(figsize=(8.0, 4.3), layout="constrained")
     for axes, (name, _, whole), limits, label in zip(
         picture.subplots(1, 2),
         QUANTITIES,

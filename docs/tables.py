@@ -18,9 +18,12 @@ TABLES = {
     "flyby": "flybystab bench flyby --output docs/images/precision.png",
     "forecast": "python examples/apophis_forecast.py",
     "grains": "python benchmarks/piles.py grains",
+    "grains_agreement": "python benchmarks/grains_agreement.py compare docs/tables/grains_runs.csv "
+    "--figure docs/images/grains_agreement.png",
     "grains_cases": "python benchmarks/grains_ellipsoid.py cases --cases 1600 --jobs 2",
     "grains_flybys": "python benchmarks/grains_references.py flybys --cases 26",
     "grains_flybys_2": "python benchmarks/grains_references.py flybys --first 26 --seeds 2",
+    "grains_packing": "python benchmarks/grains_packing.py",
     "grains_map": "python benchmarks/grains_ellipsoid.py map --grains 150",
     "honesty": "python benchmarks/honesty.py scripted --encounters 300",
     "honesty_real": "python benchmarks/honesty.py real --every 4",

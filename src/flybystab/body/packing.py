@@ -3,7 +3,7 @@
 Spheres with little friction collapse in a central field whose level surfaces are similar to the ellipsoid. The required
 number of grains is cut out of the aggregate, friction is switched on, and the pile settles under its own gravity, at
 first with a drag. The preparation affects the outcome: a pile that has collapsed under its own gravity into a sphere
-before the ellipsoid is cut out is stretched less, by 3 % without spin and 6 % retrograde
+before the ellipsoid is cut out is stretched less, by 3 % without spin and 4 % retrograde
 (``python benchmarks/grains_packing.py``).
 """
 
