@@ -304,3 +304,31 @@ def test_line_ends_and_marks_do_not_matter(tmp_path, path):
     assert outcome(text.replace("\n", "\r\n").encode()) == expected
     assert outcome(b"\xef\xbb\xbf" + text.encode()) == expected
     assert outcome(text.rstrip("\n").encode()) == expected
+
+
+@pytest.mark.parametrize(
+    "epoch", [Time(2461000.5, format="jd"), Time("2025-11-21"), Time(61000, format="mjd")]
+)
+def test_an_epoch_of_a_state_in_utc_warns(epoch):
+    with pytest.warns(FlybystabWarning, match="epoch is in UTC"):
+        fs.Orbit.from_state(epoch, [1.0, 0.0, 0.1] * u.au, [0.0, 0.017, 0.0] * u.au / u.d)
+
+
+def test_a_time_of_perihelion_in_utc_warns():
+    """At any time of the day: the epoch beside it is in TDB."""
+    elements = {"q": 0.7 * u.au, "e": 1.1} | dict.fromkeys(("i", "node", "peri"), 3.0 * u.deg)
+    with pytest.warns(FlybystabWarning, match="Tp is in UTC"):
+        fs.Orbit.from_elements(
+            Time(2461000.5, format="jd", scale="tdb"), Tp=Time("2026-01-02T10:20"), **elements
+        )
+
+
+def test_elements_of_the_equator():
+    epoch = Time(2461000.5, format="jd", scale="tdb")
+    elements = {"a": 0.92 * u.au, "e": 0.19, "M": 312.0 * u.deg}
+    elements |= dict.fromkeys(("i", "node", "peri"), 30.0 * u.deg)
+    a, b = (fs.Orbit.from_elements(epoch, frame=frame, **elements) for frame in ("equator", "ICRF"))
+    np.testing.assert_array_equal(a.position.value, b.position.value)
+    # The inclination to the equator is the angle of the orbit's pole to the axis of the frame.
+    pole = np.cross(a.position.value, a.velocity.value)
+    assert np.degrees(np.arccos(pole[2] / np.linalg.norm(pole))) == pytest.approx(30.0, abs=1e-10)

@@ -42,15 +42,18 @@ def checked_centre(centre: object) -> str:
 
 
 def checked_frame(frame: object) -> str:
-    """``"icrf"`` or ``"ecliptic"``.
+    """``"icrf"`` or ``"ecliptic"``; the equator of J2000 is another name of the ICRF here.
 
     Raises
     ------
     UnknownName
     """
-    if str(frame).lower() not in ("icrf", "ecliptic"):
-        raise UnknownName("frame", str(frame), [], known="(known: ICRF, ecliptic)")
-    return str(frame).lower()
+    text = str(frame).lower()
+    if text in ("equator", "equatorial"):
+        return "icrf"
+    if text not in ("icrf", "ecliptic"):
+        raise UnknownName("frame", str(frame), [], known="(known: ICRF, equator, ecliptic)")
+    return text
 
 
 def checked_count(n: object) -> int:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Self
@@ -13,7 +12,7 @@ from astropy.time import Time
 from astropy.units import Quantity
 
 from flybystab.arguments import check_arguments, check_kinds
-from flybystab.errors import FlybystabWarning, InvalidInput
+from flybystab.errors import InvalidInput
 from flybystab.orbit.barycentre import barycentre_in, barycentre_of_de440
 from flybystab.orbit.covariance import Covariance
 from flybystab.orbit.elements import (
@@ -24,7 +23,7 @@ from flybystab.orbit.elements import (
     state_in_plane,
 )
 from flybystab.orbit.ephemeris import BODIES, Ephemeris, Window
-from flybystab.orbit.epochs import checked_epoch, seconds
+from flybystab.orbit.epochs import checked_epoch, seconds, warn_of_utc
 from flybystab.orbit.forces import NonGravitational
 from flybystab.orbit.orbit_arguments import (
     NO_ACCELERATION,
@@ -128,13 +127,8 @@ class OsculatingState:
         ------
         UnitMismatch, InvalidInput, UnknownName
         """
-        if isinstance(epoch, Time) and epoch.scale == "utc" and np.all(epoch.jd * 2.0 % 1.0 == 0.0):
-            warnings.warn(
-                "epoch is in UTC; elements are published in TDB or TT, which is 69 s ahead in 2026: "
-                "Time(..., scale='tdb')",
-                FlybystabWarning,
-                stacklevel=2,
-            )
+        warn_of_utc(epoch, "epoch", stacklevel=2)
+        warn_of_utc(Tp, "Tp", stacklevel=2, any_time=True)
         when, where, axes = checked_epoch(epoch), checked_centre(centre), checked_frame(frame)
         given = given_elements(when, a, q, e, {"i": i, "node": node, "peri": peri, "M": M}, Tp)
         nongrav = non_gravitational(A1, A2, A3, law, DT, AMRAT)
@@ -228,6 +222,7 @@ class OsculatingState:
             r, v = ecliptic_to_icrf() @ r, ecliptic_to_icrf() @ v
         nongrav = non_gravitational(A1, A2, A3, law, DT, AMRAT)
         state = np.concatenate([r, v])
+        warn_of_utc(epoch, "epoch", stacklevel=2)
         return cls._at(checked_epoch(epoch), state, where, barycentre, nongrav, name, covariance)
 
     @check_arguments

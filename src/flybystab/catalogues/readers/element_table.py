@@ -7,7 +7,6 @@ motion or the period, where given, is compared with the semi-major axis.
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
@@ -18,7 +17,8 @@ from flybystab.catalogues.readers import Contents, reader
 from flybystab.catalogues.readers.conversion import DEGREE, epoch_row, perihelion_row, since_perihelion
 from flybystab.catalogues.readers.parameters import check_parameters, looks_like_parameter
 from flybystab.constants import AU, DAY
-from flybystab.errors import FlybystabWarning, InvalidInput
+from flybystab.errors import InvalidInput
+from flybystab.orbit.epochs import warn_of_utc
 
 if TYPE_CHECKING:
     from astropy.table import Table
@@ -119,13 +119,7 @@ def _day(cells: Mapping[str, tuple[Any, Any]], name: str) -> float:
     value, _ = cells[name]
     if not isinstance(value, Time):
         return _value(cells, name, "d")
-    if value.scale == "utc" and float(value.jd) * 2.0 % 1.0 == 0.0:
-        warnings.warn(
-            f"{name} is in UTC; elements are published in TDB or TT, which is 69 s ahead in 2026: "
-            "Time(..., scale='tdb')",
-            FlybystabWarning,
-            stacklevel=2,
-        )
+    warn_of_utc(value, name, stacklevel=2)
     return float(value.tdb.jd)
 
 
