@@ -1,5 +1,6 @@
 """From the orbit file of an agency to the verdict and the page, by the commands."""
 
+import json
 import re
 from pathlib import Path
 from types import SimpleNamespace
@@ -110,6 +111,43 @@ def test_a_newly_found_object_has_a_verdict_by_the_population(capsys, name, date
     assert f"{date} " in shown
     assert "median of the population: diameter (from H and albedo)" in shown
     assert re.search(r"^verdict +[A-Z]", shown, re.MULTILINE)
+
+
+def jpl_answer() -> str:
+    """The orbit of 2020 AB as JPL would answer: elements with 1-sigmas, and H."""
+    (a,) = catalogue(FILES / "2020AB.json")
+    values = {mine: a.row[c] for mine, c in _NAMES_OF_JPL.items()}
+    sigmas = {"a": "1e-4", "e": "4e-5", "i": "4e-4", "om": "1e-4", "w": "4e-4", "ma": "7e-3"}
+    elements = [{"name": n, "value": v, "sigma": sigmas[n]} for n, v in values.items()]
+    return json.dumps(
+        {
+            "object": {"fullname": "(2020 AB)", "des": "2020 AB", "orbit_class": {"code": "APO"}},
+            "orbit": {
+                "epoch": a.row["epoch_jd_tdb"],
+                "orbit_id": "7",
+                "elements": elements,
+                "model_pars": [],
+            },
+            "phys_par": [{"name": "H", "value": "27.5"}],
+        }
+    )
+
+
+_NAMES_OF_JPL = {"a": "a_au", "e": "e", "i": "i_deg", "om": "node_deg", "w": "peri_deg", "ma": "M_deg"}
+
+
+def test_a_newly_found_object_of_jpl_has_a_page(tmp_path, capsys):
+    """The page lists what is assumed, and that errors without correlations are not drawn."""
+    file, page = tmp_path / "2020ab.json", tmp_path / "page.html"
+    file.write_text(jpl_answer())
+    words = ["report", str(file), "--date", "2019-12-29", "--assume", "--attitudes", "2", "--samples", "2"]
+    assert main([*words, "--output", str(page)]) == 0
+    assert "2020 AB" in capsys.readouterr().out
+    html = page.read_text()
+    assert "median of the population: diameter (from H and albedo)" in html
+    assert re.search(
+        r"not drawn</th>\s*<td[^>]*>orbit without errors \(1-sigmas without correlations\)", html
+    )
 
 
 def test_physical_parameters_of_a_file_complete_its_orbit(tmp_path, capsys):

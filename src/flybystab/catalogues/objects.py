@@ -1,11 +1,11 @@
-"""Asteroids from objects of astroquery and sbpy, without either being needed.
+"""Asteroids from objects of astroquery and sbpy; neither package is required.
 
 - ``astroquery.jplsbdb.SBDB.query(..., full_precision=True, covariance="mat", phys=True)``: a mapping;
 - ``astroquery.jplhorizons.Horizons(..., location="@10").elements()``: a table;
 - ``astroquery.mpc.MPC.query_object(...)``: a list of mappings;
 - tables with the columns of a JPL query; ``sbpy.data.Orbit``, with ``sbpy.data.Phys`` for the body.
 
-Mappings and lists are read like the JSON of the agencies, by the same rules.
+Mappings and lists are read by the readers of the JSON files of the agencies.
 """
 
 from __future__ import annotations

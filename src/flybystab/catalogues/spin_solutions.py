@@ -1,8 +1,8 @@
 """Rival spin solutions of an asteroid: periods and poles that fit its lightcurves, with weights.
 
 A row of a catalogue holds them in one column, ``spin_solutions``, as ``period sigma longitude latitude weight`` (h, h,
-deg, deg, ecliptic J2000; ``-`` if not known) separated by semicolons. The solution of the largest weight stands in the
-columns of period and pole too. A screening draws a solution for each sample.
+deg, deg, ecliptic J2000; ``-`` if not known) separated by semicolons. The columns of period and pole have the solution
+of the largest weight. A screening draws a solution for each sample.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ from flybystab.catalogues.spin_solutions import SpinSolution
 from flybystab.errors import InvalidInput
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
-#: A Julian date of the second line stands between 1880 and 2100.
+#: The Julian date of the second line is between 1880 and 2100.
 _FIRST = re.compile(
     rf"\s*({_NUMBER})[ \t]+({_NUMBER})[ \t]+({_NUMBER})[ \t]*\n\s*24[0-9]{{5}}\.?\d*[ \t]+{_NUMBER}[ \t]*(?:\n|\Z)"
 )

@@ -3,9 +3,9 @@
 Columns of the releases since 2020, counted from 1 with both ends included: number 1-7, name 11-40, designation 42-61,
 taxonomic class 74-83, diameter 89-96 (km), H 100-105, flag of the period 144, period 146-158 (h), flag of the amplitude
 176, largest amplitude 183-186 (mag), U 188-189, notes 191-195. They are those of section 4.1.3 of the ``readme.pdf`` of
-the release of October 2023 (https://minplanobs.org), as quoted by public programs that read the file. Title, date and a
-line with the names of the columns stand before the rows. The columns have changed between releases; the names in that
-line show whether a file has those given here.
+the release of October 2023 (https://minplanobs.org), as quoted by public programs that read the file. The rows follow
+a title, a date and a line with the names of the columns. The columns have changed between releases; the positions of
+these names show whether a file has the columns given here.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The Minor Planet Center's own orbit documents (MPC_ORB JSON of the get-orb API), with their covariances.
+"""Orbit documents of the Minor Planet Center (MPC_ORB JSON of the get-orb API), with their covariances.
 
 Fields: https://github.com/Smithsonian/mpc-public/tree/main/mpc_orb (schema 0.1 to 0.7). ``CAR`` is a heliocentric
 state with axes of the ecliptic, ``COM`` q, e, i, node, argperi, peri_time (MJD); epoch in MJD, TT; ``covKL`` is row
