@@ -64,6 +64,7 @@ TABLES = {
     "shapes_timing": "python benchmarks/shapes.py timing",
     "stability": "python benchmarks/stability.py",
     "stress": "python benchmarks/campaign.py stress",
+    "versions": "python benchmarks/versions.py out/before",
     "verdicts": "python benchmarks/campaign.py verdicts 20000",
     "throughput": "python benchmarks/screen.py throughput",
     "tracks": "python benchmarks/encounters.py tracks",

@@ -9,7 +9,7 @@ from flybystab.catalogues.catalogue import Asteroid, catalogue
 from flybystab.catalogues.lightcurves import periods_like
 from flybystab.errors import InvalidInput, UnknownName
 from flybystab.screening.distributions import Distribution, truncated_normal
-from flybystab.screening.draws import Attitudes, draws, nominal, stream
+from flybystab.screening.draws import Attitudes, Samples, draws, nominal, stream
 from flybystab.screening.priors import Population
 
 APOPHIS = Asteroid.from_catalogue("Apophis")
@@ -176,3 +176,18 @@ def test_assumed_values_can_be_replaced():
     assert np.all(draws(ANTEROS, 5, 0, p).rho == 1234.0)
     assert not np.any(draws(ANTEROS, 5, 0).rho == 1234.0)
     assert draws(Asteroid.from_catalogue("Bennu"), 50, 0, p).rho.mean() == pytest.approx(1194, rel=0.01)
+
+
+@pytest.mark.parametrize("asteroid", [APOPHIS, ANTEROS])
+def test_samples_drawn_in_parts_are_those_of_one_draw(asteroid):
+    draw = draws(asteroid, 50, 7)
+    every = Attitudes.at(asteroid, draw, 7, "earth", "x")
+    samples = Samples(asteroid, 50, 7, None, ("earth", "x"))
+    for first, last in ((0, 3), (3, 4), (17, 50)):
+        part = samples.part(first, last)
+        assert part.count == last - first
+        for name in draw._fields:
+            if name != "drawn":
+                np.testing.assert_array_equal(getattr(part.draws, name), getattr(draw, name)[first:last])
+        some = np.arange(last - first)
+        np.testing.assert_array_equal(part.matrices(some), every.matrices(first + some))

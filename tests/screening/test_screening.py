@@ -21,7 +21,7 @@ from flybystab.encounter.reach import usual_start
 from flybystab.errors import FlybystabWarning, InvalidInput, OutOfSpan, OutputFailed, UnknownName
 from flybystab.flybys.flyby import flyby
 from flybystab.orbit.planets import planet
-from flybystab.screening import table_files
+from flybystab.screening import table_files, tasks
 from flybystab.screening.columns import COLUMNS, VERDICTS, share_of
 from flybystab.screening.draws import Attitudes, draws
 from flybystab.screening.encounters import Passage, passages
@@ -153,7 +153,7 @@ def test_a_deep_passage_is_work_for_every_worker():
     class Counting(ThreadPoolExecutor):
         def submit(self, work, *given, **more):
             if isinstance(given[0], Part):
-                sizes.append(len(given[0].attitudes.uniform))
+                sizes.append(given[0].last - given[0].first)
             return super().submit(work, *given, **more)
 
     run = Screening([Asteroid.from_catalogue("Anteros")], settings(*SPAN, samples=200, seed=1), three)
@@ -265,7 +265,7 @@ def test_a_run_stopped_inside_an_asteroid_goes_on_with_its_parts(tmp_path, monke
     judged, original = [], Part.judged
 
     def counted(part, settings):
-        judged.append(len(part.attitudes.uniform))
+        judged.append(part.last - part.first)
         return original(part, settings)
 
     monkeypatch.setattr(Part, "judged", counted)
@@ -577,3 +577,24 @@ def test_an_orbit_of_endless_steps_is_given_up():
         [Asteroid(row | {"A2_au_d2": "", "A1_au_d2": "", "A3_au_d2": ""})], "2026-01-01", "2100-01-01"
     )
     assert "1,000,000 steps taken at" in table["error"][0]
+
+
+@pytest.mark.parametrize("block", [4, 64])
+def test_statistics_of_samples_that_are_only_counted(monkeypatch, block):
+    """Beyond the first `RANKED` samples the verdicts are counted: the same row whatever is kept, and in any parts."""
+    asteroid = Asteroid.from_catalogue("Anteros")
+
+    def rows(**more):
+        run = Screening([asteroid], settings(*SPAN, samples=200, seed=1, **more), three)
+        ((_, result),) = run.results(block=block)
+        ranks = [row.pop("contributors") for row in result["rows"]]
+        return json.dumps(result["rows"]), ranks, sum(row["samples_dynamic"] for row in result["rows"])
+
+    monkeypatch.setattr(tasks, "RANKED", 60)
+    counted = rows()
+    assert counted == rows(keep_samples=True)
+    monkeypatch.setattr(tasks, "RANKED", 1000)
+    every = rows()
+    assert counted[0] == every[0]
+    assert counted[1] != every[1]
+    assert counted[2] > 60

@@ -40,11 +40,12 @@ def _catalogue_values() -> dict[str, Array]:
     return {"spin_period_h": np.sort(periods), "elongation": np.sort(axes[:, 0] / axes[:, 1])}
 
 
-def stream(seed: int, *names: object) -> np.random.Generator:
-    """Random numbers that depend on the seed and the names only."""
+def stream(seed: int, *names: object, skip: int = 0) -> np.random.Generator:
+    """Random numbers that depend on the seed and the names only, without the first `skip` of them."""
     digest = hashlib.sha256("|".join(str(n) for n in names).encode()).digest()
     words = [int.from_bytes(digest[i : i + 4], "little") for i in range(0, 16, 4)]
-    return np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, *words])))
+    bits = np.random.PCG64(np.random.SeedSequence([seed, *words]))
+    return np.random.Generator(bits.advance(skip) if skip else bits)
 
 
 class Draws(NamedTuple):
@@ -170,9 +171,11 @@ def completed(asteroid: Asteroid, population: Population | None = None) -> Aster
     return replace(asteroid, row=row)
 
 
-def draws(asteroid: Asteroid, samples: int, seed: int, population: Population | None = None) -> Draws:
-    """Samples of an asteroid (arguments as in :func:`nominal`)."""
-    uniform = stream(seed, "body", identity(asteroid)).random((samples, _WIDTH))
+def draws(
+    asteroid: Asteroid, samples: int, seed: int, population: Population | None = None, *, first: int = 0
+) -> Draws:
+    """Samples of an asteroid from number `first` on (arguments as in :func:`nominal`)."""
+    uniform = stream(seed, "body", identity(asteroid), skip=first * _WIDTH).random((samples, _WIDTH))
     return _draws(asteroid, uniform, population or Population(), keep=False)
 
 
@@ -293,10 +296,15 @@ class Attitudes:
     uniform: Array = field(repr=False)
 
     @classmethod
-    def at(cls, asteroid: Asteroid, draws: Draws, seed: int, *encounter: object) -> Attitudes:
-        """Attitudes that depend on the seed, the asteroid and the encounter only."""
-        numbers = stream(seed, "attitude", identity(asteroid), *encounter).random((len(draws.rho), 3))
-        return cls(asteroid, draws, numbers)
+    def at(cls, asteroid: Asteroid, draws: Draws, seed: int, *encounter: object, first: int = 0) -> Attitudes:
+        """Attitudes of samples from number `first` on; they depend on seed, asteroid, encounter and number only."""
+        numbers = stream(seed, "attitude", identity(asteroid), *encounter, skip=3 * first)
+        return cls(asteroid, draws, numbers.random((len(draws.rho), 3)))
+
+    @property
+    def count(self) -> int:
+        """Number of samples."""
+        return len(self.uniform)
 
     def part(self, first: int, last: int) -> Attitudes:
         """Attitudes of samples `first` to ``last - 1``."""
@@ -325,3 +333,19 @@ class Attitudes:
     def matrix(self, i: int) -> Array:
         """Rotation of sample `i`, body axes -> ICRF."""
         return self.matrices(np.array([i]))[0]
+
+
+@dataclass(frozen=True)
+class Samples:
+    """Samples of an asteroid at one encounter, drawn part by part: memory does not grow with their number."""
+
+    asteroid: Asteroid
+    count: int
+    seed: int
+    population: Population | None
+    encounter: tuple[object, ...]
+
+    def part(self, first: int, last: int) -> Attitudes:
+        """Samples `first` to ``last - 1``: the same as those of a draw of all."""
+        draw = draws(self.asteroid, last - first, self.seed, self.population, first=first)
+        return Attitudes.at(self.asteroid, draw, self.seed, *self.encounter, first=first)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator
 from typing import Any
 
@@ -20,6 +19,7 @@ from flybystab.screening.draws import Attitudes, Draws, free_rotation, nominal
 from flybystab.screening.encounters import Passage
 from flybystab.screening.sample_verdicts import (
     SampleVerdicts,
+    Tally,
     contributors,
     friction_at_rest,
     inputs,
@@ -89,32 +89,46 @@ def catalogue_body(passage: Passage, settings: Settings) -> Attitudes:
     return Attitudes.at(asteroid, known, settings.seed, "nominal", *passage.key)
 
 
-def sampled_row(row: Row, orbits: OrbitSampling, draw: Draws, result: SampleVerdicts) -> Row:
-    """The row of the catalogue body completed by the statistics of the samples."""
-    counts = Counter(result.verdict)
-    judged = len(draw.rho) - counts[""]
+def sampled_row(row: Row, orbits: OrbitSampling, tally: Tally, draw: Draws, result: SampleVerdicts) -> Row:
+    """The row of the catalogue body completed by the statistics of the samples.
+
+    Parameters
+    ----------
+    row : dict
+    orbits : OrbitSampling
+    tally : Tally
+        Of all samples.
+    draw : Draws
+        The first samples, `RANKED` at most.
+    result : SampleVerdicts
+        Of these samples at least; of all of them where each has its own orbit.
+    """
+    counts = tally.verdicts
+    judged = tally.samples - counts[""]
     stands = judged - counts[Verdict.NOT_IN_EQUILIBRIUM]
     yielded = sum(counts[v] for v in YIELDED)
     low, high = wilson(yielded, stands)
     sigma = orbits.sigma
+    ranked = len(draw.rho)
     if orbits.clones is not None and np.isnan(sigma):
         sigma = orbits.clones.sigma(result.distance)
     row = row | {
         "samples": judged,
-        "samples_dynamic": int(result.dynamic.sum()),
-        "samples_grains": int(result.grains.sum()),
+        "samples_dynamic": tally.dynamic,
+        "samples_grains": tally.grains,
         **{share_of(v): counts[v] / judged if judged else np.nan for v in VERDICTS},
         "p_yield": yielded / stands if stands else np.nan,
         "p_yield_low": low,
         "p_yield_high": high,
         "distance_sigma": sigma / 1000.0,
-        "contributors": contributors(inputs(draw) | {"distance": result.distance}, result.margin),
+        "contributors": contributors(
+            inputs(draw) | {"distance": result.distance[:ranked]}, result.margin[:ranked]
+        ),
         "drawn": "; ".join((*draw.drawn, *(("orbit",) if orbits.clones else ()))),
         "assumed": "; ".join(filter(None, (row["assumed"], orbits.note))),
     }
-    failures = [e for e in result.error if e]
-    if failures and not row["error"]:
-        row["error"] = f"{len(failures)} samples: {failures[0]}"
+    if tally.error and not row["error"]:
+        row["error"] = f"{tally.failed} samples: {tally.error}"
     return row
 
 

@@ -18,7 +18,7 @@ import numpy as np
 from flybystab.catalogues.catalogue import Asteroid
 from flybystab.errors import FlybystabError
 from flybystab.screening.clones import Clones, OrbitSampling, orbit_sampling
-from flybystab.screening.draws import Attitudes, draws
+from flybystab.screening.draws import Attitudes, Samples
 from flybystab.screening.encounters import Finder, Passage
 from flybystab.screening.grain_samples import CATALOGUE_BODY, GrainSample, needing_grains
 from flybystab.screening.result_rows import (
@@ -29,7 +29,7 @@ from flybystab.screening.result_rows import (
     sample_rows,
     sampled_row,
 )
-from flybystab.screening.sample_verdicts import SampleVerdicts, sample_verdicts, verdicts_each
+from flybystab.screening.sample_verdicts import RANKED, SampleVerdicts, Tally, sample_verdicts, verdicts_each
 from flybystab.screening.settings import Settings
 from flybystab.screening.time_limits import time_limit
 
@@ -57,38 +57,41 @@ class Part:
     passage : Passage
     clones : Clones or None
         Set where each sample has its own orbit.
-    first : int
-        Number of the first of these samples.
-    attitudes : Attitudes
-        Of these samples, with their bodies.
+    first, last : int
+        Number of the first of these samples, and of the first that is not one of them.
+    samples : Samples or Attitudes
+        All samples of the passage; those of the part are drawn by the worker.
     """
 
     passage: Passage
     clones: Clones | None
     first: int
-    attitudes: Attitudes
+    last: int
+    samples: Samples | Attitudes
 
     def judged(self, settings: Settings) -> SampleVerdicts:
         """Verdicts on the samples."""
-        given = self.attitudes.draws, self.attitudes, settings.material
+        attitudes = self.samples.part(self.first, self.last)
+        given = attitudes.draws, attitudes, settings.material
         if self.clones is None:
             return sample_verdicts(self.passage, *given, tolerance=settings.tolerance)
-        n = len(self.attitudes.uniform)
+        n = attitudes.count
         try:
             followed = self.clones.passages(self.first, self.first + n)
         except (
             FlybystabError
         ):  # one sample fails: it is isolated, so that the result does not depend on the division
-            return SampleVerdicts.joined([self._one(self.clones, k, settings) for k in range(n)])
+            return SampleVerdicts.joined(
+                [self._one(self.clones, attitudes.part(k, k + 1), self.first + k, settings) for k in range(n)]
+            )
         return verdicts_each(followed, *given, tolerance=settings.tolerance)
 
-    def _one(self, clones: Clones, k: int, settings: Settings) -> SampleVerdicts:
-        """Verdict on the k-th sample alone."""
+    def _one(self, clones: Clones, one: Attitudes, number: int, settings: Settings) -> SampleVerdicts:
+        """Verdict on one sample alone."""
         try:
-            followed = clones.passages(self.first + k, self.first + k + 1)
+            followed = clones.passages(number, number + 1)
         except FlybystabError as error:
             return SampleVerdicts.failed(f"{type(error).__name__}: {error}", clones.within)
-        one = self.attitudes.part(k, k + 1)
         return verdicts_each(followed, one.draws, one, settings.material, tolerance=settings.tolerance)
 
 
@@ -102,12 +105,18 @@ class OpenPassage:
     row : dict
         Of the catalogue body.
     orbits : OrbitSampling
-    attitudes : Attitudes
+    attitudes : Samples or Attitudes
         Of all samples, with their bodies.
+    nominal : Attitudes or None
+        The catalogue body, where grains are to carry on bodies.
+    whole : bool
+        Whether the verdicts of all samples are kept, or their number only, apart from those of the first `RANKED`.
     size : int
         Samples of a part.
     judged : dict of int to SampleVerdicts
-        Finished parts, by their first sample.
+        Finished parts whose verdicts are kept, by their first sample.
+    tallies : dict of int to Tally
+        All finished parts, by their first sample.
     needed : dict of int to str or None
         Numbers and verdicts of the samples that grains have yet to carry on; None without grains.
     carried : dict of int to SampleVerdicts
@@ -119,17 +128,19 @@ class OpenPassage:
     passage: Passage
     row: Row
     orbits: OrbitSampling
-    attitudes: Attitudes
+    attitudes: Samples | Attitudes
     nominal: Attitudes | None = None
+    whole: bool = True
     size: int = 0
     judged: dict[int, SampleVerdicts] = field(default_factory=dict)
+    tallies: dict[int, Tally] = field(default_factory=dict)
     needed: dict[int, str] = field(default_factory=dict)
     carried: dict[int, SampleVerdicts] = field(default_factory=dict)
     unjudged: int = field(init=False)
     sent: bool = False
 
     def __post_init__(self) -> None:
-        self.unjudged = len(self.attitudes.uniform)
+        self.unjudged = self.attitudes.count
         if self.nominal is not None:
             self._need(CATALOGUE_BODY, [str(self.row["verdict"])])
 
@@ -144,7 +155,9 @@ class OpenPassage:
             self.carried[first] = judged
             self.needed.pop(first, None)
             return judged
-        self.judged[first] = judged
+        self.tallies[first] = Tally.of(judged)
+        if self.whole or first < RANKED:
+            self.judged[first] = judged
         self.unjudged -= len(judged.verdict)
         if self.nominal is not None:
             self._need(first, judged.verdict)
@@ -165,12 +178,12 @@ class OpenPassage:
 
     def part(self, first: int, last: int) -> Part:
         """Samples `first` to ``last - 1``."""
-        return Part(self.passage, self.orbits.clones, first, self.attitudes.part(first, last))
+        return Part(self.passage, self.orbits.clones, first, last, self.attitudes)
 
     def parts(self) -> Iterator[tuple[int, Part]]:
         """Parts without verdicts, with the numbers of their first samples."""
-        ends = [*sorted(self.judged), len(self.attitudes.uniform)]
-        for begin, end in zip([0, *(k + len(self.judged[k].verdict) for k in ends[:-1])], ends, strict=True):
+        ends = [*sorted(self.tallies), self.attitudes.count]
+        for begin, end in zip([0, *(k + self.tallies[k].samples for k in ends[:-1])], ends, strict=True):
             for k in range(begin, end, max(1, self.size)):
                 yield k, self.part(k, min(k + self.size, end))
 
@@ -183,7 +196,7 @@ class OpenPassage:
                     self.take(first, judged)
                 continue
             last = first + len(judged.verdict)
-            if all(last <= k or first >= k + len(j.verdict) for k, j in self.judged.items()):
+            if all(last <= k or first >= k + t.samples for k, t in self.tallies.items()):
                 self.take(first, judged)
 
     def rows(self, settings: Settings) -> Rows:
@@ -195,13 +208,19 @@ class OpenPassage:
         if not self.judged:
             return {"rows": [row], "samples": []}
         result = SampleVerdicts.joined([self.judged[first] for first in sorted(self.judged)])
+        tally = Tally.joined(self.tallies[first] for first in sorted(self.tallies))
         for k, one in self.carried.items():
             if k != CATALOGUE_BODY:
                 result.verdict[k], result.largest[k] = one.verdict[0], one.largest[0]
                 result.grains[k], result.error[k] = not one.error[0], one.error[0]
-        row = sampled_row(row, self.orbits, self.attitudes.draws, result)
-        kept = sample_rows(self.passage, self.attitudes, result) if settings.keep_samples else ()
-        return {"rows": [row], "samples": list(kept)}
+        if self.carried:
+            tally = Tally.of(result)
+        ranked = self.attitudes.part(0, min(RANKED, self.attitudes.count))
+        row = sampled_row(row, self.orbits, tally, ranked.draws, result)
+        if not settings.keep_samples:
+            return {"rows": [row], "samples": []}
+        everyone = self.attitudes.part(0, self.attitudes.count)
+        return {"rows": [row], "samples": list(sample_rows(self.passage, everyone, result))}
 
 
 def opened(passage: Passage, settings: Settings, block: int) -> Rows | OpenPassage:
@@ -224,9 +243,10 @@ def opened(passage: Passage, settings: Settings, block: int) -> Rows | OpenPassa
             passage, row, OrbitSampling(None, np.nan, ""), nominal.part(0, 0), nominal, size=1
         )
         return alone if alone.left else alone.rows(settings)
-    draw = draws(passage.asteroid, n, settings.seed, settings.population)
-    attitudes = Attitudes.at(passage.asteroid, draw, settings.seed, *passage.key)
-    work = OpenPassage(passage, row, orbit_sampling(passage, n, settings.seed), attitudes, nominal)
+    samples = Samples(passage.asteroid, n, settings.seed, settings.population, passage.key)
+    orbits = orbit_sampling(passage, n, settings.seed)
+    whole = settings.keep_samples or nominal is not None or orbits.clones is not None
+    work = OpenPassage(passage, row, orbits, samples, nominal, whole)
     probe = min(n, block, _PROBE)
     first = work.take(0, work.part(0, probe).judged(settings))
     if work.unjudged:

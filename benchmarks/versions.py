@@ -1,0 +1,125 @@
+"""Processor time of the flybys of two versions of the package, in turn, so that other programs affect both alike.
+
+python benchmarks/versions.py OLD [NEW]     folders of two checkouts; NEW is this one by default
+
+Each version runs in a process of its own with compiled kernels: the pile of `flybystab bench flyby` in 300 attitudes at
+6 and 3 radii (rigid), 2.2 radii (a third of them flow) and 300 random scenes of `campaign.py stress`. The ratio is the
+median over the rounds; outcomes that differ are counted.
+"""
+
+from __future__ import annotations
+
+import json
+import statistics
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+#: Rounds, and flybys of each case.
+ROUNDS, NUMBER = 15, 300
+
+
+def cases() -> dict[str, tuple[Any, Any]]:
+    """Records of bodies and encounters by case."""
+    import astropy.units as u
+    import campaign
+    import numpy as np
+    from scipy.spatial.transform import Rotation
+
+    import flybystab as fs
+    from flybystab.bench.flyby import case
+    from flybystab.flybys.batch import records
+
+    body, _ = case()
+    turns = Rotation.random(NUMBER, random_state=1).as_matrix()
+    found = {}
+    for q in (6.0, 3.0, 2.2):
+        e = fs.Encounter.hyperbolic("earth", periapsis=q * fs.R_earth, v_inf=5 * u.km / u.s)
+        found[f"{q:g} radii"] = records([body] * NUMBER, e.periapsis_axes.T @ turns, [e] * NUMBER)
+    rng = np.random.default_rng(11)
+    scenes = [campaign.draw(rng) for _ in range(NUMBER)]
+    frames = np.stack([e.periapsis_axes.T @ turn for _, e, turn in scenes])
+    found["random"] = records([b for b, _, _ in scenes], frames, [e for _, e, _ in scenes])
+    return found
+
+
+def serve() -> None:
+    """Run all cases for each line that comes in, and write their times per flyby (ms) and their outcomes."""
+    import time
+
+    import numpy as np
+
+    from flybystab.core.dynamics.verdict_row import verdict_rows
+    from flybystab.core.dynamics.workspace import Limits
+    from flybystab.flybys.batch import MAX_STEPS, output_buffers
+
+    every = np.arange(NUMBER)
+    prepared = cases()
+    while True:
+        answer = {}
+        for name, (rows, met) in prepared.items():
+            output = output_buffers(NUMBER, 0)
+            start = time.process_time()
+            verdict_rows(every, rows, met, Limits(1e-7, 12.0, MAX_STEPS), True, output)
+            took = 1e3 * (time.process_time() - start) / NUMBER
+            out = output.outcomes
+            answer[name] = took, out["verdict"].tolist(), out["friction"].tolist(), out["axes"].tolist()
+        print(json.dumps(answer), flush=True)
+        if not sys.stdin.readline():
+            return
+
+
+def answers(folder: Path) -> Iterator[dict[str, Any]]:
+    """Times and outcomes of a version, a round each."""
+    program = (
+        f"import sys; sys.path[:0] = [{str(folder / 'src')!r}, {str(folder / 'benchmarks')!r}, "
+        f"{str(Path(__file__).parent)!r}]; import versions; versions.serve()"
+    )
+    with subprocess.Popen(
+        [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+    ) as process:
+        assert process.stdin is not None
+        assert process.stdout is not None
+        for line in process.stdout:
+            if line.startswith("{"):
+                yield json.loads(line)
+                process.stdin.write("\n")
+                process.stdin.flush()
+
+
+def main() -> int:
+    if not 2 <= len(sys.argv) <= 3:
+        print(__doc__)
+        return 2
+    here = Path(__file__).resolve().parents[1]
+    folders = Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve() if len(sys.argv) == 3 else here
+    both = [answers(folder) for folder in folders]
+    first = [next(a) for a in both]  # compiles
+    rounds = [[next(a) for a in both] for _ in range(ROUNDS)]
+    print(
+        f"processor time of {NUMBER} flybys at 1e-7, least of {ROUNDS} rounds in turn, ms each; largest changes"
+    )
+    print(
+        f"{'case':>10} {'old':>8} {'new':>8} {'ratio':>6}   {'other verdicts':>14}  friction (deg)  axes (99 %)"
+    )
+    import numpy as np
+
+    for name in first[0]:
+        old, new = ([r[k][name][0] for r in rounds] for k in (0, 1))
+        ratio = statistics.median(b / a for a, b in zip(old, new, strict=True))
+        verdicts, friction, axes = (np.array([f[name][i] for f in first]) for i in (1, 2, 3))
+        finite = np.isfinite(friction).all(axis=0)
+        change = np.rad2deg(np.abs(np.diff(friction[:, finite], axis=0))).max(initial=0.0)
+        with np.errstate(invalid="ignore"):
+            stretched = np.abs(axes[1] / axes[0] - 1.0).max(axis=1)
+        print(
+            f"{name:>10} {min(old):8.4f} {min(new):8.4f} {ratio:6.2f}   {int((verdicts[0] != verdicts[1]).sum()):14d}"
+            f"  {change:14.1e}  {np.nanquantile(stretched, 0.99):11.1e}"
+        )
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
