@@ -202,7 +202,7 @@ _RESTORE = {
 
 
 def _short(array: Any) -> bool:
-    """Whether an array is stored as a list: short, and of a type that its list tells."""
+    """Whether an array is stored as a list: short, and of a type that the list determines."""
     usual = array.dtype.kind == "U" or array.dtype in (np.dtype(float), np.dtype(int), np.dtype(bool))
     return 0 < array.size <= LISTED and usual
 

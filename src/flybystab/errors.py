@@ -25,9 +25,9 @@ class InvalidInput(FlybystabError, ValueError):
     name : str
         The argument.
     value : object
-        What was given.
+        The value given.
     expected : str
-        What is expected.
+        Description of the values expected.
     """
 
     def __init__(self, name: str, value: Any, expected: str) -> None:
@@ -52,7 +52,7 @@ class UnknownName(FlybystabError, KeyError):
     Attributes
     ----------
     kind, name : str
-        What was looked for.
+        Kind of the name, such as "planet".
     suggestions : list of str
         Near matches, best first.
     """
@@ -68,7 +68,7 @@ class UnknownName(FlybystabError, KeyError):
 
 
 class NotModelled(FlybystabError, NotImplementedError):
-    """What was asked for is outside the model; the message says what is inside it."""
+    """The request is outside the model; the message gives the limits of the model."""
 
 
 class OutOfSpan(FlybystabError, ValueError):
@@ -102,7 +102,7 @@ class NotConverged(FlybystabError, ArithmeticError):
 
 
 class MissingExtra(FlybystabError, ImportError):
-    """An optional package is needed for what was asked."""
+    """The request needs an optional package that is not installed."""
 
     def __init__(self, package: str, extra: str, purpose: str) -> None:
         self.package, self.extra = package, extra
@@ -114,8 +114,8 @@ class NothingComputed(FlybystabError, RuntimeError):
 
 
 class WorkersLost(FlybystabError, RuntimeError):
-    """Processes that computed something are gone; what was finished is kept."""
+    """Worker processes have died; finished results are kept."""
 
 
 class OutputFailed(FlybystabError, OSError):
-    """A result file could not be written in the middle of a run; the message says what is safe, and where."""
+    """A result file could not be written in the middle of a run; the message says which results are kept, and where."""

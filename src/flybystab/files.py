@@ -77,11 +77,11 @@ def read_bytes(path: str | Path, what: str, limit: int = TEXT_LIMIT, kind: str =
     path : str or Path
         An ordinary file: a FIFO or device, which may never end, is refused.
     what : str
-        What the file is, for the message: "catalogue file".
+        Kind of the file, for the message: "catalogue file".
     limit : int
         Largest size after decompression, bytes.
     kind : str
-        What is expected, for the message: "CSV file".
+        Expected kind, for the message: "CSV file".
 
     Raises
     ------
@@ -169,7 +169,7 @@ def csv_rows(text: str, what: str, path: str | Path, **dialect: Any) -> Iterator
 
 
 def _check_document(text: str, what: str, path: str | Path, strings: re.Pattern[str]) -> str:
-    """Refuse what is too large, too deep or has too many digits; the text with its strings blanked."""
+    """The text with its strings blanked; text that is too large, too deep or has too many digits is an error."""
     if len(text) > DOCUMENT_LIMIT:
         raise InvalidInput(what, path, f"a document of at most {_size(DOCUMENT_LIMIT)}")
     bare = strings.sub("~", text)

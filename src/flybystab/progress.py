@@ -20,7 +20,7 @@ from tqdm.std import tqdm
 
 #: Types accepted by the argument ``progress``.
 Progressing = bool | Callable[[int, int], None] | None
-#: Seconds before a bar appears that was not asked for.
+#: Seconds before a bar appears that was not requested.
 DELAY = 2.0
 #: Seconds between two lines where there is no terminal.
 QUIET = 30.0

@@ -63,7 +63,7 @@ class ResultTable(QTable):
     """
 
     def kind(self) -> str:
-        """What the rows are, by their columns: a key of :data:`SHOWN`, or an empty text."""
+        """Kind of the rows, from their columns: a key of :data:`SHOWN`, or an empty text."""
         names = set(self.colnames)
         return next((kind for kind, columns in KNOWN_BY.items() if columns <= names), "")
 

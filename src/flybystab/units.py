@@ -30,7 +30,7 @@ def to_si(
     Parameters
     ----------
     value : Quantity
-        What the user gave; a bare number is refused unless `unit` is dimensionless.
+        Value given by the user; a bare number is an error unless `unit` is dimensionless.
     unit : Unit
         The SI unit to convert to.
     name : str

@@ -19,7 +19,7 @@ from numba.core import event
 
 from flybystab.errors import InvalidInput
 
-#: Cases: what is run in Python.
+#: Cases: statements that are run in Python.
 CASES = {
     "import": "import flybystab; flybystab.flyby",
     "flyby Apophis (rigid)": "from flybystab.cli.main import main; main(['flyby', 'Apophis'])",

@@ -49,7 +49,7 @@ class Material:
         One of :data:`YIELD_SURFACES`, Mohr-Coulomb by default. ``"drucker-prager"`` is the cone through triaxial
         compression.
     brittle : bool
-        Whether cohesion is lost for good at first yield.
+        Whether cohesion is lost permanently at first yield.
     bulk_modulus : Quantity or None
         Plastic bulk modulus ``kappa`` of the energy criterion, Pa; None leaves it out.
     tensile_strength : Quantity or float, optional
@@ -287,7 +287,7 @@ class Body:
     def __repr__(self) -> str:
         spin = "no spin"
         if self.spin_period is not None:
-            spin = f"turns in {brief(self.spin_period)}"
+            spin = f"spin period {brief(self.spin_period)}"
         elif self.spin is not None and np.any(self.omega != 0.0):
             spin = f"spin {brief(self.spin)}"
         return f"<Body {brief(self.semi_axes)}, {brief(self.density)}, {spin}, {repr(self.material)[10:-1]}>"

@@ -65,7 +65,9 @@ def edges_of(facets: Integers) -> tuple[Integers, Integers]:
     if np.any(counts == 1):
         raise _bad_facets(owner[starts[counts == 1]], "a closed surface: these facets have an open edge")
     if np.any(counts > 2):
-        raise _bad_facets(owner[starts[counts > 2]], "an edge shared by two facets: at these more meet")
+        raise _bad_facets(
+            owner[starts[counts > 2]], "an edge shared by exactly two facets: these share an edge with more"
+        )
     first, second = starts, starts + 1
     same = directed[first, 0] == directed[second, 0]
     if np.any(same):

@@ -171,7 +171,9 @@ def check_grains(body: Body, grains: int) -> None:
     friction = contact_friction(body.material.phi)
     contact_cohesion(body.material.c_pa, friction, _central_pressure(body))
     if body.material.brittle and body.material.c_pa > 0.0:
-        raise InvalidInput("brittle", True, "False: contacts of grains that meet again cohere again")
+        raise InvalidInput(
+            "brittle", True, "False: broken contacts become cohesive again when the grains touch"
+        )
 
 
 def _memory() -> float:

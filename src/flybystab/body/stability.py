@@ -130,7 +130,7 @@ class Stability(Record):
     direction : ndarray, shape (3, 3)
         The one of the second order.
     at_apex : Orders of bool
-        Whether that direction dilates faster than the friction asks for (apex of the yield surface).
+        Whether that direction dilates faster than the flow rule of the cone (apex of the yield surface).
     barrier_kind : str
         "maximum": beyond the barrier the deformation gains energy; "edge": there the axis ratio passes 6:1, while
         friction still prevails; "none": no path has either; "inadmissible": the body is not in equilibrium.

@@ -1,6 +1,6 @@
 """Slope and effective acceleration on every facet of a shape, as functions of time.
 
-On each facet loose material feels the effective acceleration ``g = grad U + (K_t - Omega^2 - Omegadot) x``
+On each facet the effective acceleration of loose material is ``g = grad U + (K_t - Omega^2 - Omegadot) x``
 (:mod:`flybystab.body.shape_slope`). Its component along the outward normal decides on lift-off, its angle to the inward
 normal is the slope.
 """

@@ -83,7 +83,7 @@ def body_arguments(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
         "--assume",
         action="store_true",
-        help="take what is missing from the population of screen: its median, and samples in a report",
+        help="take missing properties from the population of screen: its medians; in a report, samples",
     )
 
 

@@ -1,4 +1,4 @@
-"""``flybystab rates [FILE]``: encounter rates of a population, and what the encounters do."""
+"""``flybystab rates [FILE]``: encounter rates of a population, and rates of the verdicts."""
 
 from __future__ import annotations
 

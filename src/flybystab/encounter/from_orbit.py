@@ -209,8 +209,8 @@ def _check_way(orbit: Orbit, body: Planet, window: Window, passage: _Passage, ep
     if hits.size:
         first = hits[np.argmin(np.abs(hits - epoch))]
         raise NoEncounter(
-            f"{orbit.name or 'the orbit'} meets {body.name} at {later(window.epoch, float(first)).iso} TDB on its way "
-            f"from {orbit.epoch.tdb.iso[:10]}: what is asked for lies beyond that impact"
+            f"{orbit.name or 'the orbit'} hits {body.name} at {later(window.epoch, float(first)).iso} TDB, between "
+            f"its epoch {orbit.epoch.tdb.iso[:10]} and the time given"
         )
 
 
@@ -237,7 +237,7 @@ def _horizon(
     what = beside.label if found.displacement[0] == gap else "the error of the force model"
     return (
         f"; the orbit cannot be predicted that far: {what} at {beside.orbit.epoch.iso[:10]} is "
-        f"{gap / AU:.2g} au there, so that an encounter at this time is one of many possible"
+        f"{gap / AU:.2g} au at this time"
     )
 
 

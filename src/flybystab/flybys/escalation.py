@@ -1,4 +1,4 @@
-"""Escalation of a flyby from the ellipsoid to grains, where the ellipsoid cannot answer or the user asks for it."""
+"""Escalation of a flyby from the ellipsoid to grains, where the ellipsoid is not an adequate model or the user requests it."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from flybystab.flybys.verdict import Verdict, letter_of
 from flybystab.progress import Progressing
 from flybystab.typing import Array
 
-#: Verdicts of the ellipsoid that are handed on to grains: it cannot say what becomes of the body.
+#: Verdicts of the ellipsoid after which the encounter is computed with grains: the outcome is not determined.
 HANDED_ON = (Verdict.BEYOND_MODEL, Verdict.MASS_LOSS, Verdict.DISRUPTED)
 #: Number of grains where it is not given.
 GRAINS = 500

@@ -48,7 +48,7 @@ class LargestClump(NamedTuple):
     mass : float
         Over that of the body.
     bound_mass : float
-        Of the clump and of what is bound to it.
+        Of the clump together with the material bound to it.
     semi_axes, spin : ndarray (3,)
         Of the ellipsoid with its inertia, longest first; angular velocity. nan where no grain is left.
     masses : ndarray

@@ -114,7 +114,7 @@ def grains_flyby(
 
 
 def _modelled(body: Body, encounter: Encounter, grains: int, runs: tuple[GrainsRun, ...]) -> tuple[str, ...]:
-    """What the runs have modelled: forces, piles, material and time after the encounter."""
+    """Effects modelled in the runs: forces, piles, material and time after the encounter."""
     friction = np.rad2deg(body.material.phi)
     strength = body.material.c_pa
     cohesion = f"cohesion {strength:g} Pa (calibrated by pulling and shearing)" if strength else "no cohesion"

@@ -40,7 +40,7 @@ class GrainsCourse(Tabular):
     time : Quantity (m,)
         Since closest approach.
     largest_fraction, bound_fraction : ndarray (m,)
-        Mass of the largest clump, and of it with what is bound to it, over that of the body.
+        Mass of the largest clump, without and with the material bound to it, over that of the body.
     semi_axes : Quantity (m, 3)
         Of the largest clump, longest first.
     spin : Quantity (m,)
@@ -73,7 +73,7 @@ class GrainsRun(Record):
     seed : int
     verdict : Verdict
     largest_fraction, bound_fraction : float
-        Mass of the largest clump, and of it with what is bound to it, over that of the body.
+        Mass of the largest clump, without and with the material bound to it, over that of the body.
     ground_fraction : float
         Mass that reached the ground or the atmosphere.
     semi_axes, initial_semi_axes : Quantity (3,)
@@ -189,7 +189,7 @@ class GrainsOutcome(Collection):
 
     @property
     def bound_fraction(self) -> float:
-        """Of the median run: the largest clump with what is bound to it, over the mass of the body."""
+        """Of the median run: mass of the largest clump and the material bound to it, over that of the body."""
         return self.median.bound_fraction
 
     @property

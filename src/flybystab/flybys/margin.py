@@ -61,7 +61,7 @@ class FlybyMargin(Record):
         Barrier of the energy criterion (:func:`flybystab.body.stability.stability`), J, at the spin before the
         encounter and at that of a rigid body after it. Zero for a body that is not in equilibrium.
     momentum, momentum_change : Quantity (3,)
-        Angular momentum before, and what the encounter adds to it, kg m2/s, frame of the encounter.
+        Angular momentum before the encounter and its change, kg m2/s, frame of the encounter.
     stands_after : bool
         Whether the body in its initial shape is in equilibrium at its spin after the encounter.
     required_friction_angle : Quantity

@@ -48,7 +48,7 @@ def start() -> bool:
 def wait() -> None:
     """Return when the process that :func:`start` has begun has ended; at once without one.
 
-    What it has not compiled, for whatever reason, is compiled here.
+    Kernels that it has not compiled are compiled here.
     """
     global _running
     if _running is not None:

@@ -157,7 +157,7 @@ class FlybyResult(Record):
 
     @cached_property
     def body(self) -> Body:
-        """The body after the encounter, along its own axes; ``state`` tells whether it is one whole body at rest."""
+        """The body after the encounter, along its own axes; ``state`` is its state (see :class:`flybystab.Body`)."""
         return body_after(self.inputs.body, self._run, self.attitude, self._onset is not None)
 
     @cached_property
@@ -173,7 +173,7 @@ class FlybyResult(Record):
 
     @cached_property
     def settled(self) -> bool:
-        """Whether the body is at rest, disperses for good or has left the model when the run ends.
+        """Whether the body is at rest, disperses permanently or is outside the model at the end of the run.
 
         Otherwise it still flows or is out of contact, with too little energy to disperse: a body without friction
         oscillates without end. Its verdict and bound mass fraction are then those of one instant of that motion.

@@ -84,7 +84,7 @@ def surface_verdicts(inputs: FlybyInputs, run: FlybyRun, everything: bool = Fals
 
 
 def phases_of(value: Any) -> int:
-    """Number of spin phases that ``robustness=`` asks for: zero for False, 8 for True."""
+    """Number of spin phases for a value of ``robustness=``: 0 for False, 8 for True."""
     if isinstance(value, bool | np.bool_):
         return PHASES if value else 0
     return whole(value, "robustness", 1)

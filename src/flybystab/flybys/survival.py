@@ -101,7 +101,7 @@ def survival(
 ) -> Survival:
     """Probabilities of the verdicts on a body whose orbit is uncertain.
 
-    Each clone meets the planet on its own two-body path through closest approach (which has the tide of the
+    Each clone passes the planet on its own two-body path through closest approach (which has the tide of the
     real one to about 1e-4 of its peak near the planet), with its own attitude of the body. Where a bound on the
     stress (:mod:`flybystab.core.ellipsoid.yield_bound`) proves that the body cannot yield, nothing is integrated.
 

@@ -96,7 +96,7 @@ def bound_fraction(shape: Array, velocity_gradient: Array, density: float) -> fl
     Material that is unbound in the potential of the whole is removed, the potential is computed for the remainder, and
     so on until nothing more is unbound. The remainder of each pass is replaced by the homogeneous ellipsoid with its
     mass and its second moments. Compared with sums over 32,768 points the fraction has an error of 0.005 (rms of 40
-    random states), except for states whose remainder is barely bound: 0.078 where this gives 0.
+    random states), except for states whose remainder is only just bound: 0.078 where this gives 0.
 
     Parameters
     ----------
@@ -141,6 +141,6 @@ def letter_of(verdict: Verdict, bound: float) -> str | None:
 
 
 def settled(verdict: Verdict, regime: str, energy: float) -> bool:
-    """Whether a run ended with a body at rest, dispersing for good (`energy` not negative), or outside the model."""
+    """Whether a run ended with a body at rest, dispersing permanently (`energy` not negative), or outside the model."""
     left = (Verdict.BEYOND_MODEL, Verdict.IMPACT, Verdict.NOT_IN_EQUILIBRIUM)
     return regime == "rigid" or verdict in left or energy >= 0.0

@@ -85,7 +85,7 @@ class Planet:
 
     @property
     def impact_distance(self) -> float:
-        """Distance from the centre below which a passage is an impact, m: atmosphere or surface."""
+        """Distance from the centre below which an encounter is an impact, m: atmosphere or surface."""
         return self.radius + self.atmosphere
 
     def impact_level(self, distance: float) -> str | None:

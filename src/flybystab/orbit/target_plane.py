@@ -15,7 +15,7 @@ import numpy as np
 from flybystab.errors import InvalidInput
 from flybystab.typing import Array
 
-#: North of every target plane unless another is asked for: +z of the frame, the Earth's equator in ICRF.
+#: North of every target plane unless another is given: +z of the frame, the Earth's equator in ICRF.
 NORTH = (0.0, 0.0, 1.0)
 
 

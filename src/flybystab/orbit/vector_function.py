@@ -24,7 +24,7 @@ from flybystab.typing import Array
 
 #: NAIF numbers of the centres that a path can be given from.
 CENTRES = {"sun": 10, "ssb": 0}
-#: The ephemeris is read this far beyond the times asked for, s: light time and its iteration stay inside.
+#: The ephemeris is read this far beyond the requested times, s: light time and its iteration stay inside.
 _MARGIN = 10.0 * DAY
 
 
@@ -51,7 +51,7 @@ def whole_and_fraction(t: Any) -> tuple[Array, Array]:
 
 
 def shaped(states: Array, t: Any) -> tuple[Array, Array, None, None]:
-    """States (m, m/s), shape (n, 6), as skyfield wants them: au and au/d, shape (3,) or (3, n)."""
+    """States (m, m/s), shape (n, 6), in the form of skyfield: au and au/d, shape (3,) or (3, n)."""
     r, v = states[:, :3].T / AU, states[:, 3:].T * (DAY / AU)
     if np.ndim(t.tt) == 0:
         r, v = r[:, 0], v[:, 0]
@@ -59,7 +59,7 @@ def shaped(states: Array, t: Any) -> tuple[Array, Array, None, None]:
 
 
 class OrbitVector(VectorFunction):
-    """The path of an orbit, integrated to whatever times are asked for.
+    """The path of an orbit, integrated to the requested times.
 
     Parameters
     ----------

@@ -33,7 +33,7 @@ from flybystab.screening.journal import Journal
 from flybystab.screening.priors import Population
 from flybystab.units import to_si, whole
 
-#: Planets that near-Earth asteroids meet.
+#: Planets that near-Earth asteroids encounter.
 PLANETS = ("mercury", "venus", "earth", "mars")
 #: Strata in periapsis between the surface and the limit.
 STRATA = 8

@@ -37,7 +37,7 @@ LISTED_FRAGMENTS = 12
 
 
 class Plan(NamedTuple):
-    """What a run of :func:`flybystab.disruption_rates` computes.
+    """Settings of a run of :func:`flybystab.disruption_rates`.
 
     ``edges`` are the limits of the strata in planetary radii; ``diameter`` (m) is nan for sizes from ``H``.
     """

@@ -1,4 +1,4 @@
-"""Rates of verdicts in a population: the result of :func:`flybystab.disruption_rates` and what follows from it."""
+"""Rates of verdicts in a population: the result of :func:`flybystab.disruption_rates`, and quantities derived from them."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ class DisruptionRates(Collection):
 
     @check_arguments
     def lifetime(self, *verdicts: str) -> Quantity:
-        """Mean time, Myr, until a body of the population meets one of the verdicts."""
+        """Mean time, Myr, until a body of the population has an encounter with one of the verdicts."""
         total = sum((self.rate(v) for v in verdicts), 0.0 / u.yr)
         return (self.bodies / total).to(u.Myr) if total.value > 0.0 else np.inf * u.Myr
 
@@ -72,7 +72,7 @@ class DisruptionRates(Collection):
         """Fraction of the population that met one of the verdicts within a time, ``1 - exp(-time/lifetime)``.
 
         By default the verdicts of bodies that were reshaped or lost mass. Rates are taken as constant in time and the
-        same for all bodies, which is an upper limit: some bodies meet several such encounters, others none.
+        same for all bodies, which is an upper limit: some bodies have several such encounters, others none.
         """
         span = to_si(time, u.s, "time", low=0.0)
         lifetime = self.lifetime(*(verdicts or CHANGED)).to_value(u.s)

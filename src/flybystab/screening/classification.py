@@ -81,14 +81,14 @@ def classification(
     ----------
     asteroids : path, or sequence of asteroids, names and paths, optional
         As in :func:`flybystab.screening.screening.screen`; the embedded catalogue by default. Bodies of tables of
-        orbits get their spins and shapes from the embedded tables; what is missing is the median of its distribution.
+        orbits get their spins and shapes from the embedded tables; missing values are medians of their distributions.
     material : Material, optional
         For the critical strain and the cohesion needed; 35 deg without cohesion by default. Its yield surface
         applies to all columns.
     dilatancy : float
         ``beta/min k`` of the test; 1 is associative flow.
     population : Population, optional
-        Distributions of what is missing.
+        Distributions of missing values.
     workers : int, optional
         Threads; one per processor by default.
     threads : int, optional

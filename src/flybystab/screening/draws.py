@@ -1,4 +1,4 @@
-"""Random bodies: catalogue values within their errors, and priors for what is not measured.
+"""Random bodies: catalogue values within their errors, and priors for unmeasured quantities.
 
 A sample depends on the seed, the asteroid and the sample number only: sample 17 of Apophis is the same for any list
 of asteroids, any order, any number of workers and any number of samples. All encounters of an asteroid use the same

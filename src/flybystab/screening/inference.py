@@ -34,7 +34,7 @@ from flybystab.screening.draws import stream
 from flybystab.units import to_si, whole
 
 _TOLERANCE = 1e-7
-#: Increase of the mobilised friction angle below which a passage is not integrated, rad.
+#: Increase of the mobilised friction angle below which an encounter is not integrated, rad.
 NEGLIGIBLE = float(np.radians(0.05))
 #: Friction angle above that of any material, rad: upper end of the search of the bound.
 _STEEP = 1.5
@@ -58,7 +58,7 @@ def infer(
     asteroid : Asteroid or Body
     encounters : sequence of Encounter
         Passages that it is known to have survived. Where the analytic bound on the increase is below 0.05 deg the
-        passage is not integrated: the bound is used for every attitude, and zero for any attitude.
+        encounter is not integrated: the bound is used for every attitude, and zero for any attitude.
     densities, cohesions : Quantity (n,), (m,)
         The grid; by default 1000 to 3500 kg/m3, and cohesions from zero to three times the mean internal stress.
     attitudes : int

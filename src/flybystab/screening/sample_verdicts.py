@@ -99,7 +99,7 @@ class SampleVerdicts:
 
     @classmethod
     def failed(cls, error: str, distance: float) -> SampleVerdicts:
-        """One sample that could not be judged."""
+        """One sample that could not be computed."""
         nothing = np.full(1, np.nan)
         return cls([""], nothing, nothing.copy(), np.zeros(1, dtype=bool), [error], np.full(1, distance))
 

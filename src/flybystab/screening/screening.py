@@ -70,7 +70,7 @@ class Screening:
         """Provenance of the table."""
         files = sorted({a.file for a in self.asteroids})
         return {
-            "title": "encounters of asteroids and what they do to rubble piles",
+            "title": "encounters of asteroids and their effect on rubble piles",
             "time_scale": "TDB",
             "frame": "ICRF",
             "complete": complete,

@@ -236,7 +236,7 @@ class TableFile:
             self._remove()
 
     def discard(self) -> None:
-        """Remove what was written."""
+        """Remove the partial file."""
         with suppress(OSError, ValueError):  # a buffer may find no space; the stream may be closed
             self._file.close(finish=False)
         self._remove()

@@ -262,7 +262,7 @@ def opened(passage: Passage, settings: Settings, block: int) -> Rows | OpenPassa
 def begin(asteroid: Asteroid, settings: Settings, finder: Finder, block: int) -> list[Rows | OpenPassage]:
     """An asteroid's passages, each as its rows or with its open samples.
 
-    An asteroid that fails, for whatever reason, or that exceeds the time limit of the settings, gets one row with the
+    An asteroid that fails or that exceeds the time limit of the settings, gets one row with the
     reason: it does not end the run, and a continued run does not compute it again.
     """
     try:

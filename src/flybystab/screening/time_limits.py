@@ -23,7 +23,7 @@ def time_limit(seconds: float, name: str) -> Iterator[None]:
     ----------
     seconds : float
     name : str
-        What is computed, for the message.
+        Description of the calculation, for the message.
     """
     main = threading.current_thread() is threading.main_thread()
     if not main or not hasattr(signal, "setitimer") or signal.getitimer(signal.ITIMER_REAL)[0] > 0.0:
