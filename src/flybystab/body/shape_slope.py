@@ -1,8 +1,8 @@
 """Slopes over the facets of a polyhedral shape, at rest and through an encounter.
 
-On each facet the effective acceleration of loose material is ``g = grad U + (K_t - Omega^2 - Omegadot) x``: the gravity of the polyhedron, the
-tide, and the centrifugal and Euler accelerations of the rigid body. The gravity of a rigid body is constant in its own
-frame and is computed once.
+On each facet the effective acceleration of loose material is ``g = grad U + (K_t - Omega^2 - Omegadot) x``: the
+gravity of the polyhedron, the tide, and the centrifugal and Euler accelerations of the rigid body. The gravity of a
+rigid body is constant in its own frame and is computed once.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Escalation of a flyby from the ellipsoid to grains, where the ellipsoid is not an adequate model or the user requests it."""
+"""Escalation of a flyby from the ellipsoid to grains, where the ellipsoid is inadequate or on request."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Rates of verdicts in a population: the result of :func:`flybystab.disruption_rates`, and quantities derived from them."""
+"""Rates of verdicts in a population, the result of :func:`flybystab.disruption_rates`, and derived quantities."""
 
 from __future__ import annotations
 
