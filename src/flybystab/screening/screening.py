@@ -1,24 +1,24 @@
-"""Screening: which encounters could reshape which asteroids, and with what probability.
+"""Screening: verdicts on the encounters of many asteroids, with probabilities.
 
-Each asteroid is one task (:mod:`flybystab.screening.tasks`). Its encounters are found, and verdicts are computed for
-the catalogue body and for samples drawn from :mod:`flybystab.screening.priors`. The bound of
-:mod:`flybystab.core.ellipsoid.yield_bound` decides most of them; the others are integrated
-(:mod:`flybystab.screening.sample_verdicts`), in parts shared by all workers where there are many. Tasks are
-independent, and their random numbers depend on the seed, the asteroid and the sample only, so that the rows do not
-depend on the executor.
+Each asteroid is one task (:mod:`flybystab.screening.tasks`). Its encounters are found on its orbit. For each encounter
+verdicts are computed for the catalogue body and for samples drawn from :mod:`flybystab.screening.priors`. For most of
+them the bound of :mod:`flybystab.core.ellipsoid.yield_bound` proves that the body does not yield; the others are
+integrated (:mod:`flybystab.screening.sample_verdicts`), in parts that are distributed over all workers where there are
+many. Tasks are independent. Their random numbers depend on the seed, the asteroid and the sample only, so that the
+rows do not depend on the executor.
+
+:func:`screen` returns a table; :meth:`Screening.run` writes one and can be resumed
+(:mod:`flybystab.screening.resumable_run`).
 """
 
 from __future__ import annotations
 
 import hashlib
 import json
-import os
 import time as clock
-import warnings
 from collections import Counter
-from collections.abc import Callable, Container, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Container, Iterator, Sequence
 from concurrent.futures import Executor
-from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -30,23 +30,18 @@ from flybystab._version import __version__
 from flybystab.arguments import check_arguments
 from flybystab.body.body import Material
 from flybystab.catalogues.catalogue import Asteroid
-from flybystab.errors import FlybystabWarning, InvalidInput, OutputFailed
 from flybystab.orbit.ephemeris import ephemeris
 from flybystab.progress import check_progress, progress_bar
 from flybystab.result_table import ResultTable
-from flybystab.screening.columns import COLUMNS, SAMPLE_COLUMNS
+from flybystab.screening.columns import COLUMNS
 from flybystab.screening.encounters import Finder, passages
-from flybystab.screening.journal import Journal
-from flybystab.screening.outputs import Outputs
 from flybystab.screening.priors import Population
 from flybystab.screening.progress import Progress
-from flybystab.screening.result_rows import Row
-from flybystab.screening.results import Column, read_meta, table_of
-from flybystab.screening.sample_verdicts import SampleVerdicts
+from flybystab.screening.results import table_of
+from flybystab.screening.resumable_run import ResumableRun, output_tables
 from flybystab.screening.scheduling import Parts, SerialExecutor, scheduled, window_of
 from flybystab.screening.selection import listed
 from flybystab.screening.settings import Settings, settings
-from flybystab.screening.table_files import check_output
 from flybystab.screening.tasks import Rows, block_of
 
 
@@ -58,7 +53,7 @@ class Screening:
     asteroids : sequence of Asteroid
     settings : Settings
     finder : callable
-        Finds the passages of an asteroid; those of its orbit by default.
+        Finds the encounters of an asteroid; by default those of its orbit.
     """
 
     def __init__(self, asteroids: Sequence[Asteroid], settings: Settings, finder: Finder = passages) -> None:
@@ -119,7 +114,7 @@ class Screening:
         window : int, optional
             Calls in flight at a time; four per worker by default.
         block : int, optional
-            Samples by the dynamics in one call of a worker. The rows do not depend on it.
+            Samples that are integrated in one call of a worker. The rows do not depend on it.
         report : callable, optional
             Called with the completed fractions of the asteroids in progress, summed.
         parts : Parts, optional
@@ -176,110 +171,19 @@ class Screening:
         KeyboardInterrupt
             After the rows so far have been written to a valid file; the same call resumes the run.
         """
-        out = check_output(output)
-        tables: dict[str, tuple[Path, Mapping[str, Column]]] = {"rows": (out, COLUMNS)}
-        if samples_output is not None:
-            if not self.settings.keep_samples:
-                raise InvalidInput("samples_output", str(samples_output), "keep_samples in the settings")
-            second = check_output(samples_output)
-            if second.resolve() == out.resolve() or (
-                second.exists() and out.exists() and second.samefile(out)
-            ):
-                raise InvalidInput("samples_output", str(samples_output), "a file other than the output")
-            tables["samples"] = second, SAMPLE_COLUMNS
-        journal_file = out.with_name(out.name + ".journal")
-        unfinished = os.path.lexists(journal_file)
-        taken = [path for path, _ in tables.values() if os.path.lexists(path)]
-        if not overwrite:
-            for path in taken:
-                # A resumed run may replace its own table only.
-                if not unfinished or read_meta(path).get("settings") != self.meta()["settings"]:
-                    raise InvalidInput(
-                        "output",
-                        str(path),
-                        "a file that is not there yet; --overwrite (overwrite=True) replaces it",
-                    )
-        journal = Journal(journal_file, self.fingerprint())
-        if journal.damaged:
-            warnings.warn(_damage(journal, len(self.asteroids)), FlybystabWarning, stacklevel=2)
-        began = clock.monotonic()
-        resumed = journal.count
-        counts: Counter[str] = Counter()
-
-        def count(rows: Iterable[Row]) -> None:
-            counts.update(r.get("verdict") or "error" for r in rows)
-
-        def state(begun: float = 0.0) -> Progress:
-            total, seconds = len(self.asteroids), clock.monotonic() - began
-            return Progress(journal.count, total, resumed, counts.total(), dict(counts), seconds, begun)
-
-        def tell(begun: float = 0.0) -> None:
-            if progress is not None:
-                progress(state(begun))
-
-        for task in journal.tasks():
-            count(task["rows"])
-
-        @contextmanager
-        def writing() -> Iterator[None]:
-            try:
-                yield
-            except OSError as error:
-                raise OutputFailed(
-                    f"{out.parent} can no longer be written ({error.strerror or error}). {journal.count} of "
-                    f"{len(self.asteroids)} asteroids are saved in {journal.path}: free some space and repeat "
-                    "the same command"
-                ) from None
-
-        outputs: Outputs | None = None
-        try:
-            with writing():
-                outputs = Outputs(journal, tables, self.meta(), replace=overwrite or bool(taken))
-                outputs.follow()
-            tell()
-            kept = _Kept(journal, writing)
-            for i, result in self.results(executor, skip=journal, chunk=chunk, report=tell, parts=kept):
-                with writing():
-                    journal.add(i, result)
-                    outputs.follow(i, result)
-                count(result["rows"])
-                tell()
-            with writing():
-                outputs.finish()
-        except BaseException:
-            try:
-                if outputs is not None:
-                    with writing():
-                        outputs.so_far(self.meta(complete=False))
-            finally:
-                with suppress(OSError):  # a full disk is reported already
-                    journal.close()
-            raise
-        journal.close(remove=True)
-        return state()
-
-
-def _damage(journal: Journal, asteroids: int) -> str:
-    """Describe the losses of a damaged journal."""
-    lines = ", ".join(map(str, journal.damaged[:10])) + (", ..." if len(journal.damaged) > 10 else "")
-    return (
-        f"{journal.path} is damaged in {len(journal.damaged)} of its lines ({lines}); their results are lost. "
-        f"{journal.count} of {asteroids} asteroids are intact, the others are recomputed"
-    )
-
-
-class _Kept:
-    """Finished parts of the asteroids in progress, stored in the journal."""
-
-    def __init__(self, journal: Journal, writing: Callable[[], AbstractContextManager[None]]) -> None:
-        self._journal, self._writing = journal, writing
-
-    def add(self, asteroid: int, passage: int, first: int, judged: SampleVerdicts) -> None:
-        with self._writing():
-            self._journal.add_part(asteroid, passage, first, judged.stored())
-
-    def of(self, asteroid: int) -> list[dict[str, Any]]:
-        return self._journal.parts(asteroid)
+        run = ResumableRun(
+            output_tables(output, samples_output, keep_samples=self.settings.keep_samples),
+            len(self.asteroids),
+            lambda complete: self.meta(complete=complete),
+            self.fingerprint(),
+            overwrite=overwrite,
+            progress=progress,
+        )
+        return run.finish(
+            lambda journal, report, kept: self.results(
+                executor, skip=journal, chunk=chunk, report=report, parts=kept
+            )
+        )
 
 
 @check_arguments
@@ -326,12 +230,13 @@ def screen(
     tolerance : float
         Step tolerance of the dynamics.
     grains : int, optional
-        Grains of the piles that carry on the samples where the ellipsoid ends, one pile a sample.
+        Number of grains of the piles with which samples are computed that the ellipsoid cannot follow to the end, one
+        pile each.
     progress : bool or callable, optional
         Whether to show a bar (:mod:`flybystab.progress`), or a function that is called with a :class:`Progress` after
         every asteroid.
     finder : callable
-        Finds the passages of an asteroid, instead of its orbit.
+        Finds the encounters of an asteroid, in place of a search along its orbit.
 
     Returns
     -------
