@@ -144,6 +144,111 @@ def one_pass_share(shape: Array, gradient: Array, rho: float) -> float:
 
 
 @kernel
+def _kinetic_form(gradient: Array, f: Array, out: Array) -> None:
+    """Write the form ``out[3, 3]`` of the kinetic energy per unit mass of the velocity ``L x`` at ``x = F z``."""
+    flow = np.empty((3, 3))
+    multiply(gradient, f, flow)
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = 0.5 * (flow[0, i] * flow[0, j] + flow[1, i] * flow[1, j] + flow[2, i] * flow[2, j])
+
+
+@kernel
+def _escape_basis(form: Array, basis: Array) -> None:
+    """Write the principal axes of a form of the energy as columns, that of the largest value last."""
+    c = np.empty(6)
+    values = np.empty(3)
+    pack(form, c)
+    eigensystem(c, values, basis)
+    top = np.argmax(values)
+    for i in range(3):
+        basis[i, 2], basis[i, top] = basis[i, top], basis[i, 2]
+
+
+@kernel
+def _remainder_energy(
+    to_space: Array, moments: Array, density: float, volume: float, kinetic: Array, form: Array
+) -> float:
+    """Write the form ``form[3, 3]`` of the energy per unit mass in the field of a remainder; the depth of its well.
+
+    The remainder counts as the homogeneous ellipsoid with its mass and its second moments. A point of the unit ball is
+    bound where the form is below the depth (m2/s2).
+
+    Parameters
+    ----------
+    to_space : ndarray, shape (3, 3)
+        Unit ball -> body, m.
+    moments : ndarray, shape (3, 3)
+        ``5 <z z^T>`` of the remainder in the unit ball.
+    density, volume : float
+        ``pi G rho`` times the remaining fraction of the mass (s^-2), product of the semi-axes of the whole body (m3).
+    kinetic : ndarray, shape (3, 3)
+        Form of the kinetic energy.
+    """
+    half, v = np.empty((3, 3)), np.empty((3, 3))
+    c, values = np.empty(6), np.empty(3)
+    for i in range(3):
+        for j in range(3):
+            half[i, j] = (
+                to_space[i, 0] * moments[0, j]
+                + to_space[i, 1] * moments[1, j]
+                + to_space[i, 2] * moments[2, j]
+            )
+    for i in range(3):
+        for j in range(3):
+            form[i, j] = (
+                half[i, 0] * to_space[j, 0] + half[i, 1] * to_space[j, 1] + half[i, 2] * to_space[j, 2]
+            )
+    pack(form, c)
+    eigensystem(c, values, v)
+    coefficients = gravity_coefficients(values[0], values[1], values[2])
+    potential = density / (np.sqrt(values[0] * values[1] * values[2]) / volume)
+    for i in range(3):
+        for j in range(3):
+            half[i, j] = v[0, i] * to_space[0, j] + v[1, i] * to_space[1, j] + v[2, i] * to_space[2, j]
+    for i in range(3):
+        for j in range(3):
+            form[i, j] = kinetic[i, j]
+            for k in range(3):
+                form[i, j] += potential * coefficients[k] * half[k, i] * half[k, j]
+    return potential * potential_coefficient(values[0], values[1], values[2])
+
+
+@kernel
+def _bound_part(form: Array, depth: float, moments: Array) -> float:
+    """Fraction of the unit ball in which ``z.form z`` is below `depth`; writes ``5 <z z^T>`` of that part.
+
+    The moments are not normalised where the fraction is below `NOTHING`.
+    """
+    n = np.empty(3)
+    mass = 0.0
+    moments[:] = 0.0
+    for a in range(_HALF_NODES.size):
+        n[2] = _HALF_NODES[a]
+        across = np.sqrt(1.0 - n[2] * n[2])
+        weight = _HALF_WEIGHTS[a] / _HALF_LONGITUDES
+        for b in range(_HALF_LONGITUDES):
+            n[0] = across * _COSINES[b]
+            n[1] = across * _SINES[b]
+            q = form[0, 0] * n[0] * n[0] + form[1, 1] * n[1] * n[1] + form[2, 2] * n[2] * n[2]
+            q += 2.0 * (form[0, 1] * n[0] * n[1] + form[0, 2] * n[0] * n[2] + form[1, 2] * n[1] * n[2])
+            r2 = min(1.0, depth / q)
+            r3 = weight * r2 * np.sqrt(r2)
+            mass += r3
+            r5 = 3.0 * r2 * r3
+            for i in range(3):
+                for j in range(i, 3):
+                    moments[i, j] += r5 * n[i] * n[j]
+    if mass < NOTHING:
+        return mass
+    for i in range(3):
+        for j in range(i, 3):
+            moments[i, j] /= mass
+            moments[j, i] = moments[i, j]
+    return mass
+
+
+@kernel
 def bound_share(shape: Array, gradient: Array, rho: float) -> float:
     """Fraction of the mass that stays bound, for a homogeneous ellipsoid with velocity ``L x``.
 
@@ -157,93 +262,32 @@ def bound_share(shape: Array, gradient: Array, rho: float) -> float:
         return first
     scale = np.pi * G
     axes = np.empty(3)
-    v = np.empty((3, 3))
-    f = np.empty((3, 3))
-    flow = np.empty((3, 3))
-    kinetic = np.empty((3, 3))
-    c = np.empty(6)
-    values = np.empty(3)
-    basis = np.empty((3, 3))
+    v, f, kinetic = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     principal_axes(shape, axes, v)
     coefficients = gravity_coefficients(axes[0] ** 2, axes[1] ** 2, axes[2] ** 2)
     for i in range(3):
         for j in range(3):
             f[i, j] = v[i, j] * axes[j]
-    multiply(gradient, f, flow)
-    for i in range(3):
-        for j in range(3):
-            kinetic[i, j] = 0.5 * (
-                flow[0, i] * flow[0, j] + flow[1, i] * flow[1, j] + flow[2, i] * flow[2, j]
-            )
+    _kinetic_form(gradient, f, kinetic)
     form = kinetic.copy()
     for i in range(3):
         form[i, i] += scale * rho * coefficients[i] * axes[i] ** 2
-    pack(form, c)
-    eigensystem(c, values, basis)
-    top = np.argmax(values)
-    for i in range(3):  # the polar axis is the one that escapes most
-        basis[i, 2], basis[i, top] = basis[i, top], basis[i, 2]
-    to_space = np.empty((3, 3))
+    basis = np.empty((3, 3))
+    _escape_basis(form, basis)
+    to_space, half = np.empty((3, 3)), np.empty((3, 3))
     multiply(f, basis, to_space)
-    half = np.empty((3, 3))
     multiply(kinetic, basis, half)
     for i in range(3):
         for j in range(3):
             kinetic[i, j] = basis[0, i] * half[0, j] + basis[1, i] * half[1, j] + basis[2, i] * half[2, j]
-    moments = np.eye(3)  # 5 <z z^T> of the remainder, unit ball
+    volume = axes[0] * axes[1] * axes[2]
+    moments = np.eye(3)
     share = 1.0
-    n = np.empty(3)
     for _ in range(PASSES):
-        for i in range(3):
-            for j in range(3):
-                half[i, j] = (
-                    to_space[i, 0] * moments[0, j]
-                    + to_space[i, 1] * moments[1, j]
-                    + to_space[i, 2] * moments[2, j]
-                )
-        for i in range(3):
-            for j in range(3):
-                form[i, j] = (
-                    half[i, 0] * to_space[j, 0] + half[i, 1] * to_space[j, 1] + half[i, 2] * to_space[j, 2]
-                )
-        pack(form, c)
-        eigensystem(c, values, v)
-        coefficients = gravity_coefficients(values[0], values[1], values[2])
-        volume = np.sqrt(values[0] * values[1] * values[2]) / (axes[0] * axes[1] * axes[2])
-        potential = scale * rho * share / volume
-        depth = potential * potential_coefficient(values[0], values[1], values[2])
-        for i in range(3):
-            for j in range(3):
-                half[i, j] = v[0, i] * to_space[0, j] + v[1, i] * to_space[1, j] + v[2, i] * to_space[2, j]
-        for i in range(3):
-            for j in range(3):
-                form[i, j] = kinetic[i, j]
-                for k in range(3):
-                    form[i, j] += potential * coefficients[k] * half[k, i] * half[k, j]
-        mass = 0.0
-        moments[:] = 0.0
-        for a in range(_HALF_NODES.size):
-            n[2] = _HALF_NODES[a]
-            across = np.sqrt(1.0 - n[2] * n[2])
-            weight = _HALF_WEIGHTS[a] / _HALF_LONGITUDES
-            for b in range(_HALF_LONGITUDES):
-                n[0] = across * _COSINES[b]
-                n[1] = across * _SINES[b]
-                q = form[0, 0] * n[0] * n[0] + form[1, 1] * n[1] * n[1] + form[2, 2] * n[2] * n[2]
-                q += 2.0 * (form[0, 1] * n[0] * n[1] + form[0, 2] * n[0] * n[2] + form[1, 2] * n[1] * n[2])
-                r2 = min(1.0, depth / q)
-                r3 = weight * r2 * np.sqrt(r2)
-                mass += r3
-                r5 = 3.0 * r2 * r3
-                for i in range(3):
-                    for j in range(i, 3):
-                        moments[i, j] += r5 * n[i] * n[j]
+        depth = _remainder_energy(to_space, moments, scale * rho * share, volume, kinetic, form)
+        mass = _bound_part(form, depth, moments)
         if mass < NOTHING:
             return 0.0
-        for i in range(3):
-            for j in range(i, 3):
-                moments[i, j] /= mass
-                moments[j, i] = moments[i, j]
         change = share - mass
         share = mass
         if change < CONVERGED:

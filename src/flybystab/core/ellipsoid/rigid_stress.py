@@ -112,45 +112,34 @@ def _crossing(
 
 
 @kernel
-def load_interval(base: Array, load: Array, code: int, phi: float, cohesion: float) -> tuple[float, float]:
-    """Least and largest ``x >= 0`` for which the stress ``base + x load`` is borne; (nan, nan) where none is.
-
-    The overload is convex along the line, so that the admissible loads form one interval: its minimum
-    is bracketed by doubling and found by golden section, its ends by bisection. An upper end of inf: any
-    load is borne.
-    """
-    size_load = 0.0
-    size_base = 0.0
-    for i in range(6):
-        size_load = max(size_load, abs(load[i]))
-        size_base = max(size_base, abs(base[i]))
-    g0 = _at(base, load, 0.0, code, phi, cohesion)
-    if size_load == 0.0:
-        return (0.0, np.inf) if g0 <= 0.0 else (np.nan, np.nan)
-    scale = max(size_base, cohesion) / size_load
-    if scale == 0.0:
-        scale = 1.0
-    # Walk outward until the overload grows again.
+def _bracketed_minimum(
+    base: Array, load: Array, g0: float, scale: float, code: int, phi: float, cohesion: float
+) -> tuple[float, float]:
+    """Interval of ``x >= 0`` with the least overload of ``base + x load``, by doubling; `g0` is that at zero."""
     left = 0.0
     mid = 1e-3 * scale
     g_mid = _at(base, load, mid, code, phi, cohesion)
     if g_mid >= g0:
-        right = mid
-        left = 0.0
-    else:
-        right = 2.0 * mid
+        return left, mid
+    right = 2.0 * mid
+    g_right = _at(base, load, right, code, phi, cohesion)
+    while g_right < g_mid and right < 1e9 * scale:
+        left = mid
+        mid = right
+        g_mid = g_right
+        right *= 2.0
         g_right = _at(base, load, right, code, phi, cohesion)
-        while g_right < g_mid and right < 1e9 * scale:
-            left = mid
-            mid = right
-            g_mid = g_right
-            right *= 2.0
-            g_right = _at(base, load, right, code, phi, cohesion)
+    return left, right
+
+
+@kernel
+def _least_overload(
+    base: Array, load: Array, g0: float, a: float, b: float, code: int, phi: float, cohesion: float
+) -> tuple[float, float]:
+    """``x`` of the least overload, at zero (where it is `g0`) or between `a` and `b`, and its value: golden section."""
     golden = 0.3819660112501051
     best = 0.0
     g_best = g0
-    a = left
-    b = right
     x1 = a + golden * (b - a)
     x2 = b - golden * (b - a)
     g1 = _at(base, load, x1, code, phi, cohesion)
@@ -172,6 +161,29 @@ def load_interval(base: Array, load: Array, code: int, phi: float, cohesion: flo
             g2 = _at(base, load, x2, code, phi, cohesion)
         if b - a <= 1e-15 * abs(b):
             break
+    return best, g_best
+
+
+@kernel
+def load_interval(base: Array, load: Array, code: int, phi: float, cohesion: float) -> tuple[float, float]:
+    """Least and largest ``x >= 0`` for which the stress ``base + x load`` is borne; (nan, nan) where none is.
+
+    The overload is convex along the line, so that the admissible loads form one interval: its minimum is bracketed by
+    doubling and found by golden section, its ends by bisection. The upper end is inf where any load is borne.
+    """
+    size_load = 0.0
+    size_base = 0.0
+    for i in range(6):
+        size_load = max(size_load, abs(load[i]))
+        size_base = max(size_base, abs(base[i]))
+    g0 = _at(base, load, 0.0, code, phi, cohesion)
+    if size_load == 0.0:
+        return (0.0, np.inf) if g0 <= 0.0 else (np.nan, np.nan)
+    scale = max(size_base, cohesion) / size_load
+    if scale == 0.0:
+        scale = 1.0
+    left, right = _bracketed_minimum(base, load, g0, scale, code, phi, cohesion)
+    best, g_best = _least_overload(base, load, g0, left, right, code, phi, cohesion)
     if g_best > 0.0:
         return np.nan, np.nan
     low = 0.0 if g0 <= 0.0 else _crossing(base, load, best, 0.0, code, phi, cohesion)

@@ -6,6 +6,8 @@ a yield surface that is not circular.
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from flybystab.core.energy.perturbation import (
@@ -149,87 +151,119 @@ def _principal(x: Array, axes: Array) -> None:
         axes[:, j] = vectors[:, rank[j]]
 
 
+class Simplex(NamedTuple):
+    """Corners ``[n + 1, n]`` of a simplex and the values there, and what is minimised.
+
+    With three coordinates they are turns of the principal `axes` in which the Mohr-Coulomb face is normal
+    (:func:`_on_face`), with five the direction itself.
+    """
+
+    corners: Array
+    values: Array
+    axes: Array
+    order: int
+    which: int
+
+
+@kernel
+def _corner(b: Ellipsoid, v: Array, s: Simplex, y: Array) -> float:
+    """Value at the point ``v`` of a simplex, which it brings into the ball; writes its direction ``y[5]``."""
+    if v.size == 3:
+        _on_face(b, v, s.axes, y)
+    else:
+        _clip(v, b.associative and b.sin > 0.0)
+        y[:] = v
+    return level(b, y, s.order, np.inf)[s.which]
+
+
+@kernel
+def _set_up(b: Ellipsoid, s: Simplex, size: float, best: float, on_face: bool, y: Array) -> None:
+    """Set up a simplex of a size about the direction ``y[5]``, which has the value `best`; ``y`` is overwritten."""
+    s.corners[:] = 0.0
+    if on_face:
+        _principal(y, s.axes)
+    else:
+        s.corners[:] = y
+    s.values[0] = best
+    for i in range(s.corners.shape[1]):
+        s.corners[i + 1, i] += size if s.corners[i + 1, i] <= 0.0 else -size
+        s.values[i + 1] = _corner(b, s.corners[i + 1], s, y)
+
+
+@kernel
+def _contract(b: Ellipsoid, s: Simplex, low: int, y: Array) -> None:
+    """Halve the distances of all corners from the lowest."""
+    for i in range(s.values.size):
+        if i != low:
+            s.corners[i] = 0.5 * (s.corners[i] + s.corners[low])
+            s.values[i] = _corner(b, s.corners[i], s, y)
+
+
+@kernel
+def _turn(b: Ellipsoid, s: Simplex, centre: Array, trial: Array, other: Array, y: Array) -> bool:
+    """One step of Nelder & Mead (1965): reflection, expansion, contraction; whether the simplex is still steep.
+
+    `centre`, `trial`, `other` and ``y[5]`` are work space.
+    """
+    n = centre.size
+    rank = np.argsort(s.values)
+    low, high, second = rank[0], rank[n], rank[n - 1]
+    if s.values[high] - s.values[low] <= 1e-9 * s.values[low]:
+        return False
+    for i in range(n):
+        centre[i] = (np.sum(s.corners[:, i]) - s.corners[high, i]) / n
+    trial[:] = 2.0 * centre - s.corners[high]
+    value = _corner(b, trial, s, y)
+    if value < s.values[low]:
+        other[:] = 3.0 * centre - 2.0 * s.corners[high]
+        farther = _corner(b, other, s, y)
+        if farther < value:
+            value = farther
+            trial[:] = other
+    elif value >= s.values[second]:
+        inside = 0.5 if value < s.values[high] else -0.5
+        other[:] = centre + inside * (centre - s.corners[high])
+        nearer = _corner(b, other, s, y)
+        if nearer >= min(value, s.values[high]):
+            _contract(b, s, low, y)
+            return True
+        value = nearer
+        trial[:] = other
+    s.corners[high] = trial
+    s.values[high] = value
+    return True
+
+
 @kernel
 def polish(
     b: Ellipsoid, x: Array, order: int, which: int, size: float, smallest: float, on_face: bool
 ) -> float:
     """Lower the critical energy (or strain) from ``x[5]``, which it moves, by simplices (Nelder & Mead 1965).
 
-    A simplex turns into the narrow, curved valleys along which no coordinate leads down; it is set up anew and
+    A simplex follows the narrow, curved valleys along which no coordinate leads down; it is set up anew and
     smaller until a round gains nothing. `on_face` moves along the normals of the Mohr-Coulomb faces, where the
     dissipation of associative flow, the greater of two linear functions of the greatest and the least principal
     rate, has a kink: the bottom of a sharp valley.
     """
-    ball = b.associative and b.sin > 0.0
     n = 3 if on_face else 5
-    axes = np.empty((3, 3))
-    corners = np.empty((n + 1, n))
-    values = np.empty(n + 1)
-    centre = np.empty(n)
-    trial = np.empty(n)
-    other = np.empty(n)
+    s = Simplex(np.empty((n + 1, n)), np.empty(n + 1), np.empty((3, 3)), order, which)
+    centre, trial, other = np.empty(n), np.empty(n), np.empty(n)
     y = x.copy()
     if on_face:
-        _principal(x, axes)
-        _on_face(b, np.zeros(3), axes, y)
+        _principal(x, s.axes)
+        _on_face(b, np.zeros(3), s.axes, y)
     best = level(b, y, order, np.inf)[which]
     while size > smallest and 0.0 < best < np.inf:
         before = best
-        corners[:] = 0.0
-        if on_face:
-            _principal(y, axes)
-        else:
-            corners[:] = y
-        values[0] = best
-        for i in range(n):
-            corners[i + 1, i] += size if corners[i + 1, i] <= 0.0 else -size
-            values[i + 1] = _corner(b, corners[i + 1], order, which, ball, axes, y)
+        _set_up(b, s, size, best, on_face, y)
         for _ in range(MOST_TURNS):
-            rank = np.argsort(values)
-            low, high, second = rank[0], rank[n], rank[n - 1]
-            if values[high] - values[low] <= 1e-9 * values[low]:
+            if not _turn(b, s, centre, trial, other, y):
                 break
-            for i in range(n):
-                centre[i] = (np.sum(corners[:, i]) - corners[high, i]) / n
-            trial[:] = 2.0 * centre - corners[high]
-            value = _corner(b, trial, order, which, ball, axes, y)
-            if value < values[low]:
-                other[:] = 3.0 * centre - 2.0 * corners[high]
-                farther = _corner(b, other, order, which, ball, axes, y)
-                if farther < value:
-                    value = farther
-                    trial[:] = other
-            elif value >= values[second]:
-                inside = 0.5 if value < values[high] else -0.5
-                other[:] = centre + inside * (centre - corners[high])
-                nearer = _corner(b, other, order, which, ball, axes, y)
-                if nearer >= min(value, values[high]):
-                    for i in range(n + 1):
-                        if i != low:
-                            corners[i] = 0.5 * (corners[i] + corners[low])
-                            values[i] = _corner(b, corners[i], order, which, ball, axes, y)
-                    continue
-                value = nearer
-                trial[:] = other
-            corners[high] = trial
-            values[high] = value
-        low = np.argmin(values)
-        best = _corner(b, corners[low], order, which, ball, axes, y)
+        best = _corner(b, s.corners[np.argmin(s.values)], s, y)
         if before - best <= 1e-6 * before:
             size *= 0.1
     x[:] = y
     return best
-
-
-@kernel
-def _corner(b: Ellipsoid, v: Array, order: int, which: int, ball: bool, axes: Array, y: Array) -> float:
-    """Value at the corner ``v`` of a simplex, which it brings into the ball; writes its direction ``y[5]``."""
-    if v.size == 3:
-        _on_face(b, v, axes, y)
-    else:
-        _clip(v, ball)
-        y[:] = v
-    return level(b, y, order, np.inf)[which]
 
 
 @kernel

@@ -190,53 +190,39 @@ def gauss_up_to(i: int, values: Array) -> float:
 
 
 @kernel
-def power_derivatives(
-    flow: Flow, s: Array, one: Array, two: Array, three: Array, spin: Array, d: Array
-) -> tuple[float, float, float]:
-    """Power of the stress and its first two derivatives at the start of the path with rate of strain ``d[6]``.
+def _deformation_coefficients(
+    section: Array, e: float, s: Array, l: Array, l2: Array, b: Array, values: Array, turned: Array
+) -> None:
+    """Write ``B = 1 - e N`` and the first two derivatives of ``B:S^-1`` and ``B:(N S^-1)`` after their values.
 
-    ``s[3]`` with ``s1 s2 s3 = 1`` and its index symbols. With ``S' = 2 L S``, ``N_u = (S + u)^-1``
-    and ``Gamma = int N_u du/Delta`` the derivatives of ``K_g = -2 Gamma`` follow from ``N_u' = -N_u S' N_u`` and those
-    of ``1/Delta`` (see :func:`flybystab.core.energy.potential.energy_derivatives`); ``(S^-1)' = -2 S^-1 L``.
+    ``l`` and ``l2`` are ``L`` and ``L^2``: ``(S^-1)' = -2 S^-1 L``. ``values[3]`` and ``turned[3]`` are the results.
     """
-    m = flow.support
-    tr = flow.trace
-    cohesive = 5.0 * flow.cohesion
-    c = MASS / 5.0 * m
-    if flow.sin <= 0.0 or flow.share >= flow.sin:
-        return c * cohesive, c * cohesive * tr, c * cohesive * tr * tr
-    e = flow.share
-    slack = flow.sin - e
-    if flow.kappa > 0.0:
-        w0 = c * (slack * 5.0 * flow.pressure + cohesive)
-        fall = c * slack * 5.0 * flow.kappa * tr
-        return w0, w0 * tr - fall, w0 * tr * tr - 2.0 * fall * tr
-    b = np.empty((3, 3))
     bn = np.empty((3, 3))
-    multiply(flow.section, flow.section, bn)
+    multiply(section, section, bn)
+    values[:] = 0.0
+    turned[:] = 0.0
     for i in range(3):
         for j in range(3):
-            b[i, j] = (1.0 if i == j else 0.0) - e * flow.section[i, j]
-            bn[i, j] = flow.section[i, j] - e * bn[i, j]
-    l = np.empty((3, 3))
-    l2 = np.empty((3, 3))
-    p = np.empty((3, 3))
-    q = np.empty((3, 3))
-    velocity_gradient(s[0], s[1], s[2], d, l)
-    multiply(l, l, l2)
-    a0 = a1 = a2 = 0.0  # B:S^-1 and its derivatives
-    n0 = n1 = n2 = 0.0  # B:(N S^-1)
+            b[i, j] = (1.0 if i == j else 0.0) - e * section[i, j]
+            bn[i, j] = section[i, j] - e * bn[i, j]
     for i in range(3):
-        a0 += b[i, i] / s[i]
-        n0 += bn[i, i] / s[i]
+        values[0] += b[i, i] / s[i]
+        turned[0] += bn[i, i] / s[i]
         for j in range(3):
-            p[i, j] = 2.0 * l[i, j] * s[j]
-            q[i, j] = 4.0 * l2[i, j] * s[j]
-            a1 -= 2.0 * b[i, j] * l[i, j] / s[i]
-            n1 -= 2.0 * bn[i, j] * l[i, j] / s[i]
-            a2 += 4.0 * b[i, j] * l2[i, j] / s[i]
-            n2 += 4.0 * bn[i, j] * l2[i, j] / s[i]
-    r0 = r1 = r2 = 0.0  # B:R
+            values[1] -= 2.0 * b[i, j] * l[i, j] / s[i]
+            turned[1] -= 2.0 * bn[i, j] * l[i, j] / s[i]
+            values[2] += 4.0 * b[i, j] * l2[i, j] / s[i]
+            turned[2] += 4.0 * bn[i, j] * l2[i, j] / s[i]
+
+
+@kernel
+def _gravity_load(b: Array, one: Array, two: Array, three: Array, p: Array, q: Array, load: Array) -> None:
+    """Write ``B:K_g`` and its first two derivatives into ``load[3]``; ``p, q`` are those of ``S``.
+
+    With ``N_u = (S + u)^-1`` and ``Gamma = int N_u du/Delta`` the derivatives of ``K_g = -2 Gamma`` follow from
+    ``N_u' = -N_u S' N_u`` and those of ``1/Delta`` (see :mod:`flybystab.core.energy.potential`).
+    """
+    r0 = r1 = r2 = 0.0
     for i in range(3):
         r0 -= 2.0 * b[i, i] * one[i]
         for j in range(3):
@@ -252,7 +238,15 @@ def power_derivatives(
                         second += three[i, k, n] * (0.5 * p[k, n] * p[n, k] + 0.25 * p[k, k] * p[n, n])
             r1 -= 2.0 * b[i, j] * first
             r2 -= 2.0 * b[i, j] * second
-    # -Omega^2 with omega = J^-1 H: omega' = -J^-1 J' omega, omega'' = J^-1 (2 J' J^-1 J' - J'') omega
+    load[0], load[1], load[2] = r0, r1, r2
+
+
+@kernel
+def _add_rotation_load(b: Array, s: Array, p: Array, q: Array, spin: Array, load: Array) -> None:
+    """Add ``-B:Omega^2`` and its first two derivatives at fixed angular momentum to ``load[3]``.
+
+    ``omega = J^-1 H``: ``omega' = -J^-1 J' omega``, ``omega'' = J^-1 (2 J' J^-1 J' - J'') omega``.
+    """
     tp = p[0, 0] + p[1, 1] + p[2, 2]
     tq = q[0, 0] + q[1, 1] + q[2, 2]
     ts = s[0] + s[1] + s[2]
@@ -274,20 +268,56 @@ def power_derivatives(
     for i in range(3):
         for j in range(3):
             form = (trace if i == j else 0.0) - b[i, j]
-            r0 += form * spin[i] * spin[j]
-            r1 += 2.0 * form * spin[i] * w1[j]
-            r2 += 2.0 * form * (w1[i] * w1[j] + spin[i] * w2[j])
-    den0 = a0 - flow.sin * n0
-    den1 = a1 - flow.sin * n1
-    den2 = a2 - flow.sin * n2
+            load[0] += form * spin[i] * spin[j]
+            load[1] += 2.0 * form * spin[i] * w1[j]
+            load[2] += 2.0 * form * (w1[i] * w1[j] + spin[i] * w2[j])
+
+
+@kernel
+def power_derivatives(
+    flow: Flow, s: Array, one: Array, two: Array, three: Array, spin: Array, d: Array
+) -> tuple[float, float, float]:
+    """Power of the stress and its first two derivatives at the start of the path with rate of strain ``d[6]``.
+
+    ``s[3]`` with ``s1 s2 s3 = 1`` and its index symbols. The derivatives of the reaction pressure follow from those of
+    its equation, numerator and denominator of :func:`power`, with ``S' = 2 L S``. The power is infinite where the flow
+    jams.
+    """
+    tr = flow.trace
+    cohesive = 5.0 * flow.cohesion
+    c = MASS / 5.0 * flow.support
+    if flow.sin <= 0.0 or flow.share >= flow.sin:
+        return c * cohesive, c * cohesive * tr, c * cohesive * tr * tr
+    e = flow.share
+    slack = flow.sin - e
+    if flow.kappa > 0.0:
+        w0 = c * (slack * 5.0 * flow.pressure + cohesive)
+        fall = c * slack * 5.0 * flow.kappa * tr
+        return w0, w0 * tr - fall, w0 * tr * tr - 2.0 * fall * tr
+    l, l2 = np.empty((3, 3)), np.empty((3, 3))
+    p, q = np.empty((3, 3)), np.empty((3, 3))
+    velocity_gradient(s[0], s[1], s[2], d, l)
+    multiply(l, l, l2)
+    for i in range(3):
+        for j in range(3):
+            p[i, j] = 2.0 * l[i, j] * s[j]
+            q[i, j] = 4.0 * l2[i, j] * s[j]
+    b = np.empty((3, 3))
+    a, n, r = np.empty(3), np.empty(3), np.empty(3)  # B:S^-1, B:(N S^-1), B:R; with derivatives
+    _deformation_coefficients(flow.section, e, s, l, l2, b, a, n)
+    _gravity_load(b, one, two, three, p, q, r)
+    _add_rotation_load(b, s, p, q, spin, r)
+    den0 = a[0] - flow.sin * n[0]
+    den1 = a[1] - flow.sin * n[1]
+    den2 = a[2] - flow.sin * n[2]
     if den0 <= 0.0:
         return np.inf, 0.0, 0.0
-    p0 = (cohesive * n0 - r0) / den0
+    p0 = (cohesive * n[0] - r[0]) / den0
     if p0 <= -cohesive / flow.sin:  # contact is lost
         w0 = c * cohesive * e / flow.sin
         return w0, w0 * tr, w0 * tr * tr
-    p1 = (cohesive * (tr * n0 + n1) - r1 - p0 * den1) / den0
-    p2 = (cohesive * (tr * tr * n0 + 2.0 * tr * n1 + n2) - r2 - 2.0 * p1 * den1 - p0 * den2) / den0
+    p1 = (cohesive * (tr * n[0] + n[1]) - r[1] - p0 * den1) / den0
+    p2 = (cohesive * (tr * tr * n[0] + 2.0 * tr * n[1] + n[2]) - r[2] - 2.0 * p1 * den1 - p0 * den2) / den0
     return (
         c * (slack * p0 + cohesive),
         c * (slack * p1 + cohesive * tr),

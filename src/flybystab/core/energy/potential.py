@@ -67,27 +67,10 @@ def velocity_gradient(s1: float, s2: float, s3: float, d: Array, out: Array) -> 
 
 
 @kernel
-def energy_derivatives(
-    s1: float, s2: float, s3: float, one: Array, two: Array, three: Array, spin: Array, d: Array
-) -> tuple[float, float, float]:
-    """First three derivatives of ``Phi`` in ``t`` along ``F = exp(L t)`` for a rate of strain ``d[6]``.
-
-    ``one, two, three`` are the :func:`~flybystab.core.ellipsoid.potential.index_symbols` of ``s_i`` (with
-    ``s1 s2 s3 = 1``), ``spin[3]`` is ``J^-1 H`` before the strain.
-
-    With ``N = (S + u)^-1``, ``x = ln det(S + u)`` has ``x' = N:S'``, ``x'' = N:S'' - NS':NS'``,
-    ``x''' = N:S''' - 3 NS':NS'' + 2 tr (NS')^3``; the integrals over ``u`` are index symbols. With
-    ``Q = J^-1`` the derivatives of ``H.Q.H/2`` follow from ``Q' = -Q J' Q``.
-    """
+def _shape_derivatives(s: Array, d: Array, p: Array, q: Array, r: Array) -> None:
+    """Write the first three derivatives of ``S`` along ``F = exp(L t)``: ``2 L S``, ``4 L^2 S``, ``8 L^3 S``."""
     l = np.empty((3, 3))
-    p = np.empty((3, 3))
-    q = np.empty((3, 3))
-    r = np.empty((3, 3))
-    velocity_gradient(s1, s2, s3, d, l)
-    s = np.empty(3)
-    s[0] = s1
-    s[1] = s2
-    s[2] = s3
+    velocity_gradient(s[0], s[1], s[2], d, l)
     for i in range(3):
         for j in range(3):
             p[i, j] = 2.0 * l[i, j] * s[j]
@@ -97,6 +80,17 @@ def energy_derivatives(
         for j in range(3):
             q[i, j] *= 2.0
             r[i, j] *= 4.0
+
+
+@kernel
+def _gravity_derivatives(
+    one: Array, two: Array, three: Array, p: Array, q: Array, r: Array
+) -> tuple[float, float, float]:
+    """First three derivatives of ``sqrt(det S) int du/Delta`` at fixed ``det S``, from those of ``S``: ``p, q, r``.
+
+    With ``N = (S + u)^-1``, ``x = ln det(S + u)`` has ``x' = N:S'``, ``x'' = N:S'' - NS':NS'``,
+    ``x''' = N:S''' - 3 NS':NS'' + 2 tr (NS')^3``; the integrals over ``u`` are index symbols.
+    """
     e1 = 0.0
     e2 = 0.0
     e3 = 0.0
@@ -113,23 +107,29 @@ def energy_derivatives(
                     + 0.75 * p[k, k] * p[i, j] * p[i, j]
                     + 0.125 * p[i, i] * p[j, j] * p[k, k]
                 )
-    # spin: J = (m/5)(tr S 1 - S) and its derivatives, applied to the angular velocity
+    return e1, e2, e3
+
+
+@kernel
+def _times_inertia(p: Array, trace: float, spin: Array, out: Array) -> None:
+    """Write ``J' omega``, ``J' = (m/5)(tr S' 1 - S')``, for a derivative ``p[3, 3]`` of ``S`` with this trace."""
+    c = MASS / 5.0
+    for i in range(3):
+        out[i] = c * trace * spin[i]
+        for j in range(3):
+            out[i] -= c * p[i, j] * spin[j]
+
+
+@kernel
+def _rotation_derivatives(s: Array, p: Array, q: Array, r: Array, spin: Array) -> tuple[float, float, float]:
+    """First three derivatives of ``H.Q.H/2``, ``Q = J^-1``, at fixed ``H``: ``Q' = -Q J' Q``."""
     c = MASS / 5.0
     tp = p[0, 0] + p[1, 1] + p[2, 2]
-    tq = q[0, 0] + q[1, 1] + q[2, 2]
-    tr = r[0, 0] + r[1, 1] + r[2, 2]
-    ts = s1 + s2 + s3
-    w1 = np.empty(3)
-    w2 = np.empty(3)
-    w3 = np.empty(3)
-    for i in range(3):
-        w1[i] = c * tp * spin[i]
-        w2[i] = c * tq * spin[i]
-        w3[i] = c * tr * spin[i]
-        for j in range(3):
-            w1[i] -= c * p[i, j] * spin[j]
-            w2[i] -= c * q[i, j] * spin[j]
-            w3[i] -= c * r[i, j] * spin[j]
+    ts = s[0] + s[1] + s[2]
+    w1, w2, w3 = np.empty(3), np.empty(3), np.empty(3)
+    _times_inertia(p, tp, spin, w1)
+    _times_inertia(q, q[0, 0] + q[1, 1] + q[2, 2], spin, w2)
+    _times_inertia(r, r[0, 0] + r[1, 1] + r[2, 2], spin, w3)
     f1 = 0.0
     f2 = 0.0
     f3 = 0.0
@@ -142,6 +142,26 @@ def energy_derivatives(
         for j in range(3):
             j1 -= p[i, j] * w1[j] / (c * (ts - s[j]))
         f3 -= 3.0 * g * c * j1
+    return f1, f2, f3
+
+
+@kernel
+def energy_derivatives(
+    s1: float, s2: float, s3: float, one: Array, two: Array, three: Array, spin: Array, d: Array
+) -> tuple[float, float, float]:
+    """First three derivatives of ``Phi`` in ``t`` along ``F = exp(L t)`` for a rate of strain ``d[6]``.
+
+    ``one, two, three`` are the :func:`~flybystab.core.ellipsoid.potential.index_symbols` of ``s_i`` (with
+    ``s1 s2 s3 = 1``), ``spin[3]`` is ``J^-1 H`` before the strain.
+    """
+    s = np.empty(3)
+    s[0] = s1
+    s[1] = s2
+    s[2] = s3
+    p, q, r = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    _shape_derivatives(s, d, p, q, r)
+    e1, e2, e3 = _gravity_derivatives(one, two, three, p, q, r)
+    f1, f2, f3 = _rotation_derivatives(s, p, q, r, spin)
     scale = -GRAVITY / np.sqrt(s1 * s2 * s3)
     return scale * e1 + f1, scale * e2 + f2, scale * e3 + f3
 
@@ -183,15 +203,10 @@ def path_frame(s1: float, s2: float, s3: float, d: Array, rates: Array, frame: A
 
 
 @kernel
-def energy_along(
-    rates: Array, frame: Array, momentum: Array, t: float, volume: float, growth: float, axes: PrincipalAxes
-) -> tuple[float, float, float]:
-    """``Phi``, ``dPhi/dt`` and the squared axis ratio at time `t` on a path of :func:`path_frame`; writes `axes`.
-
-    On top of that path the body swells evenly: to `volume` times its volume by now, at the rate ``d ln V/dt`` =
-    `growth`.
-    """
-    shape, rate = axes.shape, axes.rate
+def _shape_along(
+    rates: Array, frame: Array, t: float, volume: float, growth: float, shape: Array, rate: Array
+) -> None:
+    """Write ``S`` and ``dS/dt`` (six components each) at `t`; arguments as of :func:`energy_along`."""
     swollen = np.cbrt(volume * volume)
     for i in range(6):
         shape[i] = 0.0
@@ -214,6 +229,19 @@ def energy_along(
         rate[3] += h * x * y
         rate[4] += h * x * z
         rate[5] += h * y * z
+
+
+@kernel
+def energy_along(
+    rates: Array, frame: Array, momentum: Array, t: float, volume: float, growth: float, axes: PrincipalAxes
+) -> tuple[float, float, float]:
+    """``Phi``, ``dPhi/dt`` and the squared axis ratio at time `t` on a path of :func:`path_frame`; writes `axes`.
+
+    On top of that path the body swells evenly: to `volume` times its volume by now, at the rate ``d ln V/dt`` =
+    `growth`.
+    """
+    shape, rate = axes.shape, axes.rate
+    _shape_along(rates, frame, t, volume, growth, shape, rate)
     values, vectors = axes.squares, axes.vectors
     eigensystem(shape, values, vectors)
     rf, d1, d2, d3 = carlson_fd(values[0], values[1], values[2])

@@ -1,13 +1,15 @@
 """Least critical energy and strain at second order, certified as global minima.
 
 On a circular cone ``P1`` is linear and ``P2`` quadratic in the direction ``x``
-(:mod:`flybystab.core.energy.perturbation`). The
-least ``P1^2/(2 P2)`` is the root ``E`` of ``min_x (P1^2 - 2 E P2) = 0`` and the least ``-P1/P2`` the root ``t`` of
-``min_x (-P1 - t P2) = 0``. Each inner minimum is a trust-region problem, whose global solution is known up to
-one scalar root (Moré & Sorensen 1983): nothing is searched, so that no direction can be missed.
+(:mod:`flybystab.core.energy.perturbation`). The least ``P1^2/(2 P2)`` is the root ``E`` of
+``min_x (P1^2 - 2 E P2) = 0`` and the least ``-P1/P2`` the root ``t`` of ``min_x (-P1 - t P2) = 0``. Each inner minimum
+is a trust-region problem, whose global solution is known up to one scalar root (Moré & Sorensen 1983). No search over
+directions is needed.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 
@@ -15,6 +17,78 @@ from flybystab.core.energy.perturbation import Ellipsoid, rate_of_strain, slope_
 from flybystab.core.energy.potential import MASS, energy_derivatives
 from flybystab.core.numerics.jit import kernel
 from flybystab.typing import Array
+
+
+@kernel
+def _inside_ball(values: Array, g: Array, y: Array) -> bool:
+    """Whether the free minimum ``g/values`` lies in the unit ball; writes it into ``y[n]``."""
+    if values[0] <= 0.0:
+        return False
+    inside = 0.0
+    for i in range(g.size):
+        y[i] = g[i] / values[i]
+        inside += y[i] ** 2
+    return inside <= 1.0
+
+
+@kernel
+def _secular_root(values: Array, g: Array, low: float, y: Array) -> None:
+    """Write ``y[n] = g/(values - values[0] + nu)`` of unit length.
+
+    `low` is the square of the part of ``g`` along the lowest eigenvectors, which brackets ``nu`` from below. ``1/|y| -
+    1`` is nearly linear in ``nu``: Newton's method on it, within the bracket.
+    """
+    n = g.size
+    left = np.sqrt(low)
+    right = np.sqrt(np.sum(g * g))
+    nu = left if left > 0.0 else 1e-8 * right
+    for _ in range(100):
+        q = 0.0
+        dq = 0.0
+        for i in range(n):
+            h = values[i] - values[0] + nu
+            q += (g[i] / h) ** 2
+            dq -= 2.0 * g[i] * g[i] / (h * h * h)
+        if q > 1.0:
+            left = nu
+        else:
+            right = nu
+        root = np.sqrt(q)
+        new = nu + 2.0 * q * (1.0 - root) / dq
+        if not (left <= new <= right):
+            new = 0.5 * (left + right)
+        if abs(new - nu) <= 1e-15 * abs(nu) or abs(root - 1.0) < 1e-15:
+            nu = new
+            break
+        nu = new
+    for i in range(n):
+        y[i] = g[i] / (values[i] - values[0] + nu)
+    y /= np.sqrt(np.sum(y * y))
+
+
+@kernel
+def _on_sphere(values: Array, g: Array, size: float, y: Array) -> None:
+    """Write the minimum ``y[n]`` on the unit sphere in the basis of the eigenvectors.
+
+    `size` is the scale of what counts as zero. The lowest eigenvalue may be repeated: in the hard case ``g`` is
+    negligible along all of its eigenvectors.
+    """
+    n = g.size
+    others = 0.0
+    low = 0.0
+    for i in range(n):
+        gap = values[i] - values[0]
+        if gap > 1e-12 * size:
+            others += (g[i] / gap) ** 2
+        else:
+            low += g[i] * g[i]
+    if np.sqrt(low) > 1e-13 * size or others > 1.0:
+        _secular_root(values, g, low, y)
+        return
+    for i in range(n):
+        gap = values[i] - values[0]
+        y[i] = g[i] / gap if gap > 1e-12 * size else 0.0
+    y[0] = np.sqrt(max(0.0, 1.0 - np.sum(y * y)))
 
 
 @kernel
@@ -31,60 +105,9 @@ def trust_region(a: Array, b: Array, ball: bool, x: Array) -> float:
     for i in range(n):
         g[i] = -0.5 * np.sum(vectors[:, i] * b)
         size = max(size, abs(g[i]), abs(values[i]))
-    mu = -1.0
-    if ball and values[0] > 0.0:
-        inside = 0.0
-        for i in range(n):
-            inside += (g[i] / values[i]) ** 2
-        if inside <= 1.0:
-            mu = 0.0
     y = np.zeros(n)
-    if mu == 0.0:
-        for i in range(n):
-            y[i] = g[i] / values[i]
-    else:
-        # the lowest eigenvalue may be repeated: b is negligible along all of its vectors in the hard case
-        tiny = 1e-13 * size
-        others = 0.0
-        low = 0.0
-        for i in range(n):
-            gap = values[i] - values[0]
-            if gap > 1e-12 * size:
-                others += (g[i] / gap) ** 2
-            else:
-                low += g[i] * g[i]
-        if np.sqrt(low) <= tiny and others <= 1.0:
-            for i in range(n):
-                gap = values[i] - values[0]
-                y[i] = g[i] / gap if gap > 1e-12 * size else 0.0
-            y[0] = np.sqrt(max(0.0, 1.0 - np.sum(y * y)))
-        else:
-            # |x(nu)| = 1 with nu = mu + lowest eigenvalue; 1/|x| - 1 is nearly linear in nu
-            left = np.sqrt(low)
-            right = np.sqrt(np.sum(g * g))
-            nu = left if left > 0.0 else 1e-8 * right
-            for _ in range(100):
-                q = 0.0
-                dq = 0.0
-                for i in range(n):
-                    h = values[i] - values[0] + nu
-                    q += (g[i] / h) ** 2
-                    dq -= 2.0 * g[i] * g[i] / (h * h * h)
-                if q > 1.0:
-                    left = nu
-                else:
-                    right = nu
-                root = np.sqrt(q)
-                new = nu + 2.0 * q * (1.0 - root) / dq
-                if not (left <= new <= right):
-                    new = 0.5 * (left + right)
-                if abs(new - nu) <= 1e-15 * abs(nu) or abs(root - 1.0) < 1e-15:
-                    nu = new
-                    break
-                nu = new
-            for i in range(n):
-                y[i] = g[i] / (values[i] - values[0] + nu)
-            y /= np.sqrt(np.sum(y * y))
+    if not (ball and _inside_ball(values, g, y)):
+        _on_sphere(values, g, size, y)
     value = 0.0
     for i in range(n):
         x[i] = np.sum(vectors[i, :] * y)
@@ -112,6 +135,88 @@ def curvature_form(b: Ellipsoid, f: Array) -> None:
             f[j, i] = f[i, j]
 
 
+class SecondOrder(NamedTuple):
+    """``P1 = MASS (stress.x - load)`` and ``P2 = -(x.curvature x + slope.x + constant)`` on a circular cone."""
+
+    stress: Array
+    load: float
+    curvature: Array
+    slope: Array
+    constant: float
+    ball: bool  # whether directions fill the unit ball
+
+
+@kernel
+def _second_order_form(b: Ellipsoid, x: Array) -> SecondOrder:
+    """The two forms; they do not depend on the direction ``x[5]``, on a circular cone."""
+    f = np.empty((6, 6))
+    curvature_form(b, f)
+    g, beta = slope_of_flow(b, x)
+    k = g * b.sin
+    kc = g * b.cohesion
+    stress_term = MASS * beta * ((k - beta) * (b.kappa - b.pressure) - kc)
+    return SecondOrder(
+        b.stress,
+        k * b.pressure + kc,
+        f[:5, :5].copy(),
+        2.0 * beta * f[:5, 5],
+        beta * beta * f[5, 5] - stress_term,
+        b.associative and k > 0.0,
+    )
+
+
+@kernel
+def _powers(form: SecondOrder, x: Array) -> tuple[float, float]:
+    """``P1`` and ``P2`` of a direction."""
+    p1 = MASS * (np.sum(form.stress * x) - form.load)
+    return p1, -(np.sum(x * (form.curvature @ x)) + np.sum(form.slope * x) + form.constant)
+
+
+@kernel
+def _least_energy(form: SecondOrder, best: float, x_least: Array) -> float:
+    """Least ``P1^2/(2 P2)``, from a value of it; writes the direction if another one is lower."""
+    m2 = MASS * MASS
+    a, b, x = np.empty((5, 5)), np.empty(5), np.empty(5)
+    for _ in range(60):
+        for i in range(5):
+            b[i] = -2.0 * m2 * form.load * form.stress[i] + 2.0 * best * form.slope[i]
+            for j in range(5):
+                a[i, j] = m2 * form.stress[i] * form.stress[j] + 2.0 * best * form.curvature[i, j]
+        trust_region(a, b, form.ball, x)
+        p1, p2 = _powers(form, x)
+        if p2 <= 0.0:
+            break
+        new = 0.5 * p1 * p1 / p2
+        if new < best:
+            x_least[:] = x
+        if new >= best * (1.0 - 1e-14):
+            return min(best, new)
+        best = new
+    return best
+
+
+@kernel
+def _least_strain(form: SecondOrder, best: float, x_least: Array) -> float:
+    """Least ``-P1/P2``, from a value of it; writes the direction if another one is lower."""
+    a, b, x = np.empty((5, 5)), np.empty(5), np.empty(5)
+    for _ in range(60):
+        for i in range(5):
+            b[i] = -MASS * form.stress[i] + best * form.slope[i]
+            for j in range(5):
+                a[i, j] = best * form.curvature[i, j]
+        trust_region(a, b, form.ball, x)
+        p1, p2 = _powers(form, x)
+        if p2 <= 0.0:
+            break
+        new = -p1 / p2
+        if new < best:
+            x_least[:] = x
+        if new >= best * (1.0 - 1e-14):
+            return min(best, new)
+        best = new
+    return best
+
+
 @kernel
 def least_second_order(b: Ellipsoid, x_energy: Array, x_strain: Array) -> tuple[float, float, float]:
     """Least critical energy and least critical strain at second order on a circular cone, and greatest ``P2``.
@@ -119,64 +224,15 @@ def least_second_order(b: Ellipsoid, x_energy: Array, x_strain: Array) -> tuple[
     Writes the directions that give them. Dinkelbach's iteration ``E <- P1^2/(2 P2)`` at the minimiser of
     ``P1^2 - 2 E P2`` falls monotonically and superlinearly to the global least value.
     """
-    f = np.empty((6, 6))
-    curvature_form(b, f)
-    g, beta = slope_of_flow(b, x_energy)
-    k = g * b.sin
-    kc = g * b.cohesion
-    load = k * b.pressure + kc
-    stress_term = MASS * beta * ((k - beta) * (b.kappa - b.pressure) - kc)
-    ball = b.associative and k > 0.0
-    a = f[:5, :5].copy()
-    lin = 2.0 * beta * f[:5, 5]
-    con = beta * beta * f[5, 5] - stress_term
+    form = _second_order_form(b, x_energy)
     x = np.empty(5)
-    most = -(trust_region(a, lin, ball, x) + con)
+    most = -(trust_region(form.curvature, form.slope, form.ball, x) + form.constant)
     x_energy[:] = x
     x_strain[:] = x
     if most <= 0.0:
         return np.inf, np.inf, most
-    p1 = MASS * (np.sum(b.stress * x) - load)
+    p1 = MASS * (np.sum(b.stress * x) - form.load)
     if p1 >= 0.0:
         return 0.0, 0.0, most
-    best = 0.5 * p1 * p1 / most
-    m2 = MASS * MASS
-    aa = np.empty((5, 5))
-    bb = np.empty(5)
-    for _ in range(60):
-        for i in range(5):
-            bb[i] = -2.0 * m2 * load * b.stress[i] + 2.0 * best * lin[i]
-            for j in range(5):
-                aa[i, j] = m2 * b.stress[i] * b.stress[j] + 2.0 * best * a[i, j]
-        trust_region(aa, bb, ball, x)
-        p1 = MASS * (np.sum(b.stress * x) - load)
-        p2 = -(np.sum(x * (a @ x)) + np.sum(lin * x) + con)
-        if p2 <= 0.0:
-            break
-        new = 0.5 * p1 * p1 / p2
-        if new < best:
-            x_energy[:] = x
-        if new >= best * (1.0 - 1e-14):
-            best = min(best, new)
-            break
-        best = new
-    p1 = MASS * (np.sum(b.stress * x_strain) - load)
-    strain = -p1 / most
-    for _ in range(60):
-        for i in range(5):
-            bb[i] = -MASS * b.stress[i] + strain * lin[i]
-            for j in range(5):
-                aa[i, j] = strain * a[i, j]
-        trust_region(aa, bb, ball, x)
-        p1 = MASS * (np.sum(b.stress * x) - load)
-        p2 = -(np.sum(x * (a @ x)) + np.sum(lin * x) + con)
-        if p2 <= 0.0:
-            break
-        new = -p1 / p2
-        if new < strain:
-            x_strain[:] = x
-        if new >= strain * (1.0 - 1e-14):
-            strain = min(strain, new)
-            break
-        strain = new
-    return best, strain, most
+    energy = _least_energy(form, 0.5 * p1 * p1 / most, x_energy)
+    return energy, _least_strain(form, -p1 / most, x_strain), most
