@@ -247,6 +247,7 @@ def valid():
         "Covariance": covariance,
         "Covariance.deviations": {"parameters": asteroid.orbit.covariance.values[None]},
         "Covariance.in_units": covariance | {"units": units},
+        "Covariance.nongrav_deviations": {"parameters": asteroid.orbit.covariance.values[None]},
         "Covariance.pushes": {"parameters": asteroid.orbit.covariance.values[None]},
         "Covariance.samples": {"n": 2, "seed": 0},
         "Covariance.states": {"parameters": asteroid.orbit.covariance.values[None]},

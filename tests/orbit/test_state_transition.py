@@ -11,7 +11,7 @@ from reference import need_ephemeris
 import flybystab as fs
 from flybystab.constants import DAY, YEAR
 from flybystab.errors import InvalidInput
-from flybystab.orbit.covariance import PUSHES
+from flybystab.orbit.covariance import NONGRAV_PARAMETERS
 from flybystab.orbit.default_forces import default_forces
 from flybystab.orbit.elements import GM_SUN
 from flybystab.orbit.ephemeris import BODIES, SUN, ephemeris
@@ -118,7 +118,7 @@ def test_derivatives_by_parameters_are_differences_of_orbits():
     window = ephemeris(None).window(EPOCH, 0.0, t)
     values = np.array([*law.a, law.delay, law.area_to_mass])
     steps = np.array([1e-9, 1e-9, 1e-9, 0.1 * DAY, 0.2])
-    for k, name in enumerate(PUSHES):
+    for k, name in enumerate(NONGRAV_PARAMETERS):
         ends = []
         for side in (1.0, -1.0):
             a1, a2, a3, delay, area = values + side * steps[k] * (np.arange(5) == k)

@@ -23,7 +23,7 @@ from flybystab.arguments import check_arguments
 from flybystab.constants import DAY
 from flybystab.encounter.linear_target_plane import disc_probability
 from flybystab.errors import InaccurateOrbit, InvalidInput
-from flybystab.orbit.covariance import PUSHES, Covariance
+from flybystab.orbit.covariance import NONGRAV_PARAMETERS, Covariance
 from flybystab.orbit.deviations import deviated
 from flybystab.orbit.ephemeris import Ephemeris
 from flybystab.orbit.epochs import later, seconds
@@ -56,7 +56,7 @@ class _Line:
                 "covariance", covariance, "a Covariance: the line of variations is that of one"
             )
         self.covariance, self.body, self.eph, self.workers = covariance, body, eph, workers
-        nothing = np.zeros((1, 6)), np.zeros((1, len(PUSHES)))
+        nothing = np.zeros((1, 6)), np.zeros((1, len(NONGRAV_PARAMETERS)))
         self.orbit = deviated(orbit, covariance.epoch, *nothing, "there", eph)[0]
 
     def weak_direction(self, time: Time) -> Array:
@@ -67,11 +67,11 @@ class _Line:
         covariance = self.covariance
         steps = _SMALL * covariance.factor.T
         ahead, back = (covariance.deviations(covariance.values + s * steps) for s in (1.0, -1.0))
-        states, pushes = ((0.5 * (x - y) / _SMALL).T for x, y in zip(ahead, back, strict=True))
+        states, parameters = ((0.5 * (x - y) / _SMALL).T for x, y in zip(ahead, back, strict=True))
         with warnings.catch_warnings():  # a direction does not need the state to a kilometre
             warnings.simplefilter("ignore", InaccurateOrbit)
             change = self.orbit.state_transition(time, self.eph)
-        moved = change.matrix[:3] @ states + change.parameters[:3] @ pushes
+        moved = change.matrix[:3] @ states + change.parameters[:3] @ parameters
         return np.asarray(np.linalg.svd(moved)[2][0])
 
     def encounters(self, z: Array, start: Time, stop: Time, within: float) -> ResultTable:

@@ -7,6 +7,7 @@ linearisation, so that the clones are centred on the orbit.
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -33,13 +34,13 @@ SETS: Mapping[str, tuple[str, ...]] = {
     "cartesian": ("x", "y", "z", "vx", "vy", "vz"),
 }
 #: Non-gravitational parameters that can be estimated with the elements.
-PUSHES = ("A1", "A2", "A3", "DT", "AMRAT")
+NONGRAV_PARAMETERS = ("A1", "A2", "A3", "DT", "AMRAT")
 _SI: Mapping[str, u.UnitBase] = (
     dict.fromkeys(("a", "q", "x", "y", "z"), u.m)
     | dict.fromkeys(("vx", "vy", "vz"), u.m / u.s)
     | dict.fromkeys(("i", "node", "peri", "M", "L"), u.rad)
     | dict.fromkeys(("h", "k", "P", "Q"), u.dimensionless_unscaled)
-    | dict.fromkeys(PUSHES[:3], u.m / u.s**2)
+    | dict.fromkeys(NONGRAV_PARAMETERS[:3], u.m / u.s**2)
     | {"e": u.dimensionless_unscaled, "tp": u.s, "DT": u.s, "AMRAT": u.m**2 / u.kg}
 )
 #: Caveat of a covariance by the printed digits of an orbit, which says nothing of the error of the orbit itself.
@@ -59,7 +60,8 @@ class Covariance:
     epoch : Time
         Epoch of the elements, TDB.
     names : tuple of str
-        The parameters: one of the sets of :data:`SETS`, in any order, and the estimated ones of :data:`PUSHES`.
+        The parameters: one of the sets of :data:`SETS`, in any order, and the estimated ones of
+        :data:`NONGRAV_PARAMETERS`.
     values : ndarray, shape (n,)
         Mean; m, s, rad, m/s, m/s2, m2/kg.
     matrix : ndarray, shape (n, n)
@@ -103,10 +105,10 @@ class Covariance:
         if not (self.correlated or self.caveat):
             object.__setattr__(self, "caveat", "without correlations")
         n = len(self.names)
-        orbital = {name for name in self.names if name not in PUSHES}
+        orbital = {name for name in self.names if name not in NONGRAV_PARAMETERS}
         if len(set(self.names)) != n or not any(orbital == set(s) for s in SETS.values()):
             raise InvalidInput(
-                "names", self.names, f"one of {[*SETS.values()]}, and any of {PUSHES}, each once"
+                "names", self.names, f"one of {[*SETS.values()]}, and any of {NONGRAV_PARAMETERS}, each once"
             )
         if self.values.shape != (n,) or self.matrix.shape != (n, n):
             raise InvalidInput("covariance", self.matrix.shape, f"{n} values and a matrix ({n}, {n})")
@@ -300,7 +302,7 @@ class Covariance:
         covariance: the position of a centre has no error here.
         """
         n = len(self.names)
-        extra = tuple(name for name in PUSHES if name in self.names)
+        extra = tuple(name for name in NONGRAV_PARAMETERS if name in self.names)
         step = np.maximum(1e-2 * self.sigma, 1e-7 * np.abs(self.values))
         step[step == 0.0] = 1e-9
         ways = np.diag(step)
@@ -320,20 +322,27 @@ class Covariance:
         )
 
     @check_arguments
-    def pushes(self, parameters: Array) -> Array:
+    def nongrav_deviations(self, parameters: Array) -> Array:
         """A1, A2, A3 (m/s2), DT (s), AMRAT (m2/kg) less their means, shape (m, 5); zero if not estimated."""
         parameters = self._rows(parameters)
-        out = np.zeros((len(parameters), len(PUSHES)))
-        for j, name in enumerate(PUSHES):
+        out = np.zeros((len(parameters), len(NONGRAV_PARAMETERS)))
+        for j, name in enumerate(NONGRAV_PARAMETERS):
             if name in self.names:
                 at = self.names.index(name)
                 out[:, j] = parameters[:, at] - self.values[at]
         return out
 
+    def pushes(self, parameters: Array) -> Array:
+        """Deprecated name of :meth:`nongrav_deviations`."""
+        warnings.warn("Covariance.pushes is deprecated: use nongrav_deviations", DeprecationWarning, 2)
+        return self.nongrav_deviations(parameters)
+
     @check_arguments
     def deviations(self, parameters: Array) -> tuple[Array, Array]:
         """States and non-gravitational parameters less those of the mean, shapes (m, 6) and (m, 5)."""
-        return self.states(parameters) - self.states(self.values[None, :]), self.pushes(parameters)
+        return self.states(parameters) - self.states(self.values[None, :]), self.nongrav_deviations(
+            parameters
+        )
 
     def __repr__(self) -> str:
         kind = f", {self.caveat}" if self.caveat else ""

@@ -22,7 +22,7 @@ def deviated(
     orbit: Orbit,
     epoch: Time,
     states: Array,
-    pushes: Array,
+    parameters: Array,
     label: str,
     ephemeris: str | Ephemeris | None,
     first: int = 0,
@@ -31,7 +31,7 @@ def deviated(
 
     Parameters
     ----------
-    states, pushes : ndarray, shapes (m, 6) and (m, 5)
+    states, parameters : ndarray, shapes (m, 6) and (m, 5)
         Deviations of the state (m, m/s) and of A1, A2, A3 (m/s2), DT (s), AMRAT (m2/kg).
     label : str
         Their names are this and a number, from `first` on.
@@ -55,7 +55,7 @@ def deviated(
             name=f"{orbit.name} {label} {k}".strip(),
             covariance=None,
         )
-        for k, (ds, da) in enumerate(zip(states, pushes, strict=True), first)
+        for k, (ds, da) in enumerate(zip(states, parameters, strict=True), first)
     )
 
 

@@ -15,7 +15,7 @@ from flybystab.arguments import check_arguments
 from flybystab.errors import Impact, InaccurateOrbit, InvalidInput
 from flybystab.orbit.barycentre import barycentre_in
 from flybystab.orbit.closest_approach import first_contact
-from flybystab.orbit.covariance import PUSHES, Covariance
+from flybystab.orbit.covariance import NONGRAV_PARAMETERS, Covariance
 from flybystab.orbit.default_forces import default_forces, without_itself
 from flybystab.orbit.deviations import deviated
 from flybystab.orbit.ephemeris import BODIES, Ephemeris, Window
@@ -210,12 +210,14 @@ class Orbit(OsculatingState):
         OutOfSpan, Impact
         """
         known = self._known("a covariance at another time").as_state()
-        there = deviated(self, known.epoch, np.zeros((1, 6)), np.zeros((1, len(PUSHES))), "", ephemeris)[0]
+        there = deviated(
+            self, known.epoch, np.zeros((1, 6)), np.zeros((1, len(NONGRAV_PARAMETERS))), "", ephemeris
+        )[0]
         change = there.state_transition(time, ephemeris)
-        extra = [name for name in PUSHES if name in known.names]
+        extra = [name for name in NONGRAV_PARAMETERS if name in known.names]
         full = np.eye(6 + len(extra))
         full[:6, :6] = change.matrix
-        full[:6, 6:] = change.parameters[:, [PUSHES.index(name) for name in extra]]
+        full[:6, 6:] = change.parameters[:, [NONGRAV_PARAMETERS.index(name) for name in extra]]
         matrix = full @ known.matrix @ full.T
         r, v = there.at(time, "sun", ephemeris)
         mean = np.concatenate([r.to_value(u.m), v.to_value(u.m / u.s), known.values[6:]])

@@ -15,7 +15,7 @@ import numpy as np
 from astropy.time import Time
 
 from flybystab.constants import YEAR
-from flybystab.orbit.covariance import PUSHES, Covariance
+from flybystab.orbit.covariance import NONGRAV_PARAMETERS, Covariance
 from flybystab.orbit.deviations import deviated
 from flybystab.orbit.ephemeris import Ephemeris
 from flybystab.orbit.orbit import Orbit
@@ -69,7 +69,7 @@ class Deviations:
     ----------
     orbit : Orbit
         The orbit at the epoch of its covariance.
-    states, pushes : ndarray, shapes (2, n, 6) and (2, n, 5)
+    states, parameters : ndarray, shapes (2, n, 6) and (2, n, 5)
         Differences from the orbit: state (m, m/s, ICRF axes), and A1, A2, A3 (m/s2), DT (s), AMRAT (m2/kg); first
         plus, then minus.
     label : str
@@ -83,7 +83,7 @@ class Deviations:
 
     orbit: Orbit
     states: Array
-    pushes: Array
+    parameters: Array
     label: str
     known: bool = True
     scale: float = 1.0
@@ -102,12 +102,17 @@ def deviations_of(orbit: Orbit, ephemeris: str | Ephemeris | None = None) -> Dev
         out = np.concatenate([_SHIFT * r / np.linalg.norm(r), np.zeros(3)])
         points = np.array([out, -out])[:, None]
         return Deviations(
-            orbit, points, np.zeros((2, 1, len(PUSHES))), "1 m away from the Sun", False, 1.0 / _SHIFT
+            orbit,
+            points,
+            np.zeros((2, 1, len(NONGRAV_PARAMETERS))),
+            "1 m away from the Sun",
+            False,
+            1.0 / _SHIFT,
         )
     there = deviated(
-        orbit, covariance.epoch, np.zeros((1, 6)), np.zeros((1, len(PUSHES))), "there", ephemeris
+        orbit, covariance.epoch, np.zeros((1, 6)), np.zeros((1, len(NONGRAV_PARAMETERS))), "there", ephemeris
     )[0]
     found = [covariance.deviations(covariance.values + sign * covariance.factor.T) for sign in (1.0, -1.0)]
-    states, pushes = (np.array(x) for x in zip(*found, strict=True))
+    states, parameters = (np.array(x) for x in zip(*found, strict=True))
     label = "one sigma in the direction least known" + (f", {covariance.caveat}" if covariance.caveat else "")
-    return Deviations(there, states, pushes, label, covariance.reliable)
+    return Deviations(there, states, parameters, label, covariance.reliable)

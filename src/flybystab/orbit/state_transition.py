@@ -20,7 +20,7 @@ from numba.core.ccallback import CFunc
 from flybystab.core.numerics.jit import CACHE, kernel
 from flybystab.errors import NotConverged
 from flybystab.orbit.callbacks import CALLBACK, Layout, layout, numbers_at, under_way
-from flybystab.orbit.covariance import PUSHES
+from flybystab.orbit.covariance import NONGRAV_PARAMETERS
 from flybystab.orbit.elements import GM_SUN
 from flybystab.orbit.ephemeris import N_ALL, N_BODIES, SUN
 from flybystab.orbit.forces import ForceModel, acceleration_among, bodies, unpacked, with_law
@@ -40,7 +40,7 @@ from flybystab.tabular import Record
 from flybystab.typing import Array
 
 #: Directions of phase space and non-gravitational parameters.
-WAYS = 6 + len(PUSHES)
+WAYS = 6 + len(NONGRAV_PARAMETERS)
 
 
 @kernel
@@ -122,11 +122,11 @@ def _carried(
     effects = np.linalg.norm(effect, axis=1)
     strength = GM_SUN / size[0] ** 2
     scale = np.ones(WAYS)
-    scale[6:] = np.divide(strength, effects, out=np.ones(len(PUSHES)), where=effects > 0.0)
+    scale[6:] = np.divide(strength, effects, out=np.ones(len(NONGRAV_PARAMETERS)), where=effects > 0.0)
     # Position and velocity deviate together: a deviation without acceleration at the start would stop the first step.
     eye = np.eye(3)
     ways = size[:, None] * np.block([[eye, eye], [eye, -eye]])
-    begin = np.hstack([ways, np.zeros((6, len(PUSHES)))])
+    begin = np.hstack([ways, np.zeros((6, len(NONGRAV_PARAMETERS)))])
     memory = np.concatenate([with_law(model, law), scale])
     sim = simulation(start, np.vstack([state, begin.T]), epsilon, memory, _callback())
     sim.integrate(stop)
@@ -195,7 +195,7 @@ def derivatives(
     away = state - sun
     size = _size(away)
     if stop == start:
-        return np.hstack([np.eye(6), np.zeros((6, len(PUSHES)))]), 0.0
+        return np.hstack([np.eye(6), np.zeros((6, len(NONGRAV_PARAMETERS)))]), 0.0
     tight, loose = (_carried(model, law, start, state, away, stop, epsilon) for epsilon in (TIGHT, EPSILON))
     scaled = tight[:, :6] * size / size[:, None]
     error = np.linalg.norm((tight - loose)[:, :6] * size / size[:, None]) / np.linalg.norm(scaled)

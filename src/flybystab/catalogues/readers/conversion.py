@@ -233,10 +233,10 @@ def cartesian_covariance(
 
     Parameters are those of :func:`state_of`; A1, A2, A3 (au/d2), DT (d), AMRAT (m2/kg) may follow the elements.
     """
-    from flybystab.orbit.covariance import PUSHES, SETS, Covariance
+    from flybystab.orbit.covariance import NONGRAV_PARAMETERS, SETS, Covariance
 
-    extra = [n for n in names if n in PUSHES]
-    elements = [n for n in names if n not in PUSHES]
+    extra = [n for n in names if n in NONGRAV_PARAMETERS]
+    elements = [n for n in names if n not in NONGRAV_PARAMETERS]
     middle = np.array(values[: len(elements)], dtype=float)
     jacobian = np.zeros((6 + len(extra), len(names)))
     sigma = np.sqrt(np.diag(matrix))

@@ -19,7 +19,7 @@ from flybystab.constants import DAY, YEAR
 from flybystab.core.numerics.dop853 import N_STAGES
 from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.threads import in_order
-from flybystab.orbit.covariance import PUSHES
+from flybystab.orbit.covariance import NONGRAV_PARAMETERS
 from flybystab.orbit.elements import GM_SUN
 from flybystab.orbit.ephemeris import SUN, Window
 from flybystab.orbit.epochs import seconds
@@ -145,10 +145,10 @@ def spread(
     start = seconds(beside.orbit.epoch, window.epoch)
     if law == NONE:  # no non-gravitational acceleration, but its parameters can have errors
         law = beside.orbit.nongrav.parameters
-    states, pushes = beside.states.reshape(-1, 6), beside.pushes.reshape(-1, len(PUSHES))
+    states, parameters = beside.states.reshape(-1, 6), beside.parameters.reshape(-1, len(NONGRAV_PARAMETERS))
     # Half of the difference of a pair: a column of the root of the covariance, or the shift itself.
     ways = 0.5 * (beside.states[0] - beside.states[1])
-    more = 0.5 * (beside.pushes[0] - beside.pushes[1])
+    more = 0.5 * (beside.parameters[0] - beside.parameters[1])
     active = np.flatnonzero(np.abs(more).max(axis=0))
     displacement = np.full(times.size, np.inf)
     model_error = np.full(times.size, np.inf)
@@ -159,7 +159,7 @@ def spread(
         grid, at = _grid(start, times[rows])
         base = np.full((grid.size, 6), np.nan)
         change = np.full((grid.size, 6, 6 + active.size), np.nan)
-        units = np.eye(len(PUSHES))[active]
+        units = np.eye(len(NONGRAV_PARAMETERS))[active]
         state = beside.orbit.barycentric(window)
         carry_with_deviations(field, law, start, state, grid, _FINE, empty_room(), units, base, change)
         sigma = _along(ways.T, more[:, active].T, change)
@@ -171,7 +171,7 @@ def spread(
         bent = at >= min(wide, default=grid.size)
         if beside.scale == 1.0 and bent.any():  # a shift scaled to a metre is always linear
             displacement[rows[bent]] = _by_points(
-                field, law, window, start, state, states, pushes, grid[at[bent]], tolerance
+                field, law, window, start, state, states, parameters, grid[at[bent]], tolerance
             )
         model_error[rows] = _grown_error(field, law, grid, change, passages, at)
     displacement *= beside.scale
@@ -190,12 +190,12 @@ def _grid(start: float, times: Array) -> tuple[Array, NDArray[np.intp]]:
     return grid, np.searchsorted(np.abs(grid - start), np.abs(times - start))
 
 
-def _along(states: Array, pushes: Array, change: Array) -> Array:
+def _along(states: Array, parameters: Array, change: Array) -> Array:
     """Deviations, shape (n, 6, m), at the times of matrices.
 
     Parameters
     ----------
-    states, pushes : ndarray, shapes (6, m) and (q, m)
+    states, parameters : ndarray, shapes (6, m) and (q, m)
         Deviations at the start: state, and the parameters that have a column in `change`.
     change : ndarray, shape (n, 6, 6 + q)
         What unit deviations at each time have become at the next.
@@ -203,7 +203,7 @@ def _along(states: Array, pushes: Array, change: Array) -> Array:
     out = np.empty((len(change), *states.shape))
     now = states
     for n, matrix in enumerate(change):
-        now = matrix[:, :6] @ now + matrix[:, 6:] @ pushes
+        now = matrix[:, :6] @ now + matrix[:, 6:] @ parameters
         out[n] = now
     return out
 
@@ -223,7 +223,7 @@ def _by_points(
     start: float,
     state: Array,
     states: Array,
-    pushes: Array,
+    parameters: Array,
     times: Array,
     tolerance: float,
 ) -> Array:
@@ -234,8 +234,8 @@ def _by_points(
         carry(field, deviated(law, more), start, state + deviation, times, tolerance, empty_room(), out)
         return out[:, :3]
 
-    base = follow(np.zeros(6), np.zeros(len(PUSHES)))
-    return _largest(np.array([follow(*point) for point in zip(states, pushes, strict=True)]) - base)
+    base = follow(np.zeros(6), np.zeros(len(NONGRAV_PARAMETERS)))
+    return _largest(np.array([follow(*point) for point in zip(states, parameters, strict=True)]) - base)
 
 
 def _largest(gaps: Array) -> Array:
@@ -293,7 +293,7 @@ def _grown_error(
         end = passage.interval + 1
         rest = np.full((1, 6, 6), np.nan)
         there = np.empty((1, 6))
-        nothing = np.zeros((0, len(PUSHES)))
+        nothing = np.zeros((0, len(NONGRAV_PARAMETERS)))
         when = grid[end : end + 1]
         carry_with_deviations(
             field, law, passage.t, passage.state, when, _FINE, empty_room(), nothing, there, rest
