@@ -221,15 +221,16 @@ def sl9(seeds: int, grains: int) -> None:
 def numbers(seeds: int, grains: int) -> None:
     """Outcome of three flybys (Earth, 5 km/s, 6 h prograde) against the number of grains, up to `grains`.
 
-    Mean over the piles with its standard error. Piles of 1,000 grains are half as many, of more a quarter.
+    Mean over the piles with its standard error. Piles of 1,000 grains are half as many, of more a quarter (half at 2.2
+    radii, for the stretch).
     """
     friction = contact_friction(np.deg2rad(35.0))
     print("    q  grains  piles  classes   largest clump     bound             stretch (whole ones)   steps")
     for count in (250, 500, 1000, 2000, 4000):
         if count > grains:
             break
-        piles = max(2, seeds // (1 if count < 1000 else 2 if count < 2000 else 4))
         for q in (1.6, 2.0, 2.2):
+            piles = max(2, seeds // (1 if count < 1000 else 2 if count < 2000 or q == 2.2 else 4))
             case = Case(friction.mu_s, friction.beta, q, 5.0, 6.0, 0.0)
             runs = [run_of(case, seed, count) for seed in range(piles)]
             classes = "".join(sorted(letter(r.largest_fraction, r.bound_fraction) for r in runs))
