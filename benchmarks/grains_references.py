@@ -158,13 +158,26 @@ def literature(seeds: int, grains: int) -> None:
     Walsh & Richardson (2006): primaries of binaries spin in 3.5 to 6 h.
     """
     friction = contact_friction(np.deg2rad(35.0))
-    print("Zhang & Michel (2020)          found")
+    print(
+        "Zhang & Michel (2020): class, largest clump/bound mass/stretch; their shape and spin are not known here"
+    )
+    bodies = (
+        ("6 h", body(6.0)),
+        ("sphere, 4.3 h", body(4.3).with_(semi_axes=[1000, 1000, 1000] * u.m)),
+        ("sphere, no spin", body(0.0).with_(semi_axes=[1000, 1000, 1000] * u.m)),
+    )
     for q, v, expected in ((1.9, 10.0, "deformation"), (1.6, 6.0, "shedding"), (1.3, 2.0, "disruption")):
-        runs = [
-            run_of(Case(friction.mu_s, friction.beta, q, v, 6.0, 0.0), seed, grains) for seed in range(seeds)
-        ]
-        shares = ", ".join(f"{r.largest_fraction:.2f}/{r.stretch:.2f}" for r in runs)
-        print(f"q {q}, v_inf {v:2g}: {expected:12s}  clump/stretch {shares}", flush=True)
+        for name, asteroid in bodies:
+            runs = [
+                one_pile(make_pile(asteroid, grains, seed, friction), asteroid, earth(q, v), np.eye(3), seed)
+                for seed in range(seeds)
+            ]
+            shares = ", ".join(
+                f"{letter(r.largest_fraction, r.bound_fraction)} {r.largest_fraction:.2f}/{r.bound_fraction:.2f}"
+                f"/{r.stretch:.2f}"
+                for r in runs
+            )
+            print(f"q {q}, v_inf {v:2g}: {expected:12s} {name:16s} {shares}", flush=True)
     ellipticity: dict[str, list[float]] = defaultdict(list)
     periods, binaries = [], 0
     for q in (1.2, 1.4, 1.6, 1.8, 2.0, 2.2):
