@@ -20,6 +20,7 @@ TABLES = {
     "grains": "python benchmarks/piles.py grains",
     "grains_agreement": "python benchmarks/grains_agreement.py compare docs/tables/grains_runs.csv "
     "--figure docs/images/grains_agreement.png",
+    "grains_bench": "flybystab bench grains",
     "grains_cases": "python benchmarks/grains_ellipsoid.py cases --cases 1600 --jobs 2",
     "grains_flybys": "python benchmarks/grains_references.py flybys --cases 26",
     "grains_flybys_2": "python benchmarks/grains_references.py flybys --first 26 --seeds 2",
