@@ -217,3 +217,19 @@ def test_the_option_of_the_shell(tmp_path, capsys):
     assert main(["stability", "Itokawa", "--phys", str(path), "--period", "12.1 h"]) == 0
     assert capsys.readouterr().out != first
     assert main(["stability", "Itokawa", "--phys", str(tmp_path / "none")]) == 1
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "unit"),
+    [
+        ("diameter", "340", "m"),
+        ("density", "2000", "kg/m^3"),
+        ("rot_per", "1.27", "d"),
+        ("GM", "4.89", "m^3/s^2"),
+    ],
+)
+def test_other_units_of_jpl_are_refused(tmp_path, name, value, unit):
+    item = {"name": name, "value": value, "sigma": None, "units": unit, "ref": "X"}
+    answer = {"object": {"des": "99942"}, "phys_par": [item]}
+    with pytest.raises(InvalidInput, match=f"unit of {name}"):
+        read_physical(write(tmp_path / "x.json", answer))

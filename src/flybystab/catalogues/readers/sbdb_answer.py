@@ -40,6 +40,10 @@ if TYPE_CHECKING:
 
 _COLUMNS = dict(zip(("a", "e", "i", "om", "w", "ma"), COLUMN_OF.values(), strict=True))
 _LABELS = {"om": "node", "w": "peri"}
+#: Units of the physical parameters of the SBDB.
+_UNITS = {
+    "diameter": "km", "extent": "km", "rot_per": "h", "density": "g/cm^3", "GM": "km^3/s^2", "pole": "deg",
+}  # fmt: skip
 
 
 def from_sbdb_answer(text: str, file: str) -> tuple[dict[str, str], Covariance | None]:
@@ -128,8 +132,18 @@ def _elements(orbit: Mapping[str, Any], elements: Mapping[str, Any], file: str) 
 
 
 def physical(items: Sequence[Mapping[str, Any]], file: str) -> dict[str, str]:
-    """Physical columns of a list of physical parameters, each with its source."""
+    """Physical columns of a list of physical parameters, each with its source.
+
+    Raises
+    ------
+    InvalidInput
+        A value is not a number, or has a unit other than that of the SBDB.
+    """
     given = {str(p.get("name")): p for p in items if p.get("value") not in (None, "")}
+    for name, unit in _UNITS.items():
+        stated = (given.get(name) or {}).get("units")
+        if stated not in (None, "", unit):
+            raise InvalidInput(f"unit of {name}", stated, f"{unit} in {file}")
 
     def source(name: str) -> str:
         return f"JPL SBDB: {str(given[name].get('ref') or 'no reference').strip()}"
