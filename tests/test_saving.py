@@ -11,6 +11,7 @@ import astropy.units as u
 import jsonschema
 import matplotlib
 import numpy as np
+import pandas
 import pytest
 from astropy.table import QTable, Row, Table
 from astropy.time import Time
@@ -218,6 +219,8 @@ def test_saved_and_read(results, name, suffix, tmp_path):
 def test_forms(results, name):
     result = results(name)
     table, frame = QTable(result), result.to_pandas()
+    if isinstance(result, Tabular | Collection):
+        pandas.testing.assert_frame_equal(pandas.DataFrame(result), frame)
     assert table.meta["result"] == name
     rows = len(result) if isinstance(result, Collection) else 1
     assert len(table) == len(frame) == (np.prod(result._grid()) if isinstance(result, Tabular) else rows)

@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import fields, is_dataclass
 from html import escape
 from importlib import import_module
@@ -75,6 +75,11 @@ class Results:
         import pandas
 
         return pandas.DataFrame(saving.flat(self._columns()[0]))
+
+    def _row_iterator(self) -> Iterator[dict[str, Any]]:
+        """The rows of :meth:`to_pandas` as dictionaries: ``pandas.DataFrame(result)`` is made of them."""
+        columns = saving.flat(self._columns()[0])
+        return (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
 
     @check_arguments
     def save(self, path: str | Path, *, overwrite: bool = False) -> Path:
@@ -174,6 +179,10 @@ class Tabular(Results):
 
     #: Names of the leading dimensions, and for each field along one of them that dimension.
     _dimensions: ClassVar[tuple[str, ...]] = ("row",)
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        """Rows as dictionaries, with the unit in each name."""
+        return self._row_iterator()
 
     def __len__(self) -> int:
         visible = (getattr(self, f.name) for f in fields(self) if not self._hidden(f.name))  # type: ignore[arg-type]
@@ -283,6 +292,10 @@ class Collection(Record):
             for name, column in self._rows().items()
         }
         return columns, self._about()
+
+    def __iter__(self) -> Iterator[dict[str, Any]]:
+        """Rows as dictionaries, with the unit in each name."""
+        return self._row_iterator()
 
     def __len__(self) -> int:
         return len(next(iter(self._rows().values())))

@@ -116,7 +116,7 @@ def probability_plot(axes: Any, result: DisruptionRates, planet_name: str = "ear
 
 
 def size_plot(axes: Any, result: DisruptionRates) -> Any:
-    """Plot the cumulative rate of changes against diameter; a single size is shown as a vertical line."""
+    """Plot the cumulative rate of changes against diameter; for bodies of one size the rate is the same below it."""
     sizes = result.samples["diameter"].to_value(u.km)
     if len(sizes) == 0:
         return axes
