@@ -55,7 +55,7 @@ LARGEST, LOOSER = 1e-3, 30.0
 MAX_STEPS = 200_000
 
 
-def step_tolerance(value: Any) -> float:
+def step_tolerance(value: object) -> float:
     """The relative error allowed in a step, checked."""
     return to_si(value, u.dimensionless_unscaled, "tolerance", low=1e-13, high=LARGEST)
 
@@ -65,7 +65,7 @@ def comparison_tolerance(tolerance: float) -> float:
     return LOOSER * tolerance if LOOSER * tolerance <= LARGEST else tolerance / LOOSER
 
 
-def axis_ratio(value: Any) -> float:
+def axis_ratio(value: object) -> float:
     """The largest axis ratio, checked; infinite for no limit."""
     ratio = float(value) if isinstance(value, int | float | np.number) else np.nan
     if not ratio > 1.0:

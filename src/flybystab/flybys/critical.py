@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 from difflib import get_close_matches
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import astropy.units as u
 import numpy as np
@@ -122,7 +122,7 @@ def critical(
     outcome: str = Verdict.INTACT,
     *,
     phases: int = 8,
-    attitude: Any = None,
+    attitude: object = None,
     low: Quantity | None = None,
     high: Quantity | None = None,
     tolerance: float = 1e-3,

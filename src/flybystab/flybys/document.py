@@ -23,10 +23,10 @@ from flybystab.flybys.verdict_margins import VerdictMargins
 from flybystab.saving import DOCUMENT_UNITS, with_unit
 
 
-def plain(value: Any, name: str = "") -> Any:
+def plain(value: object, name: str = "") -> Any:
     """Convert to types of JSON; infinities and nan become null, in a dictionary with their reason."""
     if isinstance(value, dict):
-        out: dict[str, Any] = {}
+        out: dict[str, object] = {}
         for key, entry in value.items():
             out[str(key)] = plain(entry, str(key))
             if isinstance(entry, float | np.floating) and not np.isfinite(entry):
@@ -69,7 +69,7 @@ _INFINITE = {
 }
 
 
-def encounter_document(encounter: Encounter) -> dict[str, Any]:
+def encounter_document(encounter: Encounter) -> dict[str, object]:
     """Document of an encounter."""
     place = encounter.entry_place
     return {
@@ -93,7 +93,9 @@ def encounter_document(encounter: Encounter) -> dict[str, Any]:
     }
 
 
-def flyby_document(result: FlybyResult, sample: SpinSample | None = None, **about: Any) -> dict[str, Any]:
+def flyby_document(
+    result: FlybyResult, sample: SpinSample | None = None, **about: object
+) -> dict[str, object]:
     """Document of a flyby; `about` holds further entries, such as the asteroid, and comes first."""
     error = result.error
     seconds = [
@@ -147,7 +149,7 @@ def flyby_document(result: FlybyResult, sample: SpinSample | None = None, **abou
     return plain(document)
 
 
-def margins_document(margins: VerdictMargins) -> dict[str, Any]:
+def margins_document(margins: VerdictMargins) -> dict[str, object]:
     """Margins of a verdict, and the known properties of a body that has left the range of the model."""
     edge, distance = margins.nearest
     return {
@@ -160,7 +162,7 @@ def margins_document(margins: VerdictMargins) -> dict[str, Any]:
     }
 
 
-def sample_document(sample: SpinSample) -> dict[str, Any]:
+def sample_document(sample: SpinSample) -> dict[str, object]:
     """Quantiles over a sample of attitudes."""
     levels = (0.0, 0.05, 0.5, 0.95, 1.0)
     verdicts, counts = np.unique(sample.verdict, return_counts=True)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import astropy.units as u
 import numpy as np
@@ -38,7 +37,7 @@ class ElasticChange(Record):
 
 
 def elastic_change(
-    body: Body, encounter: Encounter, attitude: Any = None, *, poisson: float = 0.25
+    body: Body, encounter: Encounter, attitude: object = None, *, poisson: float = 0.25
 ) -> ElasticChange:
     """Elastic stress of a body at the start of an encounter and at closest approach.
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 from flybystab.body.body import YIELD_SURFACES, Body, check_settled
 from flybystab.body.pile import Pile
@@ -35,7 +34,7 @@ ROWS = 20_000
 def flyby(
     body: Body | Pile,
     encounter: Encounter,
-    attitude: Any = None,
+    attitude: object = None,
     *,
     tolerance: float = TOLERANCE,
     error: bool = True,

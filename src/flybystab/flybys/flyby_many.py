@@ -194,7 +194,7 @@ def _fail(rows: Any) -> None:
 
 
 def _broadcast(
-    bodies: Any, encounters: Any, attitudes: Any
+    bodies: object, encounters: object, attitudes: object
 ) -> tuple[list[Body], list[Encounter], list[Any] | None]:
     """The arguments as lists; a single body, encounter or rotation is used for all rows."""
     if hasattr(attitudes, "as_matrix"):  # a scipy Rotation, of one or of many

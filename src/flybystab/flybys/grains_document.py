@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import astropy.units as u
 
 from flybystab.flybys.grains_outcome import GrainsOutcome
 
 
-def grains_document(outcome: GrainsOutcome | None) -> dict[str, Any] | None:
+def grains_document(outcome: GrainsOutcome | None) -> dict[str, object] | None:
     """The distribution, the runs and the fragments."""
     if outcome is None:
         return None

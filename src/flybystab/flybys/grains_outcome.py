@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import astropy.units as u
 import numpy as np
@@ -156,7 +156,7 @@ class GrainsOutcome(Collection):
     modelled: tuple[str, ...] = field(repr=False)
     wall_time: Quantity = field(repr=False)
 
-    def _rows(self) -> dict[str, Any]:
+    def _rows(self) -> dict[str, object]:
         tables = [run.to_table() for run in self.runs]
         names = [name for name in tables[0].colnames if name not in ("axes_directions", "wall_time")]
         return {

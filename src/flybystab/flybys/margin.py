@@ -9,7 +9,7 @@ often this prediction is wrong, and in which direction.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import astropy.units as u
 import numpy as np
@@ -95,7 +95,7 @@ class FlybyMargin(Record):
 
 
 def flyby_margin(
-    body: Body, encounter: Encounter, attitude: Any = None, *, dilatancy: float | None = None
+    body: Body, encounter: Encounter, attitude: object = None, *, dilatancy: float | None = None
 ) -> FlybyMargin:
     """The stability margin of an encounter, without the dynamics of the flow.
 

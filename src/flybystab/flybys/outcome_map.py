@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import astropy.units as u
 import numpy as np
@@ -56,7 +56,7 @@ class OutcomeMap(Tabular):
     def _grid(self) -> tuple[int, ...]:
         return self.verdict.shape
 
-    def _columns(self) -> tuple[dict[str, Any], dict[str, Any]]:
+    def _columns(self) -> tuple[dict[str, object], dict[str, object]]:
         columns, meta = super()._columns()
         n, m, k = self._grid()
         phase = np.tile(180.0 * np.arange(k) / k, n * m) * u.deg
@@ -191,7 +191,7 @@ def target_map(
     directions: int = 24,
     on: str | Planet = "earth",
     *,
-    attitude: Any = None,
+    attitude: object = None,
     tolerance: float = 1e-6,
     workers: int | None = None,
     progress: Progressing = None,

@@ -93,7 +93,7 @@ class FlybyResult(Record):
     _run: FlybyRun
     _comparison: FlybyRun | None
     _by_surface: dict[str, Verdict]
-    _changed: dict[str, Any]
+    _changed: dict[str, object]
 
     def __init__(
         self,
@@ -101,8 +101,8 @@ class FlybyResult(Record):
         _run: FlybyRun,
         _comparison: FlybyRun | None = None,
         _by_surface: Mapping[str, Verdict] | None = None,
-        _changed: Mapping[str, Any] | None = None,
-        **changes: Any,
+        _changed: Mapping[str, object] | None = None,
+        **changes: object,
     ) -> None:
         found = self.__dict__
         changed = {**(_changed or {}), **changes}
@@ -311,7 +311,7 @@ class FlybyResult(Record):
             return None
         return "path" if self.encounter.impact else "body"
 
-    def _columns(self) -> tuple[dict[str, Any], dict[str, Any]]:
+    def _columns(self) -> tuple[dict[str, Any], dict[str, object]]:
         values = {name: getattr(self, name) for name in _COLUMNS}
         row = {
             name: value[None] if isinstance(value, Quantity) else np.asarray(value)[None]

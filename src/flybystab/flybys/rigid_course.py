@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import astropy.units as u
 import numpy as np
@@ -106,7 +105,7 @@ class Course:
 
 
 def rigid_course(
-    body: Body, encounter: Encounter, attitude: Any = None, *, tolerance: float = 1e-10
+    body: Body, encounter: Encounter, attitude: object = None, *, tolerance: float = 1e-10
 ) -> Course:
     """Course of a body that stays rigid.
 
@@ -160,7 +159,7 @@ def rigid_course(
     )
 
 
-def check_tension(body: Body, encounter: Encounter, attitude: Any = None) -> None:
+def check_tension(body: Body, encounter: Encounter, attitude: object = None) -> None:
     """Raise NotModelled for a body with a tension cut-off that yields in an encounter: its flow is not modelled."""
     if not body.material.cut_off:
         return

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import astropy.units as u
 import numpy as np
@@ -83,7 +82,7 @@ def surface_verdicts(inputs: FlybyInputs, run: FlybyRun, everything: bool = Fals
     return verdicts
 
 
-def phases_of(value: Any) -> int:
+def phases_of(value: object) -> int:
     """Number of spin phases for a value of ``robustness=``: 0 for False, 8 for True."""
     if isinstance(value, bool | np.bool_):
         return PHASES if value else 0

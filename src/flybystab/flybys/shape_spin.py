@@ -9,7 +9,6 @@ error of the equivalent ellipsoid. It is of the order of the radius over the dis
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import astropy.units as u
 import numpy as np
@@ -108,7 +107,7 @@ class ShapeSpin(Record):
 
 
 def shape_spin(
-    body: Body, encounter: Encounter, attitude: Any = None, *, shape: Shape, error: float = 1e-6
+    body: Body, encounter: Encounter, attitude: object = None, *, shape: Shape, error: float = 1e-6
 ) -> ShapeSpin:
     """Rotation of a rigid shape through an encounter.
 

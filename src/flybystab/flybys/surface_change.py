@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import astropy.units as u
 import numpy as np
 
@@ -18,7 +16,12 @@ from flybystab.flybys.rigid_course import rigid_course
 
 
 def surface_change(
-    body: Body, encounter: Encounter, attitude: Any = None, *, count: int = 4000, shape: Shape | None = None
+    body: Body,
+    encounter: Encounter,
+    attitude: object = None,
+    *,
+    count: int = 4000,
+    shape: Shape | None = None,
 ) -> SlopeChange:
     """Slopes over the surface of a body that stays rigid, from before an encounter to after it.
 

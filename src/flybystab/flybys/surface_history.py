@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import astropy.units as u
 import numpy as np
@@ -28,7 +27,7 @@ INSTANTS = 200
 
 
 def surface_history(
-    body: Body, encounter: Encounter, attitude: Any = None, *, shape: Shape, instants: int = INSTANTS
+    body: Body, encounter: Encounter, attitude: object = None, *, shape: Shape, instants: int = INSTANTS
 ) -> SurfaceHistory:
     """Slope and effective acceleration of every facet of a rigid shape through an encounter.
 
@@ -78,7 +77,7 @@ class LobeHistory(Record):
     time: Quantity
 
 
-def lobe_history(body: Body, encounter: Encounter, attitude: Any = None, *, shape: Shape) -> LobeHistory:
+def lobe_history(body: Body, encounter: Encounter, attitude: object = None, *, shape: Shape) -> LobeHistory:
     """Roche lobes of a shape before an encounter, at closest approach and after it (arguments: `surface_history`)."""
     check_shape(shape, body)
     course = rigid_course(body, encounter, attitude)

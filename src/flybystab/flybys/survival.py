@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import astropy.units as u
 import numpy as np
@@ -92,7 +91,7 @@ def survival(
     distribution: EncounterDistribution,
     *,
     seed: int = 0,
-    attitude: Any = None,
+    attitude: object = None,
     material: Material | None = None,
     tolerance: float = 1e-6,
     workers: int | None = None,
