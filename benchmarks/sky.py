@@ -1,7 +1,11 @@
-"""Effect of each force on the 2029 encounter of Apophis, as a table.
+"""Effect of each force on the 2029 encounter of Apophis, and of two forces on JPL's close approaches of 2020.
 
-Usage: ``python benchmarks/sky.py apophis``. Reference data are read from ``../shared/data`` (or
+Usage: ``python benchmarks/sky.py [apophis | forces | routes]``. Reference data are read from ``../shared/data`` (or
 ``$FLYBYSTAB_SHARED/data``); nothing is downloaded. Accuracy and speed over many asteroids: ``flybystab bench sky``.
+
+``forces`` integrates the orbits of the list of close approaches of January to June 2020 with ASSIST (extra ``assist``),
+with all bodies and with the Sun alone as sources of relativity, with and without the flattening of the Earth.
+``routes`` compares the list with ``Orbit.at`` and ``Encounter.from_orbit``, which integrate by IAS15.
 """
 
 from __future__ import annotations
@@ -11,8 +15,10 @@ import os
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import astropy.units as u
+import numpy as np
 from astropy.time import Time
 
 from flybystab.encounter.encounter import Encounter
@@ -91,9 +97,101 @@ def apophis(folder: Path = DATA) -> list[tuple[str, str, float, float, float]]:
     return rows
 
 
+def forces() -> None:
+    """Distances of the list by ASSIST, with and without two forces."""
+    from flybystab.bench import jpl, oracle
+
+    if reason := oracle.missing():
+        raise SystemExit(reason)
+    known = jpl.orbits()
+    events = [e for e in jpl.read(jpl.APPROACHES) if e["des"] in known]
+    there = oracle.Oracle(jpl.SPAN[0])
+    variants = {
+        "all, J2": (oracle.ALL_SOURCES, True),
+        "Sun, J2": (oracle.SUN_ALONE, True),
+        "all, no J2": (oracle.ALL_SOURCES, False),
+    }
+    off = {
+        label: np.array([_off(there, known[e["des"]][0], e, *how) for e in events])
+        for label, how in variants.items()
+    }
+    print(
+        "JPL close approaches of 2020 January to June by ASSIST; sources of relativity, J2 to J4 of the Earth"
+    )
+    print(f"{'model':12} {'events':>6} {'median (km)':>11} {'p99 (km)':>9} {'off by > 1 km':>13}")
+    for label, km in off.items():
+        size = np.abs(km)
+        median, p99 = np.percentile(size, [50, 99])
+        print(f"{label:12} {size.size:6d} {median:11.4f} {p99:9.4f} {(size > 1.0).sum():13d}")
+    full = off["all, J2"]
+    for label in ("Sun, J2", "all, no J2"):
+        moved = full - off[label]
+        some = np.flatnonzero((np.abs(moved) > 0.15) & (np.abs(full) < 20.0))
+        print(f"\nevents that change by more than 0.15 km between 'all, J2' and '{label}'")
+        print(f"{'asteroid':12} {'time (TDB)':18} {'off, all, J2 (km)':>18} {'off, ' + label + ' (km)':>22}")
+        for k in some[np.argsort(-np.abs(moved[some]))]:
+            event = events[k]
+            print(f"{event['des']:12} {event['cd']:18} {full[k]:18.3f} {off[label][k]:22.3f}")
+        print(
+            f"{'median size':31} {np.median(abs(full[some])):18.3f} {np.median(abs(off[label][some])):22.3f}"
+        )
+
+
+def routes(every: int = 10) -> None:
+    """Distances of the list by ``Orbit.at``; by ``Encounter.from_orbit`` for some rows and those off by over 1 km."""
+    from flybystab.bench import jpl
+
+    known = jpl.orbits()
+    events = [e for e in jpl.read(jpl.APPROACHES) if e["des"] in known]
+    unit = u.au.to(u.km)
+    off = np.full((2, len(events)), np.nan)
+    used = np.zeros(2)
+    for k, event in enumerate(events):
+        orbit, near = known[event["des"]][0], Time(float(event["jd"]), format="jd", scale="tdb")
+        begin = time.process_time()
+        r, v = (x.to_value(w) for x, w in zip(orbit.at(near, "earth"), (u.km, u.km / u.s), strict=True))
+        off[0, k] = np.linalg.norm(r - (r @ v) / (v @ v) * v) - float(event["dist"]) * unit
+        used[0] += time.process_time() - begin
+        if k % every == 0 or abs(off[0, k]) > 1.0:
+            begin = time.process_time()
+            found = Encounter.from_orbit(orbit, "earth", near, search=1 * u.d, within=0.6 * u.au)
+            off[1, k] = found.distance.to_value(u.km) - float(event["dist"]) * unit
+            used[1] += time.process_time() - begin
+    print(
+        "JPL close approaches of 2020 January to June by the integrations with IAS15, best ephemeris installed"
+    )
+    print(
+        f"{'route':22} {'events':>6} {'median (km)':>11} {'p99 (km)':>9} {'off by > 1 km':>13} {'ms each':>8}"
+    )
+    for label, km, cost in zip(("Orbit.at", "Encounter.from_orbit"), off, used, strict=True):
+        size = np.abs(km[np.isfinite(km)])
+        median, p99 = np.percentile(size, [50, 99])
+        far = int((size > 1.0).sum())
+        print(f"{label:22} {size.size:6d} {median:11.4f} {p99:9.4f} {far:13d} {1e3 * cost / size.size:8.1f}")
+    print(f"\n{'asteroid':12} {'time (TDB)':18} {'at (km)':>9} {'from_orbit (km)':>15}")
+    for k in np.flatnonzero((np.abs(off) > 1.0).any(axis=0)):
+        print(f"{events[k]['des']:12} {events[k]['cd']:18} {off[0, k]:9.3f} {off[1, k]:15.3f}")
+
+
+def _off(there: Any, orbit: Orbit, event: dict[str, str], sources: int, flattening: bool) -> float:
+    """Least distance by ASSIST less that of the list, km; the path is straight from the listed time on."""
+    time_listed = Time(float(event["jd"]), format="jd", scale="tdb")
+    sim, extras = there.simulation(orbit, time_listed, 1e-9)
+    extras.gr_eih_sources = sources
+    if not flattening:
+        extras.forces = [name for name in extras.forces if name != "EARTH_HARMONICS"]
+    t = there.days(time_listed)
+    sim.integrate(t)
+    earth, p = there.ephem.get_particle("earth", t), sim.particles[0]
+    r = np.array([p.x - earth.x, p.y - earth.y, p.z - earth.z])
+    v = np.array([p.vx - earth.vx, p.vy - earth.vy, p.vz - earth.vz])
+    least = np.linalg.norm(r - (r @ v) / (v @ v) * v)
+    return float(least - float(event["dist"])) * u.au.to(u.km)
+
+
 def main(arguments: list[str]) -> int:
-    known = {"apophis": apophis}
-    for name in arguments or list(known):
+    known = {"apophis": apophis, "forces": forces, "routes": routes}
+    for name in arguments or ["apophis"]:
         if name not in known:
             print(f"unknown table {name!r}; known: {', '.join(known)}", file=sys.stderr)
             return 2

@@ -34,6 +34,8 @@ def test_the_tables(monkeypatch, tmp_path):
     odd = [r for r in rows if r["table"] == "outlier"]
     assert {r["asteroid"] for r in odd} >= {"2020 CR2"}
     for row in odd:
+        assert row["displacement_at_epoch_km"] * row["growth"] == pytest.approx(abs(row["distance_error_km"]))
+        assert row["error_without_earth_j2_km"] == pytest.approx(row["distance_error_km"], abs=1.0)
         if row["asteroid"] == "2020 CR2" and not oracle.missing():
             assert row["error_of_assist_km"] == pytest.approx(row["distance_error_km"], abs=0.5)
     fine, coarse = [r for r in rows if r["table"] == "speed" and r["code"] == "flybystab"]

@@ -44,7 +44,7 @@ def test_the_same_passages(orbits, theirs):
     for i, (name, found) in enumerate(zip(NAMES, theirs, strict=True)):
         mine = table[table["index"] == i]
         days = (mine["time"] - SPAN[0]).jd
-        # before the passage of 2029 nothing is amplified; ASSIST leaves out the planets' part of relativity
+        # before the passage of 2029 nothing is amplified; ASSIST has the Earth's pole of J2000
         early = (
             found[:, 0] < (Time("2029-04-14", scale="tdb") - SPAN[0]).jd if name == "Apophis" else slice(None)
         )

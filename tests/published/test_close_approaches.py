@@ -10,6 +10,8 @@ from astropy.time import Time
 from reference import need_ephemeris, sbdb_orbit
 
 from flybystab.encounter.encounter import Encounter
+from flybystab.orbit.ephemeris import BODIES, ephemeris
+from flybystab.orbit.forces import FORCES
 from flybystab.orbit.search.encounter_finder import find_encounters
 
 #: Passages so slow that the Sun decides when they are closest.
@@ -81,3 +83,46 @@ def test_rows_whose_listed_time_is_not_the_minimum(shared):
         assert abs(gap) < 0.1, row["des"]
         late = (-(position @ velocity) / (velocity @ velocity)).to_value(u.s)
         assert abs(late) > 1500.0, row["des"]
+
+
+@pytest.fixture(scope="module")
+def near_their_epoch(shared):
+    """2018 PV24 and 2017 FS102, which pass the Earth days after the epoch of their elements: orbit and listed row."""
+    names = ("2018 PV24", "2017 FS102")
+    with gzip.open(shared / "cad_earth_2020_jan_jun.csv.gz", "rt") as file:
+        rows = {r["des"]: r for r in csv.DictReader(file) if r["des"] in names}
+    with gzip.open(shared / "nea_sbdb_fullprec_2020-09.csv.gz", "rt") as file:
+        known = {r["pdes"]: sbdb_orbit(r) for r in csv.DictReader(file) if r["pdes"] in names}
+    return {name: (known[name], rows[name]) for name in names}
+
+
+def off(orbit, row, **how):
+    """Distance less that of the list (km), and growth."""
+    near = Time(float(row["jd"]), format="jd", scale="tdb")
+    table = find_encounters(
+        orbit, near - 5 * u.d, near + 5 * u.d, within=0.5 * u.au, ephemeris="de440", growth=True, **how
+    )
+    assert len(table) == 1
+    return (table["distance"][0] - float(row["dist"]) * u.au).to_value(u.km), table["growth"][0]
+
+
+def test_the_listed_2018_pv24_lacks_the_flattening_of_the_earth(near_their_epoch):
+    """A passage at 454,000 km six days after the epoch enlarges its effect to 6 km in 2020."""
+    need_ephemeris("de440")
+    orbit, row = near_their_epoch["2018 PV24"]
+    assert abs(off(orbit, row)[0]) > 5.0
+    assert abs(off(orbit, row, forces=tuple(f for f in FORCES if f != "earth J2"))[0]) < 0.5
+
+
+def test_2017_fs102_differs_by_less_than_the_ephemerides(near_their_epoch):
+    """1.8 km after 2.9 years are 14 m at the epoch; DE421 and DE440 place the Earth 200 m apart there."""
+    need_ephemeris("de440")
+    orbit, row = near_their_epoch["2017 FS102"]
+    gap, growth = off(orbit, row)
+    places = []
+    for name in ("de421", "de440"):
+        window = ephemeris(name).window(orbit.epoch, -1.0, 1.0)
+        earth, sun = (window.states(BODIES.index(body), np.zeros(1))[0, :3] for body in ("earth", "sun"))
+        places.append(earth - sun)
+    assert 1.0 < abs(gap) < 3.0
+    assert abs(gap) / growth < 0.1 * np.linalg.norm(places[1] - places[0]) / 1e3

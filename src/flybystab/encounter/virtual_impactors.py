@@ -10,92 +10,31 @@ be found.
 
 from __future__ import annotations
 
-import warnings
 from typing import Any
 
 import astropy.units as u
 import numpy as np
-from astropy.table import QTable
 from astropy.time import Time
 from astropy.units import Quantity
 
 from flybystab.arguments import check_arguments
-from flybystab.constants import DAY
+from flybystab.encounter.line_of_variations import TOGETHER, LineOfVariations
 from flybystab.encounter.linear_target_plane import disc_probability
-from flybystab.errors import InaccurateOrbit, InvalidInput
-from flybystab.orbit.covariance import NONGRAV_PARAMETERS, Covariance
-from flybystab.orbit.deviations import deviated
+from flybystab.errors import InvalidInput
 from flybystab.orbit.ephemeris import Ephemeris
 from flybystab.orbit.epochs import later, seconds
 from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.planets import Planet, planet
-from flybystab.orbit.search.encounter_finder import find_encounters
 from flybystab.orbit.target_plane import capture_radius
 from flybystab.progress import Progressing, progress_bar
 from flybystab.result_table import ResultTable
 from flybystab.typing import Array
 from flybystab.units import checked_time, to_si, whole
 
-#: Encounters of consecutive orbits belong together if they are less than this apart, s.
-_TOGETHER = 10.0 * DAY
 #: Orbits of a refinement, and how often it is repeated at most.
 _GRID, _ROUNDS = 9, 14
-#: Deviations of the elements from which those of the state follow, in standard deviations.
-_SMALL = 1e-2
 #: Displacement on the target plane of the differences for M, over the radius of the disc.
 _STEP = 0.2
-
-
-class _Line:
-    """Orbits of standard normal variables z, and their encounters with one planet."""
-
-    def __init__(self, orbit: Orbit, body: Planet, eph: str | Ephemeris | None, workers: int | None) -> None:
-        covariance = orbit.covariance
-        if not isinstance(covariance, Covariance):
-            raise InvalidInput(
-                "covariance", covariance, "a Covariance: the line of variations is that of one"
-            )
-        self.covariance, self.body, self.eph, self.workers = covariance, body, eph, workers
-        nothing = np.zeros((1, 6)), np.zeros((1, len(NONGRAV_PARAMETERS)))
-        self.orbit = deviated(orbit, covariance.epoch, *nothing, "there", eph)[0]
-
-    def weak_direction(self, time: Time) -> Array:
-        """Direction of largest uncertainty of the position at `time`, a unit vector of the standard normal variables.
-
-        By the state transition matrix of the orbit.
-        """
-        covariance = self.covariance
-        steps = _SMALL * covariance.factor.T
-        ahead, back = (covariance.deviations(covariance.values + s * steps) for s in (1.0, -1.0))
-        states, parameters = ((0.5 * (x - y) / _SMALL).T for x, y in zip(ahead, back, strict=True))
-        with warnings.catch_warnings():  # a direction does not need the state to a kilometre
-            warnings.simplefilter("ignore", InaccurateOrbit)
-            change = self.orbit.state_transition(time, self.eph)
-        moved = change.matrix[:3] @ states + change.parameters[:3] @ parameters
-        return np.asarray(np.linalg.svd(moved)[2][0])
-
-    def encounters(self, z: Array, start: Time, stop: Time, within: float) -> ResultTable:
-        """Encounters of the orbits of z, shape (m, n)."""
-        parameters = self.covariance.values + z @ self.covariance.factor.T
-        if not self.covariance._possible(parameters).all():
-            raise InvalidInput("sigmas", "an orbit that is not a conic", "a shorter line of variations")
-        found = self.covariance.deviations(parameters)
-        orbits = deviated(self.orbit, self.covariance.epoch, *found, "variation", self.eph)
-        table = find_encounters(
-            orbits, start, stop, [self.body.name], within * u.m, ephemeris=self.eph, workers=self.workers
-        )
-        return table[table["planet"] == self.body.name]
-
-    def near(self, z: Array, time: Time, within: float) -> Array:
-        """Time (s from `time`), distance (m), b (m), v_inf (m/s) of the encounter nearest to a time; nan without."""
-        table = self.encounters(z, later(time, -_TOGETHER), later(time, _TOGETHER), within)
-        out = np.full((len(z), 5), np.nan)
-        late = np.array([seconds(t, time) for t in table["time"]])
-        for row in np.argsort(-np.abs(late)):
-            one = table[row]
-            place = [one[k].to_value(u.m) for k in ("distance", "b_t", "b_r")]
-            out[one["index"]] = late[row], *place, one["v_inf"].to_value(u.m / u.s)
-        return out
 
 
 @check_arguments
@@ -158,8 +97,8 @@ def virtual_impactors(
     reach = to_si(within, u.m, "within", low=0.0, open_low=True)
     if not 0.0 < float(sigmas) <= 10.0:
         raise InvalidInput("sigmas", sigmas, "a number in (0, 10]")
-    line = _Line(path, body, ephemeris, workers)
-    way = line.weak_direction(stop)
+    line = LineOfVariations(path, body, start, stop, float(sigmas), ephemeris, workers)
+    way = line.way
     grid = np.linspace(-float(sigmas), float(sigmas), count)
     table = line.encounters(grid[:, None] * way, start, stop, reach)
     rows, minima = [], _minima(table, count)
@@ -188,7 +127,7 @@ def virtual_impactors(
     return out
 
 
-def _minima(table: QTable, count: int) -> list[tuple[int, Time]]:
+def _minima(table: ResultTable, count: int) -> list[tuple[int, Time]]:
     """Orbits (number, time) at a local minimum of distance among the encounters that belong together.
 
     Minima from which the distance rises so slowly that it cannot reach zero between two orbits are left out.
@@ -204,7 +143,7 @@ def _minima(table: QTable, count: int) -> list[tuple[int, Time]]:
         beside = []
         for k in (index[row] - 1, index[row] + 1):
             rows = rows_of[k] if 0 <= k < count else np.zeros(0, dtype=int)
-            near = rows[np.abs(t[rows] - t[row]) < _TOGETHER]
+            near = rows[np.abs(t[rows] - t[row]) < TOGETHER]
             if near.size:
                 beside.append(float(d[near[np.argmin(np.abs(t[near] - t[row]))]]))
         if beside and (d[row] > min(beside) or d[row] > 1e9 + 2.0 * max(abs(x - d[row]) for x in beside)):
@@ -214,7 +153,7 @@ def _minima(table: QTable, count: int) -> list[tuple[int, Time]]:
 
 
 def _impact(
-    line: _Line, way: Array, sigma: float, spacing: float, time: Time, reach: float
+    line: LineOfVariations, way: Array, sigma: float, spacing: float, time: Time, reach: float
 ) -> dict[str, Any] | None:
     """The possible impact around a minimum of distance along the line; None where the encounter is lost."""
     half = spacing
