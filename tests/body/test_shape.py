@@ -292,3 +292,9 @@ def test_gravity_at_the_facets_of_an_ellipsoid_is_the_closed_form():
     error = np.linalg.norm(acceleration.value - exact, axis=1) / np.linalg.norm(exact, axis=1)
     assert np.median(error) < 2e-3
     assert error.max() < 1e-2
+
+
+@pytest.mark.parametrize("facets", [2**70, 1_000_001])
+def test_shapes_of_too_many_facets_are_refused(facets):
+    with pytest.raises(InvalidInput, match="at most 1,000,000"):
+        fs.Shape.from_ellipsoid(AXES * u.m, facets=facets)

@@ -7,6 +7,7 @@ from astropy.table import QTable
 from matplotlib.figure import Figure
 
 import flybystab as fs
+from flybystab.errors import InvalidInput
 from flybystab.plots.population import (
     contributor_plot,
     population_figure,
@@ -62,6 +63,8 @@ def test_bars_of_the_largest_contributors(result):
     assert bars == pytest.approx(most["rate"].to_value(1 / u.Myr)[::-1])
     names = [t.get_text() for t in drawn.get_yticklabels()]
     assert names == [["inner", "outer"][k] for k in most["orbit"]][::-1]
+    with pytest.raises(InvalidInput, match="names = 0 names: expected one name a row"):
+        contributor_plot(axes(), result, [])
 
 
 def test_the_page_has_five_panels_and_a_scale(result, tmp_path):

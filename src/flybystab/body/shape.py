@@ -27,6 +27,8 @@ Integers = NDArray[np.int64]
 
 #: Facets of shapes that are made in code, by default.
 FACETS = 4000
+#: Largest number of facets of a generated shape, for the memory that it takes.
+MOST_FACETS = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -405,7 +407,9 @@ def _sphere(facets: int) -> tuple[Array, Integers]:
     """Unit vectors of a Fibonacci lattice and the triangles of their convex hull, about `facets` of them."""
     from scipy.spatial import ConvexHull
 
-    count = whole(facets, "facets", 20) // 2 + 2
+    if whole(facets, "facets", 20) > MOST_FACETS:
+        raise InvalidInput("facets", facets, f"at most {MOST_FACETS:,}")
+    count = facets // 2 + 2
     i = np.arange(count) + 0.5
     z = 1.0 - 2.0 * i / count
     longitude = np.pi * (1.0 + np.sqrt(5.0)) * i

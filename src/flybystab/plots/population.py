@@ -144,8 +144,17 @@ def contributor_plot(axes: Any, result: DisruptionRates, names: Sequence[str] | 
     result : DisruptionRates
     names : sequence of str, optional
         Of the rows of the population; their numbers by default.
+
+    Raises
+    ------
+    InvalidInput
+        Fewer names than rows of the population that contribute.
     """
     most = result.contributors()[::-1]
+    if names is not None and len(most) and len(names) <= (last := int(np.max(most["orbit"]))):
+        raise InvalidInput(
+            "names", f"{len(names)} names", f"one name a row of the population, more than {last}"
+        )
     rate = most["rate"].to_value(1 / u.Myr)
     label = [f"row {k}" if names is None else str(names[int(k)]) for k in most["orbit"]]
     axes.barh(
