@@ -1,7 +1,8 @@
 """Attacks on the reliability of runs and of public functions: what was tried, survived and lost.
 
 python benchmarks/attack.py journal [N]    bits of a journal flipped: is the table of the continued run the same?
-python benchmarks/attack.py power [N]      journal and tables cut at any byte, as a power cut leaves them; cost of fsync
+python benchmarks/attack.py power [N]      journal and tables cut at any byte, as a power cut leaves them; the cost
+python benchmarks/attack.py cost           time of fsync and of the checksum per record of the journal
 python benchmarks/attack.py fuzz [N]       N calls of every public function with valid and invalid arguments
 python benchmarks/attack.py bombs          files that are too large, too deep or too long
 python benchmarks/attack.py table [N]      all of these, N calls of every function and the tests of each kind of attack:
@@ -11,6 +12,7 @@ python benchmarks/attack.py table [N]      all of these, N calls of every functi
 from __future__ import annotations
 
 import gzip
+import json
 import random
 import re
 import shutil
@@ -110,20 +112,32 @@ def cut_tables(n: int) -> Counter[str]:
 
 
 def cost() -> None:
-    """Time per record of the journal."""
+    """Time per record of the journal, and that of its checksum."""
     record = {"rows": [{f"column {k}": 1.0 / (k + 1) for k in range(45)}], "samples": []}
     for interval, n in ((1e9, 5000), (journals.SYNC_INTERVAL, 5000), (0.0, 500)):
         journals.SYNC_INTERVAL = interval
         with tempfile.TemporaryDirectory(dir=".") as folder:
             journal = journals.Journal(Path(folder) / "j", {"run": "cost"})
-            began = time.perf_counter()
+            began, spent = time.perf_counter(), time.process_time()
             for k in range(n):
                 journal.add(k, record)
             journal.sync()
-            spent = (time.perf_counter() - began) / n
+            wall, processor = (time.perf_counter() - began) / n, (time.process_time() - spent) / n
             journal.close(remove=True)
-        print(f"fsync at most every {interval:g} s: {1e6 * spent:.0f} us per record")
+        print(
+            f"fsync at most every {interval:g} s: {1e6 * wall:.0f} us per record, "
+            f"{1e6 * processor:.0f} us of processor time"
+        )
     journals.SYNC_INTERVAL = 1.0
+    with tempfile.TemporaryDirectory(dir=".") as folder:
+        journal = journals.Journal(Path(folder) / "j", {"run": "cost"})
+        body = json.dumps({"task": 1, **record}).encode()
+        spent = time.process_time()
+        for _ in range(5000):
+            journal._checksum(body)
+        spent = (time.process_time() - spent) / 5000
+        journal.close(remove=True)
+    print(f"checksum of {len(body)} bytes: {1e6 * spent:.1f} us of processor time")
 
 
 def fuzz(n: int) -> Counter[str]:
@@ -296,6 +310,8 @@ def main() -> None:
     elif kind == "power":
         print("journal:", dict(damaged(n or 60, cut)))
         print("table:", dict(cut_tables(n or 500)))
+        cost()
+    elif kind == "cost":
         cost()
     elif kind == "fuzz":
         fuzz(n or 200)

@@ -2,6 +2,9 @@
 
 import json
 import os
+import shutil
+import subprocess
+import sys
 
 import astropy.units as u
 import numpy as np
@@ -127,10 +130,32 @@ def test_bad_outputs_are_found_before_work(tmp_path, monkeypatch):
     monkeypatch.undo()
     assert check_output(tmp_path / "x.ecsv").name == "x.ecsv"
     assert not (tmp_path / "x.ecsv").exists()
-    if os.getuid():
-        tmp_path.chmod(0o500)
-        with pytest.raises(InvalidInput, match="can be written"):
-            check_output(tmp_path / "x.ecsv")
+
+
+@pytest.mark.skipif(os.name != "posix", reason="permissions of POSIX")
+def test_a_folder_that_the_user_cannot_write_to_is_named(tmp_path):
+    # root may write everywhere: a process without that capability stands for a user
+    user = []
+    if os.geteuid() == 0:
+        if shutil.which("setpriv") is None:
+            pytest.skip("root, without setpriv to give up its rights")
+        user = ["setpriv", "--bounding-set", "-dac_override,-dac_read_search"]
+    script = (
+        "import sys\nfrom flybystab.screening.table_files import check_output\n"
+        "try:\n    check_output(sys.argv[1])\nexcept Exception as error:\n    print(type(error).__name__, error)"
+    )
+    closed = tmp_path / "closed"
+    closed.mkdir()
+    (closed / "old.ecsv").write_text("")
+    (closed / "old.ecsv").chmod(0o400)
+    for mode, name in ((0o500, "x.ecsv"), (0o700, "old.ecsv")):
+        closed.chmod(mode)
+        done = subprocess.run(
+            [*user, sys.executable, "-c", script, closed / name], capture_output=True, text=True, check=True
+        )
+        assert done.stdout.startswith("InvalidInput output = "), done.stdout
+        assert "a file that can be written" in done.stdout
+    closed.chmod(0o700)
 
 
 def test_unreadable_results_are_named(tmp_path):
