@@ -5,6 +5,7 @@ import sys
 
 import pytest
 
+from flybystab.cli import COMMANDS
 from flybystab.cli.common import printable
 from flybystab.cli.main import main
 
@@ -45,3 +46,12 @@ def test_it_runs_without_docstrings_and_assertions():
         check=True,
     )
     assert '"verdict": "INTACT"' in done.stdout
+
+
+def test_too_little_memory_is_told_without_a_traceback(capsys, monkeypatch):
+    def run(options):
+        raise MemoryError
+
+    monkeypatch.setattr(COMMANDS["cite"], "run", run)
+    assert main(["cite"]) == 1
+    assert capsys.readouterr().err == "flybystab: not enough memory for this command\n"

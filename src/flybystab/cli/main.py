@@ -75,6 +75,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     except OSError as reason:
         print(printable(f"flybystab: {reason}"), file=sys.stderr)
         return 1
+    except MemoryError:
+        print("flybystab: not enough memory for this command", file=sys.stderr)
+        return 1
     except KeyboardInterrupt:
         print("flybystab: stopped", file=sys.stderr)
         return 1
