@@ -47,3 +47,12 @@ def test_names_without_a_place_are_left_out():
     _, boxes = labelled([(10.0, 0.5, f"one of very many names {i}") for i in range(60)])
     assert 3 < len(boxes) < 60
     assert not any(a.overlaps(b) for a, b in combinations(boxes, 2))
+
+
+def test_names_with_dollar_signs_and_control_characters_are_shown_as_they_are():
+    # $x^$ is no formula that matplotlib can read
+    axes, boxes = labelled([(10.0, 0.5, "$x^$"), (50.0, 0.2, "\x1b[31mred"), (2.0, 0.8, "1 $ and 2 $")])
+    assert len(boxes) == 3
+    assert sorted(t.get_text() for t in axes.texts) == ["1 \\$ and 2 \\$", r"\$x^\$", r"\x1b[31mred"]
+    _, same = labelled([(10.0, 0.5, "x^")])
+    assert boxes[0].width > same[0].width  # the two signs are drawn

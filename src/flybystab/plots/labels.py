@@ -23,6 +23,12 @@ _MARK = 3.0
 _LINE = 10.0
 
 
+def literal(name: str) -> str:
+    """A name as matplotlib shows it unchanged: dollar signs start no formula, control characters are escapes."""
+    shown = (c if c.isprintable() else c.encode("unicode_escape").decode() for c in name)
+    return "".join(shown).replace("$", r"\$")
+
+
 def label_points(
     axes: Any, points: Sequence[tuple[float, float, str]], others: Any = None, **text: Any
 ) -> Any:
@@ -58,7 +64,8 @@ def label_points(
     legend = axes.get_legend()
     if legend is not None:
         taken.append(legend.get_window_extent(renderer).extents)
-    for (x, y, name), at in zip(points, own, strict=True):
+    for (x, y, text_of_point), at in zip(points, own, strict=True):
+        name = literal(text_of_point)
         note = axes.annotate(name, (x, y), xytext=(0, 0), textcoords="offset points", zorder=6, **text)
         box = note.get_window_extent(renderer)
         size = np.array([box.width, box.height])

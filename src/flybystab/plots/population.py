@@ -13,6 +13,7 @@ from matplotlib.ticker import FormatStrFormatter, LogLocator, NullFormatter
 from flybystab.arguments import check_arguments
 from flybystab.errors import InvalidInput
 from flybystab.flybys.verdict import Verdict
+from flybystab.plots.labels import literal
 from flybystab.plots.style import new_figure, styled
 from flybystab.population.rates import EncounterRates
 from flybystab.population.verdict_rates import CHANGED, DisruptionRates
@@ -156,7 +157,7 @@ def contributor_plot(axes: Any, result: DisruptionRates, names: Sequence[str] | 
             "names", f"{len(names)} names", f"one name a row of the population, more than {last}"
         )
     rate = most["rate"].to_value(1 / u.Myr)
-    label = [f"row {k}" if names is None else str(names[int(k)]) for k in most["orbit"]]
+    label = [f"row {k}" if names is None else literal(str(names[int(k)])) for k in most["orbit"]]
     axes.barh(
         label,
         rate,

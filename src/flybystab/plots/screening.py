@@ -12,7 +12,7 @@ from astropy.table import QTable
 from flybystab.errors import InvalidInput, UnknownName
 from flybystab.flybys.verdict import Verdict
 from flybystab.plots.flyby import BLACK, BLUE, GREEN, ORANGE, RED, SKY
-from flybystab.plots.labels import label_points
+from flybystab.plots.labels import label_points, literal
 from flybystab.plots.outcome_map import MARKERS, SCALE
 from flybystab.plots.style import new_figure, save, styled
 from flybystab.screening.columns import VERDICTS
@@ -55,7 +55,7 @@ def bounds_plot(axes: Any, table: QTable, column: str | None = None) -> Any:
         raise UnknownName("column", str(name), [], f"(known: {', '.join(PANELS)})")
     drawn = _bounds_panel(axes, table, name)
     axes.set_ylabel("cohesion (Pa)")
-    axes.set_title(f"{table.meta.get('asteroid', '')}: {PANELS[name]}".removeprefix(": "))
+    axes.set_title(f"{literal(table.meta.get('asteroid', ''))}: {PANELS[name]}".removeprefix(": "))
     if drawn is not None:
         _bounds_scale(axes.figure, drawn, axes)
     return axes
@@ -116,7 +116,7 @@ def inference_figure(table: QTable, path: str | Path) -> Path:
     if drawn[0] is not None:
         _bounds_scale(figure, drawn[0], list(panels))
     axes = " x ".join(f"{2 * a:.0f}" for a in table.meta.get("semi_axes_m", []))
-    title = f"{table.meta.get('asteroid', '')}: {axes} m, {table.meta.get('spin_period_h', np.nan):.4g} h"
+    title = f"{literal(table.meta.get('asteroid', ''))}: {axes} m, {table.meta.get('spin_period_h', np.nan):.4g} h"
     strongest = strongest_passage(table)
     if strongest is not None:
         title += f"; strongest tide: {strongest['passage']}"
