@@ -259,3 +259,19 @@ def test_ways_to_write_a_name(name):
 def test_dashes_and_accents_of_names():
     assert fs.Asteroid.from_catalogue("Ra\u2013Shalom").number == 2100
     assert fs.Asteroid.from_catalogue("Phaëthon").number == 3200
+
+
+@pytest.mark.parametrize(
+    "document",
+    [
+        {
+            "code": "200",
+            "message": "specified object was not found",
+            "moreInfo": "https://ssd-api.jpl.nasa.gov",
+        },
+        {"code": "300", "message": "specified query matched more than one object", "list": [{"pdes": "1"}]},
+    ],
+)
+def test_the_message_of_an_answer_without_an_orbit_is_shown(tmp_path, document):
+    with pytest.raises(InvalidInput, match=document["message"]):
+        read(tmp_path, json.dumps(document))

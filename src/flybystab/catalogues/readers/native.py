@@ -10,6 +10,7 @@ from flybystab.catalogues.readers import READERS, header_of, rows_of
 from flybystab.catalogues.readers.sbdb import comet_orbit
 from flybystab.catalogues.record import TEXTS, UNITS
 from flybystab.errors import InvalidInput, UnknownName
+from flybystab.files import parse_json
 
 if TYPE_CHECKING:
     from flybystab.catalogues.readers import Entry
@@ -22,6 +23,8 @@ def read_native(text: str, file: str) -> list[Entry]:
     ------
     InvalidInput, UnknownName
     """
+    if message := _message(text, file):
+        raise InvalidInput("catalogue file", file, f"an orbit, not the answer {message!r}")
     columns = header_of(text)
     known = (*TEXTS, *UNITS)
     if any(";" in c or "\t" in c for c in columns):
@@ -38,6 +41,14 @@ def read_native(text: str, file: str) -> list[Entry]:
     if not {"name", "designation", "number"} & set(columns):
         raise InvalidInput("columns", columns, f"at least one of name, designation, number in {file}")
     return [(_with_law(row), None) for row in rows_of(text, file)]
+
+
+def _message(text: str, file: str) -> str:
+    """Message of an answer of JPL without an orbit, as for an unknown or an ambiguous name; empty for other texts."""
+    if not text.lstrip().startswith("{") or '"message"' not in text:
+        return ""
+    answer = parse_json(text, "catalogue file", file)
+    return str(answer.get("message") or "") if isinstance(answer, dict) else ""
 
 
 def _with_law(row: dict[str, str]) -> dict[str, str]:
