@@ -27,7 +27,7 @@ from flybystab.encounter.integrated_approach import (
 from flybystab.encounter.reach import TAIL, usual_start
 from flybystab.encounter.tide_sources import chosen_sources, tide_of
 from flybystab.errors import InvalidInput, NoEncounter
-from flybystab.orbit.closest_approach import panel_track
+from flybystab.orbit.closest_approach import STATE, TIME, panel_track
 from flybystab.orbit.default_forces import without_itself
 from flybystab.orbit.ephemeris import BODIES, Ephemeris, Window
 from flybystab.orbit.epochs import later, seconds
@@ -159,8 +159,8 @@ def _around(
     start = float(np.linalg.norm(state_in_log(log, window, index, t_in)[:3]))
     stop = t_out + wait if entry is None else entry
     end = stop + TAIL if entry is None else entry
-    row = max(int(np.searchsorted(log[:, 0], t_in, side="right")) - 1, 0)
-    flight = Flight(model(window, approach.forces, orbit.nongrav), log[row, 0], log[row, 1:7])
+    row = max(int(np.searchsorted(log[:, TIME], t_in, side="right")) - 1, 0)
+    flight = Flight(model(window, approach.forces, orbit.nongrav), log[row, TIME], log[row, STATE])
     track = panel_track(relative_to(flight, window, index, zero), t_in - zero, end - zero, tau)
 
     sources, kept, dropped = chosen_sources(track, window, index, body, zero, t_in, stop, 0.1 * accuracy / q)

@@ -9,7 +9,15 @@ import numpy as np
 
 from flybystab.constants import HOUR
 from flybystab.errors import NoEncounter
-from flybystab.orbit.closest_approach import between, crossings, nearest_minimum, periapsis_time, relative
+from flybystab.orbit.closest_approach import (
+    STATE,
+    TIME,
+    between,
+    crossings,
+    nearest_minimum,
+    periapsis_time,
+    relative,
+)
 from flybystab.orbit.ephemeris import BODIES, Window
 from flybystab.orbit.epochs import later, seconds
 from flybystab.orbit.forces import model
@@ -65,13 +73,13 @@ def approach_near(
         part = np.concatenate([flight.log_to(s)[(i > 0) :] for i, s in enumerate(stops)])
         parts.append(part[::-1] if direction < 0.0 else part[len(parts) :])
     log = np.concatenate(parts)
-    low = int(np.searchsorted(log[:, 0], -reach))
-    hit = nearest_minimum(log[low : int(np.searchsorted(log[:, 0], reach)) + 1], window, index, 0.0)
+    low = int(np.searchsorted(log[:, TIME], -reach))
+    hit = nearest_minimum(log[low : int(np.searchsorted(log[:, TIME], reach)) + 1], window, index, 0.0)
     if hit is None:
         return None
     t, _, step = hit
     step += low
-    again = Flight(model(window, forces, orbit.nongrav), log[step, 0], log[step, 1:7], epsilon)
+    again = Flight(model(window, forces, orbit.nongrav), log[step, TIME], log[step, STATE], epsilon)
     t, state = periapsis_time(relative_to(again, window, index), t)
     return Approach(t, state, log, forces)
 
@@ -79,12 +87,12 @@ def approach_near(
 def path_between(log: Array, start: float, stop: float) -> tuple[Array, Array]:
     """Times from `start` to `stop` (s, either order) and barycentric states along a log, dense enough for sums."""
     low, high = min(start, stop), max(start, stop)
-    inside = log[(log[:, 0] > low) & (log[:, 0] < high), 0]
+    inside = log[(log[:, TIME] > low) & (log[:, TIME] < high), TIME]
     t = np.unique(np.concatenate([np.linspace(low, high, 129), inside]))
-    t = t[(t >= log[0, 0]) & (t <= log[-1, 0])]
+    t = t[(t >= log[0, TIME]) & (t <= log[-1, TIME])]
     states = np.empty((t.size, 6))
     for n, time in enumerate(t):
-        k = min(max(int(np.searchsorted(log[:, 0], time, side="right")) - 1, 0), len(log) - 2)
+        k = min(max(int(np.searchsorted(log[:, TIME], time, side="right")) - 1, 0), len(log) - 2)
         between(log, k, float(time), states[n])
     return (t, states) if start <= stop else (t[::-1], states[::-1])
 
@@ -142,7 +150,7 @@ def two_body_periapsis(gm: float, state: Array) -> tuple[float, float]:
 
 def state_in_log(log: Array, window: Window, index: int, t: float) -> Array:
     """State relative to a body at `t` within a log, shape (6,)."""
-    k = min(max(int(np.searchsorted(log[:, 0], t, side="right")) - 1, 0), len(log) - 2)
+    k = min(max(int(np.searchsorted(log[:, TIME], t, side="right")) - 1, 0), len(log) - 2)
     out = np.empty(6)
     relative(log, k, window.head, window.data, window.gm, index, t, out)
     return out
@@ -153,7 +161,7 @@ def ends_of_encounter(log: Array, window: Window, index: int, level: float, t: f
     tables = (window.head, window.data, window.gm, index)
     inside, _ = crossings(log, *tables, level, 8)
     turning, _ = crossings(log, *tables, -1.0, 8)
-    before = [log[0, 0]] + [f[0] for f in (*inside, *turning) if f[0] < t and f[2] < 0.0]
-    after = [log[-1, 0]] + [f[0] for f in inside if f[0] > t and f[2] > 0.0]
+    before = [log[0, TIME]] + [f[0] for f in (*inside, *turning) if f[0] < t and f[2] < 0.0]
+    after = [log[-1, TIME]] + [f[0] for f in inside if f[0] > t and f[2] > 0.0]
     after += [f[0] for f in turning if f[0] > t and f[2] < 0.0]
     return float(max(before)), float(min(after))

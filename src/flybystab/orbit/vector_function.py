@@ -15,6 +15,7 @@ from skyfield.vectorlib import VectorFunction
 
 from flybystab.constants import AU, DAY
 from flybystab.errors import InvalidInput
+from flybystab.orbit.closest_approach import STATE, TIME
 from flybystab.orbit.default_forces import default_forces, without_itself
 from flybystab.orbit.ephemeris import BODIES, SUN, Ephemeris, Window, ephemeris
 from flybystab.orbit.forces import model
@@ -115,8 +116,8 @@ class OrbitVector(VectorFunction):
                 continue
             order = which[np.argsort(side * t[which])]
             log = self._logs[side]
-            row = max(int(np.searchsorted(side * log[:, 0], side * t[order[0]], side="right")) - 1, 0)
-            flight = Flight(flat, float(log[row, 0]), log[row, 1:7], TIGHT)
+            row = max(int(np.searchsorted(side * log[:, TIME], side * t[order[0]], side="right")) - 1, 0)
+            flight = Flight(flat, float(log[row, TIME]), log[row, STATE], TIGHT)
             for i in order:
                 out[i] = flight.to(float(t[i])) if t[i] != flight.t else flight.state
         return out
