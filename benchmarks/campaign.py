@@ -424,7 +424,8 @@ def tolerances(n: int, seed: int) -> dict[float, dict[str, float]]:
     truths = [fs.flyby(*scene, history=False, error=False, tolerance=1e-11) for scene in scenes]
     flows = np.array([t.onset_time is not None for t in truths])
     print(
-        f"{n} random flybys, {flows.sum()} with flow, seed {seed}; errors against 1e-11, of those with flow; median times"
+        f"{n} random flybys, {flows.sum()} with flow, seed {seed}; errors against 1e-11, of those with flow; "
+        "median times"
     )
     print(
         "tolerance  ms: flow  rigid   axes: 50 %     99 %   spin: 50 %     99 %  verdicts differ  covered: axes    spin"
