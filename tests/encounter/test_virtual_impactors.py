@@ -4,6 +4,7 @@ import astropy.units as u
 import numpy as np
 import pytest
 from astropy.time import Time
+from reference import need_ephemeris
 from scipy.stats import norm
 
 import flybystab as fs
@@ -75,5 +76,27 @@ def test_bad_arguments_are_named():
         fs.virtual_impactors(bare, EPOCH, end)
     with pytest.raises(InvalidInput, match="orbit"):
         fs.virtual_impactors("Apophis", EPOCH, end)
-    with pytest.raises(InvalidInput, match="sigmas"):
+    with pytest.raises(InvalidInput, match=r"sigmas = 20.0: .* at most 10 standard deviations"):
         fs.virtual_impactors(impactor((1e4, 1e3), (1e3, 1.0)), EPOCH, end, sigmas=20.0)
+
+
+def test_a_line_beyond_the_conics_is_an_error_that_names_where():
+    """A nearly circular orbit with an uncertainty of 0.02 in its eccentricity of 0.01."""
+    need_ephemeris("de421")
+    names = SETS["keplerian"]
+    mean, sigma = [1.0, 0.01, 3.0, 10.0, 20.0, 30.0], [1e-9, 2e-2, 1e-9, 1e-9, 1e-9, 1e-9]
+    units = [u.au, u.one, *[u.deg] * 4]
+    known = Covariance.in_units(EPOCH, names, mean, np.diag(sigma) ** 2.0, units, "made")
+    orbit = fs.Orbit.from_elements(
+        epoch=EPOCH,
+        a=1.0 * u.au,
+        e=0.01,
+        i=3 * u.deg,
+        node=10 * u.deg,
+        peri=20 * u.deg,
+        M=30 * u.deg,
+        covariance=known,
+    )
+    with pytest.raises(InvalidInput, match=r"sigmas = [0-9.]+: .*not those of a conic") as error:
+        fs.virtual_impactors(orbit, later(EPOCH, DAY), later(EPOCH, 2 * DAY), sigmas=3.0, ephemeris="de421")
+    assert 0.5 <= float(error.value.value) <= 0.6

@@ -10,7 +10,7 @@ from reference import need_ephemeris
 
 import flybystab as fs
 from flybystab.constants import DAY, YEAR
-from flybystab.errors import InvalidInput
+from flybystab.errors import InvalidInput, NotConverged
 from flybystab.orbit.covariance import NONGRAV_PARAMETERS
 from flybystab.orbit.default_forces import default_forces
 from flybystab.orbit.elements import GM_SUN
@@ -152,3 +152,22 @@ def _state(orbit, time):
 def test_an_orbit_without_covariance_has_none_later():
     with pytest.raises(InvalidInput, match="a Covariance"):
         replace(apophis(), covariance=None).covariance_at(AFTER)
+
+
+@pytest.mark.parametrize(("days", "side"), [(100.0, "after"), (-20.0, "before")])
+def test_a_fall_into_the_centre_of_the_sun_has_no_derivatives(days, side):
+    orbit = apophis()
+    window = ephemeris(None).window(EPOCH, -YEAR, YEAR)
+    sun = window.states(SUN, np.zeros(1))[0]
+    forces = model(window, ("sun point mass",))
+    with pytest.raises(NotConverged, match=rf"to {abs(days):g} d {side} the epoch .* not finite"):
+        derivatives(forces, orbit.nongrav.parameters, 0.0, sun + 1e10 * np.eye(6)[0], sun, days * DAY)
+
+
+def test_a_state_out_of_range_ends_the_integration():
+    window = ephemeris(None).window(EPOCH, 0.0, YEAR)
+    state = apophis().barycentric(window)
+    state[3] = 1e308
+    flight = Flight(model(window, ("sun point mass",)), 0.0, state, TIGHT)
+    with pytest.raises(NotConverged, match=r"to 1 d after the epoch .* out of range"):
+        flight.to(DAY)

@@ -129,8 +129,13 @@ class LineOfVariations:
     def _at_epoch(self, z: Array) -> tuple[Array, Array]:
         """Deviations of the state and of the non-gravitational parameters at the epoch of the covariance."""
         parameters = self.covariance.values + z @ self.covariance.factor.T
-        if not self.covariance._possible(parameters).all():
-            raise InvalidInput("sigmas", "an orbit that is not a conic", "a shorter line of variations")
+        possible = self.covariance._possible(parameters)
+        if not possible.all():
+            raise InvalidInput(
+                "sigmas",
+                f"{np.linalg.norm(z[~possible], axis=1).min():.3g}",
+                "fewer standard deviations: this far from the nominal orbit the elements are not those of a conic",
+            )
         return self.covariance.deviations(parameters)
 
     def _carried(self, z: Array, times: Array) -> Array:

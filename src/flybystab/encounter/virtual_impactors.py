@@ -96,7 +96,11 @@ def virtual_impactors(
     body, count = _body(planet), whole(n, "n", 3)
     reach = to_si(within, u.m, "within", low=0.0, open_low=True)
     if not 0.0 < float(sigmas) <= 10.0:
-        raise InvalidInput("sigmas", sigmas, "a number in (0, 10]")
+        raise InvalidInput(
+            "sigmas",
+            sigmas,
+            "the half length of the line of variations: above 0, at most 10 standard deviations",
+        )
     line = LineOfVariations(path, body, start, stop, float(sigmas), ephemeris, workers)
     way = line.way
     grid = np.linspace(-float(sigmas), float(sigmas), count)

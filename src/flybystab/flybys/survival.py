@@ -122,7 +122,9 @@ def survival(
         Whether to use the bound. Without it the verdicts are the same, and every margin is exact.
     """
     if not isinstance(distribution, EncounterDistribution):
-        raise InvalidInput("distribution", distribution, "what fs.encounter_distribution gives")
+        raise InvalidInput(
+            "distribution", distribution, "an EncounterDistribution, from flybystab.encounter_distribution"
+        )
     n = len(distribution)
     states = spin_states(body, n, seed, material)
     refuse_cut_off(states.body.material, "survival")

@@ -14,6 +14,7 @@ import rebound
 from numba import cfunc
 from numba.core.ccallback import CFunc
 
+from flybystab.constants import DAY
 from flybystab.core.numerics.jit import CACHE
 from flybystab.errors import NotConverged
 from flybystab.orbit.callbacks import CALLBACK, Layout, layout, numbers_at, under_way
@@ -95,6 +96,15 @@ def simulation(t: float, states: Array, epsilon: float, memory: Array, force: CF
     return sim
 
 
+def not_finite(t: float) -> NotConverged:
+    """The error of an integration whose state at `t` (s from the epoch of the force model) is not finite."""
+    return NotConverged(
+        f"the integration to {abs(t) / DAY:.6g} d {'before' if t < 0.0 else 'after'} the epoch of the force model "
+        "gave a state that is not finite: the orbit passes too close to the centre of the Sun or of a planet, "
+        "or its state is out of range"
+    )
+
+
 class Flight:
     """One asteroid under way in rebound.
 
@@ -132,7 +142,7 @@ class Flight:
         self._sim.integrate(t)
         state = self.state
         if not np.isfinite(state).all():
-            raise NotConverged(f"the orbit was lost before t = {t:.6g} s from the epoch of the integration")
+            raise not_finite(t)
         return state
 
     def log_to(self, t: float, rows: int = 4096) -> Array:

@@ -18,7 +18,6 @@ from numba import cfunc
 from numba.core.ccallback import CFunc
 
 from flybystab.core.numerics.jit import CACHE, kernel
-from flybystab.errors import NotConverged
 from flybystab.orbit.callbacks import CALLBACK, Layout, layout, numbers_at, under_way
 from flybystab.orbit.covariance import NONGRAV_PARAMETERS
 from flybystab.orbit.elements import GM_SUN
@@ -29,7 +28,7 @@ from flybystab.orbit.gradients import (
     add_oblateness_gradient,
     add_relativity_gradient,
 )
-from flybystab.orbit.ias15 import EPSILON, TIGHT, simulation
+from flybystab.orbit.ias15 import EPSILON, TIGHT, not_finite, simulation
 from flybystab.orbit.nongravitational import (
     N_PARAMETERS,
     NonGravitationalParameters,
@@ -132,7 +131,7 @@ def _carried(
     sim.integrate(stop)
     end = np.array([[p.x, p.y, p.z, p.vx, p.vy, p.vz] for p in sim.particles])[1:].T
     if not np.isfinite(end).all():
-        raise NotConverged(f"the orbit was lost before t = {stop:.6g} s from the epoch of the integration")
+        raise not_finite(stop)
     return np.hstack([np.linalg.solve(ways.T, end[:, :6].T).T, end[:, 6:] / scale[6:]])
 
 
@@ -190,7 +189,7 @@ def derivatives(
     Raises
     ------
     NotConverged
-        The orbit was lost.
+        The integration gave a state that is not finite.
     """
     away = state - sun
     size = _size(away)

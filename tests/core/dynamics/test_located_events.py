@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+from scenes import earth
 from scipy.spatial.transform import Rotation
-from tests.scenes import earth
 
 from flybystab.core.dynamics.run import LIMITS, body_state, integrate
 from flybystab.core.dynamics.workspace import N_SUMMITS
