@@ -1,10 +1,13 @@
 """Processor time of the flybys of two versions of the package, in turn, so that other programs affect both alike.
 
-python benchmarks/versions.py OLD [NEW]     folders of two checkouts; NEW is this one by default
+python benchmarks/versions.py OLD [NEW]         folders of two checkouts; NEW is this one by default
+python benchmarks/versions.py calls OLD [NEW]   the same for calls of the public functions
 
-Each version runs in a process of its own with compiled kernels: the pile of `flybystab bench flyby` in 300 attitudes at
-6 and 3 radii (rigid), 2.2 radii (a third of them flow) and 300 random scenes of `campaign.py stress`. The ratio is the
-median over the rounds; outcomes that differ are counted.
+Each version runs in a process of its own with compiled kernels. Without `calls`: the pile of `flybystab bench flyby` in
+300 attitudes at 6 and 3 radii (rigid), 2.2 radii (a third of them flow) and 300 random scenes of `campaign.py stress`;
+the ratio is the median over the rounds; outcomes that differ are counted. With `calls`: the same pile at 3 radii,
+without yield, and at 2.2 radii, where it flows, in a default `fs.flyby` and in a row of `fs.flyby_many` over 200 random
+attitudes on one thread; medians of the rounds.
 """
 
 from __future__ import annotations
@@ -13,12 +16,16 @@ import json
 import statistics
 import subprocess
 import sys
-from collections.abc import Iterator
+import time
+from collections.abc import Callable, Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 #: Rounds, and flybys of each case.
 ROUNDS, NUMBER = 15, 300
+#: The same for calls of the public functions.
+ROUNDS_CALLS, N_ROWS = 7, 200
 
 
 def cases() -> dict[str, tuple[Any, Any]]:
@@ -45,10 +52,8 @@ def cases() -> dict[str, tuple[Any, Any]]:
     return found
 
 
-def serve() -> None:
-    """Run all cases for each line that comes in, and write their times per flyby (ms) and their outcomes."""
-    import time
-
+def kernels() -> Callable[[], dict[str, Any]]:
+    """A function that returns the time per flyby (ms) and the outcomes of each case of `cases`."""
     import numpy as np
 
     from flybystab.core.dynamics.verdict_row import verdict_rows
@@ -57,7 +62,8 @@ def serve() -> None:
 
     every = np.arange(NUMBER)
     prepared = cases()
-    while True:
+
+    def times() -> dict[str, Any]:
         answer = {}
         for name, (rows, met) in prepared.items():
             output = output_buffers(NUMBER, 0)
@@ -66,16 +72,64 @@ def serve() -> None:
             took = 1e3 * (time.process_time() - start) / NUMBER
             out = output.outcomes
             answer[name] = took, out["verdict"].tolist(), out["friction"].tolist(), out["axes"].tolist()
-        print(json.dumps(answer), flush=True)
+        return answer
+
+    return times
+
+
+def calls() -> Callable[[], dict[str, Any]]:
+    """A function that returns the time of public calls (ms) with and without yield."""
+    import astropy.units as u
+    from scipy.spatial.transform import Rotation
+
+    import flybystab as fs
+
+    # as flybystab.bench.flyby.case, which versions from before the division into subpackages do not have
+    body = fs.Body(
+        semi_axes=[1400, 850, 750] * u.m,
+        density=2000 * u.kg / u.m**3,
+        spin_period=6 * u.h,
+        material=fs.Material(yield_surface="drucker-prager"),
+    )
+    turns = list(Rotation.random(N_ROWS, random_state=1).as_matrix())
+
+    def median(run: Callable[[], object], repeat: int) -> float:
+        run()
+        taken = []
+        for _ in range(repeat):
+            start = time.process_time()
+            run()
+            taken.append(1e3 * (time.process_time() - start))
+        return statistics.median(taken)
+
+    def times() -> dict[str, Any]:
+        answer = {}
+        for q, name in ((3.0, "no yield"), (2.2, "flow")):
+            e = fs.Encounter.hyperbolic(
+                "earth", periapsis=q * fs.R_earth, v_inf=5 * u.km / u.s, start_distance=10 * fs.R_earth
+            )
+            many = partial(fs.flyby_many, [body] * N_ROWS, [e] * N_ROWS, turns, workers=1)
+            answer[f"flyby, {name}"] = median(partial(fs.flyby, body, e), 25)
+            answer[f"row, {name}"] = median(many, 3) / N_ROWS
+        return answer
+
+    return times
+
+
+def serve(prepare: Callable[[], Callable[[], dict[str, Any]]]) -> None:
+    """Run all cases for each line that comes in, and write their times and outcomes."""
+    times = prepare()
+    while True:
+        print(json.dumps(times()), flush=True)
         if not sys.stdin.readline():
             return
 
 
-def answers(folder: Path) -> Iterator[dict[str, Any]]:
+def answers(folder: Path, what: str) -> Iterator[dict[str, Any]]:
     """Times and outcomes of a version, a round each."""
     program = (
-        f"import sys; sys.path[:0] = [{str(folder / 'src')!r}, {str(folder / 'benchmarks')!r}, "
-        f"{str(Path(__file__).parent)!r}]; import versions; versions.serve()"
+        f"import sys; sys.path.insert(0, {str(Path(__file__).parent)!r}); import versions; "
+        f"sys.path[:0] = [{str(folder / 'src')!r}, {str(folder / 'benchmarks')!r}]; versions.serve(versions.{what})"
     )
     with subprocess.Popen(
         [sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
@@ -89,13 +143,22 @@ def answers(folder: Path) -> Iterator[dict[str, Any]]:
                 process.stdin.flush()
 
 
-def main() -> int:
-    if not 2 <= len(sys.argv) <= 3:
-        print(__doc__)
-        return 2
-    here = Path(__file__).resolve().parents[1]
-    folders = Path(sys.argv[1]).resolve(), Path(sys.argv[2]).resolve() if len(sys.argv) == 3 else here
-    both = [answers(folder) for folder in folders]
+def print_calls(folders: list[Path]) -> None:
+    """Print the medians of the times of public calls."""
+    both = [answers(folder, "calls") for folder in folders]
+    for a in both:
+        next(a)  # compiles
+    rounds = [[next(a) for a in both] for _ in range(ROUNDS_CALLS)]
+    print(f"processor time of calls, medians of {ROUNDS_CALLS} rounds in turn, ms")
+    print(f"{'':>6}" + "".join(f"{case:>18}" for case in rounds[0][0]))
+    for k, version in enumerate(("old", "new")):
+        medians = (statistics.median(r[k][case] for r in rounds) for case in rounds[0][0])
+        print(f"{version:>6}" + "".join(f"{value:18.3f}" for value in medians))
+
+
+def print_kernels(folders: list[Path]) -> None:
+    """Print times, their ratio and the changes of the outcomes."""
+    both = [answers(folder, "kernels") for folder in folders]
     first = [next(a) for a in both]  # compiles
     rounds = [[next(a) for a in both] for _ in range(ROUNDS)]
     print(
@@ -118,6 +181,22 @@ def main() -> int:
             f"{name:>10} {min(old):8.4f} {min(new):8.4f} {ratio:6.2f}   {int((verdicts[0] != verdicts[1]).sum()):14d}"
             f"  {change:14.1e}  {np.nanquantile(stretched, 0.99):11.1e}"
         )
+
+
+def main() -> int:
+    words = sys.argv[1:]
+    public = words[:1] == ["calls"]
+    words = words[public:]
+    if not 1 <= len(words) <= 2:
+        print(__doc__)
+        return 2
+    folders = [Path(word).resolve() for word in words]
+    if len(folders) == 1:
+        folders.append(Path(__file__).resolve().parents[1])
+    if public:
+        print_calls(folders)
+    else:
+        print_kernels(folders)
     return 0
 
 

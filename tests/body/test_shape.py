@@ -98,7 +98,7 @@ def test_body_of_a_shape():
         # without facet 0 its neighbours 1, 5 and 11 are open: 0, 4 and 10 of those left
         (lambda v, f: (v, f[1:]), r"numbers 0, 4, 10 \(from 0\).*open edge"),
         (lambda v, f: (v, np.vstack([f[:1, ::-1], f[1:]])), r"numbers 0.*oriented opposite"),
-        (lambda v, f: (v, np.vstack([f, f[:1]])), r"numbers 0.*more meet"),
+        (lambda v, f: (v, np.vstack([f, f[:1]])), r"numbers 0.*share an edge with more"),
         (lambda v, f: (v * [1, 1, 0], f), "a solid body"),
         (lambda v, f: (v, f + 1), "numbered from 0 to 7"),
         (lambda v, f: (v[:, :2], f), "shape"),

@@ -51,50 +51,60 @@ def test_samples_of_a_badly_known_orbit_have_passages_of_their_own():
     assert p.meet().distance.to_value(u.m) == pytest.approx(p.distance, abs=1e3)
 
 
-def test_rows_draw_the_orbit_and_name_the_distance_among_the_contributors():
-    asteroid = with_spread(7000.0)
-    run = Screening([asteroid], settings(*SPAN, within=0.01 * u.au, samples=30, keep_samples=True))
-    ((_, result),) = run.results()
+#: Bodies and clones of the badly known orbit: enough for several blocks.
+SAMPLES = 6
+
+
+@pytest.fixture(scope="module")
+def spread():
+    """A screening of a badly known orbit, and its result with all samples in one block."""
+    run = Screening(
+        [with_spread(7000.0)], settings(*SPAN, within=0.01 * u.au, samples=SAMPLES, keep_samples=True)
+    )
+    ((_, result),) = run.results(block=SAMPLES)
+    return run, result
+
+
+def test_rows_draw_the_orbit_and_name_the_distance_among_the_contributors(spread):
+    run, result = spread
     (row,) = result["rows"]
     assert "orbit" in row["drawn"].split("; ")
     assert row["error"] == ""
     assert row["distance_sigma"] == pytest.approx(7700, rel=0.1)
-    assert len({s["distance"] for s in result["samples"]}) == 30
+    assert len({s["distance"] for s in result["samples"]}) == SAMPLES
     assert run.fingerprint() != Screening([APOPHIS], run.settings).fingerprint()
 
 
-def test_clones_and_rows_are_the_same_to_the_bit_however_they_are_split():
-    asteroid = with_spread(7000.0)
-    clones = orbit_sampling(only(asteroid), 18, 0).clones
-    whole = [p.distance for p in clones.passages(0, 18)]
-    assert whole == [clones.passages(k, k + 1)[0].distance for k in range(18)]
-    run = Screening([asteroid], settings(*SPAN, within=0.01 * u.au, samples=18, keep_samples=True))
-    ((_, together),) = run.results(block=18)
+def test_clones_and_rows_are_the_same_to_the_bit_however_they_are_split(spread):
+    run, together = spread
+    clones = orbit_sampling(only(run.asteroids[0]), SAMPLES, 0).clones
+    whole = [p.distance for p in clones.passages(0, SAMPLES)]
+    assert whole == [clones.passages(k, k + 1)[0].distance for k in range(SAMPLES)]
     with ThreadPoolExecutor(2) as pool:
-        ((_, split),) = run.results(pool, block=3)
+        ((_, split),) = run.results(pool, block=2)
     assert repr(split) == repr(together)  # nan is nan
     assert [s["distance"] * AU for s in split["samples"]] == pytest.approx(whole, rel=1e-15)
 
 
-def test_a_clone_that_cannot_be_followed_costs_its_own_sample_only(monkeypatch):
-    asteroid = with_spread(7000.0)
+def test_a_clone_that_cannot_be_followed_costs_its_own_sample_only(monkeypatch, spread):
+    run, whole = spread
+    lost = 3
     original = Clones.passages
 
     def passages_but_one(self, first, last):
-        if first <= 11 < last:
-            raise NotConverged("clone 11: the step size collapsed")
+        if first <= lost < last:
+            raise NotConverged(f"clone {lost}: the step size collapsed")
         return original(self, first, last)
 
-    wanted = settings(*SPAN, within=0.01 * u.au, samples=14, keep_samples=True)
-    ((_, whole),) = Screening([asteroid], wanted).results()
     monkeypatch.setattr(Clones, "passages", passages_but_one)
-    for block in (14, 3):
-        ((_, found),) = Screening([asteroid], wanted).results(block=block)
+    for block in (SAMPLES, 2):
+        ((_, found),) = Screening(run.asteroids, run.settings).results(block=block)
         errors = [s["error"] for s in found["samples"]]
-        assert [k for k, e in enumerate(errors) if e] == [11]
-        assert errors[11] == "NotConverged: clone 11: the step size collapsed"
-        assert found["rows"][0]["error"] == "1 samples: " + errors[11]
-        assert [s["verdict"] for s in found["samples"][:11]] == [s["verdict"] for s in whole["samples"][:11]]
+        assert [k for k, e in enumerate(errors) if e] == [lost]
+        assert errors[lost] == f"NotConverged: clone {lost}: the step size collapsed"
+        assert found["rows"][0]["error"] == "1 samples: " + errors[lost]
+        for k in set(range(SAMPLES)) - {lost}:
+            assert found["samples"][k]["verdict"] == whole["samples"][k]["verdict"]
 
 
 def test_what_is_not_known_of_an_orbit_is_said():
