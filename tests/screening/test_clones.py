@@ -51,8 +51,8 @@ def test_samples_of_a_badly_known_orbit_have_passages_of_their_own():
     assert p.meet().distance.to_value(u.m) == pytest.approx(p.distance, abs=1e3)
 
 
-#: Bodies and clones of the badly known orbit: enough for several blocks.
-SAMPLES = 6
+#: Samples of the badly known orbit: several blocks of two and a part of one.
+SAMPLES = 7
 
 
 @pytest.fixture(scope="module")
