@@ -8,7 +8,9 @@ import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
 
+from flybystab.encounter.reach import usual_start
 from flybystab.errors import InvalidInput
+from flybystab.orbit.planets import Planet
 from flybystab.typing import Array
 from flybystab.units import to_si
 
@@ -21,6 +23,21 @@ def checked_start(distance: Quantity | None) -> float | None:
     UnitMismatch, InvalidInput
     """
     return None if distance is None else to_si(distance, u.m, "start_distance", low=0.0)
+
+
+def start_beyond(start: float | None, body: Planet, q: float) -> float:
+    """Distance at which an encounter with closest distance `q` starts (m): the given one, or the usual one for None.
+
+    Raises
+    ------
+    InvalidInput
+        The given distance does not exceed `q`.
+    """
+    if start is None:
+        return usual_start(body, q)
+    if start <= q:
+        raise InvalidInput("start_distance", start * u.m, f"more than the closest approach, {q:.6g} m")
+    return start
 
 
 def unit_vector(pole: Sequence[float]) -> Array:

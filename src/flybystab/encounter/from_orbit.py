@@ -13,6 +13,7 @@ from flybystab.constants import AU, DAY
 from flybystab.core.ellipsoid.tide import TidePanels, tide_panels
 from flybystab.encounter.approach_errors import ApproachErrors, approach_errors, horizon
 from flybystab.encounter.encounter import Encounter
+from flybystab.encounter.encounter_arguments import start_beyond
 from flybystab.encounter.integrated_approach import (
     Approach,
     approach_near,
@@ -24,10 +25,10 @@ from flybystab.encounter.integrated_approach import (
     state_in_log,
     two_body_periapsis,
 )
-from flybystab.encounter.reach import TAIL, usual_start
+from flybystab.encounter.reach import TAIL
 from flybystab.encounter.tide_sources import chosen_sources, tide_of
-from flybystab.errors import InvalidInput, NoEncounter
-from flybystab.orbit.closest_approach import STATE, TIME, panel_track
+from flybystab.errors import NoEncounter
+from flybystab.orbit.closest_approach import STATE, TIME, PanelTrack, panel_track
 from flybystab.orbit.default_forces import without_itself
 from flybystab.orbit.ephemeris import BODIES, Ephemeris, Window
 from flybystab.orbit.epochs import later, seconds
@@ -133,6 +134,38 @@ def _panels(
     return panels, miss
 
 
+class _Tide(NamedTuple):
+    """Tide of an encounter: panels, their error over the peak, sources, and neglected sources with relative sizes."""
+
+    panels: TidePanels
+    error: float
+    kept: list[str]
+    dropped: list[tuple[str, float]]
+
+
+def _tide(
+    track: PanelTrack,
+    window: Window,
+    index: int,
+    body: Planet,
+    zero: float,
+    times: tuple[float, float, float],
+    tau: float,
+    accuracy: float,
+) -> _Tide:
+    """The tide of the planet and of the sources above a relative `accuracy`, on the clock of closest approach.
+
+    `times` are the start and the end of the encounter and the end of the track, s from the epoch of the window.
+    """
+    start, stop, end = times
+    sources, kept, dropped = chosen_sources(track, window, index, body, zero, start, stop, accuracy)
+    axis = np.array(body.pole_at(window.epoch))
+    panels, error = _panels(
+        lambda t: tide_of(track, window, index, body, axis, zero, t, sources), start - zero, end - zero, tau
+    )
+    return _Tide(panels, error, kept, dropped)
+
+
 def _around(
     cls: type[Encounter],
     orbit: Orbit,
@@ -151,10 +184,7 @@ def _around(
     at = _periapsis(float(window.gm[index]), body, approach, contact)
     zero, q, entry, log = at.t, at.q, at.entry, approach.log
     tau = max(q, 0.01 * body.radius) / at.speed
-    if start is None:
-        start = usual_start(body, q)
-    elif start <= q:
-        raise InvalidInput("start_distance", start * u.m, f"more than the closest approach, {q:.6g} m")
+    start = start_beyond(start, body, q)
     t_in, t_out = ends_of_encounter(log, window, index, start, zero if entry is None else entry)
     start = float(np.linalg.norm(state_in_log(log, window, index, t_in)[:3]))
     stop = t_out + wait if entry is None else entry
@@ -162,14 +192,7 @@ def _around(
     row = max(int(np.searchsorted(log[:, TIME], t_in, side="right")) - 1, 0)
     flight = Flight(model(window, approach.forces, orbit.nongrav), log[row, TIME], log[row, STATE])
     track = panel_track(relative_to(flight, window, index, zero), t_in - zero, end - zero, tau)
-
-    sources, kept, dropped = chosen_sources(track, window, index, body, zero, t_in, stop, 0.1 * accuracy / q)
-    axis = np.array(body.pole_at(window.epoch))
-
-    def tide(t: Array) -> Array:
-        return tide_of(track, window, index, body, axis, zero, t, sources)
-
-    panels, miss = _panels(tide, t_in - zero, end - zero, tau)
+    tide = _tide(track, window, index, body, zero, (t_in, stop, end), tau, 0.1 * accuracy / q)
     return cls(
         planet=body,
         time=later(window.epoch, zero),
@@ -181,15 +204,15 @@ def _around(
         impact_level=at.level,
         impact_time=None if entry is None else entry - zero,
         frame="ICRF",
-        forces=(*(f"orbit: {n}" for n in approach.forces), *(f"tide: {n}" for n in kept)),
+        forces=(*(f"orbit: {n}" for n in approach.forces), *(f"tide: {n}" for n in tide.kept)),
         left_out=(
             *((f"orbit: {n}", v / q) for n, v in size.items() if n not in approach.forces and v > 1e-6),
-            *dropped,
+            *tide.dropped,
         ),
-        tide_error=miss,
+        tide_error=tide.error,
         t_start=t_in - zero,
         t_stop=stop - zero,
-        tide=panels,
+        tide=tide.panels,
         track=track,
         distance_error=(errors.distance * u.m).to(u.km),
         time_error=errors.time * u.s,

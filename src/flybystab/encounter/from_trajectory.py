@@ -12,11 +12,12 @@ from astropy.units import Quantity
 from scipy.interpolate import CubicHermiteSpline
 from scipy.optimize import brentq
 
-from flybystab.core.ellipsoid.tide import tide_panels
+from flybystab.core.ellipsoid.tide import TidePanels, tide_panels
 from flybystab.core.numerics.jit import kernel
 from flybystab.encounter.encounter import Encounter
+from flybystab.encounter.encounter_arguments import start_beyond
 from flybystab.encounter.hyperbolic import left_out
-from flybystab.encounter.reach import TAIL, usual_start
+from flybystab.encounter.reach import TAIL
 from flybystab.encounter.tide_sources import planet_tide
 from flybystab.errors import InvalidInput, NoEncounter
 from flybystab.orbit.kepler import two_body
@@ -109,10 +110,7 @@ def sampled(
     first, last = float(t[0]) - zero, float(t[-1]) - zero
     r, v = (part.copy() for part in np.split(track.states(np.zeros(1))[0], 2))
     q, speed = float(np.linalg.norm(r)), float(np.linalg.norm(v))
-    if start is None:
-        start = usual_start(body, q)
-    elif start <= q:
-        raise InvalidInput("start_distance", start * u.m, f"more than the closest approach, {q:.6g} m")
+    start = start_beyond(start, body, q)
 
     def radius(time: float) -> float:
         return float(np.linalg.norm(track.states(np.array([time]))[0, :3]))
@@ -123,15 +121,7 @@ def sampled(
     entry = None if level is None else _crossing(radius, t_in, 0.0, body.impact_distance)
     stop = t_out + wait
 
-    def tide(time: Array) -> Array:
-        out = np.zeros((time.size, 6))
-        planet_tide(body.gm, body.j2 if j2 else 0.0, body.radius, axis, track.states(time)[:, :3], out)
-        return out
-
-    for width in (0.5, 0.25, 0.125, 0.0625):  # the spline has a jump of a derivative at every sample
-        panels, error = tide_panels(tide, t_in, stop + TAIL, q / speed, width=width)
-        if error < 1e-10:
-            break
+    panels, error = _panels(track, body, j2, axis, t_in, stop + TAIL, q / speed)
     v_inf2 = speed * speed - 2.0 * body.gm / q
     return cls(
         planet=body,
@@ -156,6 +146,23 @@ def sampled(
         tide=panels,
         track=track,
     )
+
+
+def _panels(
+    track: SampledTrack, body: Planet, j2: bool, axis: Array, start: float, stop: float, tau: float
+) -> tuple[TidePanels, float]:
+    """Chebyshev panels of the tide along a track, narrower until their error is below 1e-10 of the peak; that error."""
+
+    def tide(time: Array) -> Array:
+        out = np.zeros((time.size, 6))
+        planet_tide(body.gm, body.j2 if j2 else 0.0, body.radius, axis, track.states(time)[:, :3], out)
+        return out
+
+    for width in (0.5, 0.25, 0.125, 0.0625):  # the third derivative of the spline jumps at every sample
+        panels, error = tide_panels(tide, start, stop, tau, width=width)
+        if error < 1e-10:
+            break
+    return panels, error
 
 
 def _track(body: Planet, t: Array, states: Array) -> tuple[SampledTrack, float]:

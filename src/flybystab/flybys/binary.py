@@ -159,7 +159,6 @@ def binary_flyby(
     # Units of the mutual orbit: length a, time sqrt(a^3/G m).
     unit = np.sqrt(a**3 / (G * mass))
     state = _states(e, mean_anomaly, frames)
-    before = np.cross(state[:, :3], state[:, 3:])
     figures = None
     if companion is not None or oblate:
         pole = frames[:, :, 2]
@@ -171,30 +170,48 @@ def binary_flyby(
             1.0 / (1.0 + ratio),
         )
         state = np.concatenate([state, *synchronous(frames, state, 1.0)], axis=1)
-    first = state
-    state, closest, collided = _carried(state, encounter, unit, contact / a, figures)
-    x, v = state[:, :3], state[:, 3:6]
-    after = np.cross(x, v)
+    last, closest, collided = _carried(state, encounter, unit, contact / a, figures)
+    tide = float(np.linalg.norm(encounter.tidal_tensor(encounter.t_start)) * unit**2)
+    turning = figures if companion is not None else None
+    return _sample(state, last, closest, collided, turning, a * u.m, tide, int(seed))
+
+
+def _sample(
+    first: Array,
+    last: Array,
+    closest: Array,
+    collided: NDArray[np.bool_],
+    figures: Figures | None,
+    length: Quantity,
+    tide: float,
+    seed: int,
+) -> BinarySample:
+    """Orbits and rotations before and after, from states in units of `length` and of the mutual orbit.
+
+    `figures` are those of an ellipsoidal companion, None for a point mass; `tide` is that at the start over
+    ``G (m1 + m2)/a^3``.
+    """
+    x, v = last[:, :3], last[:, 3:6]
+    before, after = np.cross(first[:, :3], first[:, 3:6]), np.cross(x, v)
     r = np.linalg.norm(x, axis=1)
     energy = 0.5 * np.sum(v * v, axis=1) - 1.0 / r
     vector = np.cross(v, after) - x / r[:, None]
-    fate = np.where(collided, COLLISION, np.where(energy < 0.0, BOUND, ESCAPE))
     cosine = np.sum(before * after, axis=1) / (np.linalg.norm(before, axis=1) * np.linalg.norm(after, axis=1))
     lost = np.where(collided, np.nan, 1.0)
-    spin_ratio, wobble, obliquity = np.full((3, n), np.nan)
-    if companion is not None and figures is not None:
-        spin_ratio, wobble, obliquity = _rotation(first, state, after, figures) * lost
+    spin_ratio, wobble, obliquity = np.full((3, len(r)), np.nan)
+    if figures is not None:
+        spin_ratio, wobble, obliquity = _rotation(first, last, after, figures) * lost
     return BinarySample(
-        semi_major_axis=-0.5 / energy * a * lost * u.m,
+        semi_major_axis=-0.5 / energy * lost * length,
         eccentricity=np.linalg.norm(vector, axis=1) * lost,
         plane_change=np.rad2deg(np.arccos(np.clip(cosine, -1.0, 1.0))) * lost * u.deg,
-        closest=closest * a * u.m,
-        fate=fate,
+        closest=closest * length,
+        fate=np.where(collided, COLLISION, np.where(energy < 0.0, BOUND, ESCAPE)),
         spin_ratio=spin_ratio,
         wobble=np.rad2deg(wobble) * u.deg,
         obliquity=np.rad2deg(obliquity) * u.deg,
-        tide_at_start=float(np.linalg.norm(encounter.tidal_tensor(encounter.t_start)) * unit**2),
-        seed=int(seed),
+        tide_at_start=tide,
+        seed=seed,
     )
 
 

@@ -176,52 +176,15 @@ def critical(
         raise InvalidInput("encounter", encounter, "a hyperbolic encounter, whose periapsis can be chosen")
     n = whole(phases, "phases", 1)
     width = to_si(tolerance, u.one, "tolerance", low=1e-10, high=0.5)
-    ends: list[float] = [
-        end if given is None else float(to_si(given, parameter.unit, name, low=0.0))
-        for given, end, name in ((low, parameter.low, "low"), (high, parameter.high, "high"))
-    ]
-    if not ends[0] < ends[1]:
-        raise InvalidInput("low", low, f"less than high = {ends[1]:g} {parameter.unit}")
+    grid = _grid(parameter, low, high)
     angle = np.pi * np.arange(n) / n
-    base = attitude_matrix(attitude)
-    space = np.geomspace if parameter.logarithmic and ends[0] > 0.0 else np.linspace
-    grid = space(ends[0], ends[1], SCAN)
-
-    def fails(values: Array, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
-        """Whether the outcome is worse than accepted, for one value per phase."""
-        scenes = [parameter.apply(body, encounter, float(x)) for x in values]
-        turns = [
-            attitude_at_start(b, e, np.asarray(base) @ about_z(float(a)))
-            for (b, e), a in zip(scenes, angle[rows], strict=True)
-        ]
-        table = flyby_many(
-            [b for b, _ in scenes], [e for _, e in scenes], turns, workers=workers, progress=False
-        )
-        return np.array([SEVERITY.index(str(v)) > worst for v in table.verdict])
-
-    every = np.arange(n)
-    bad, good = np.full(n, np.nan), np.full(n, np.inf)
-    open_ = every
+    search = _Search(body, encounter, parameter, attitude_matrix(attitude), angle, worst, workers)
     # Bisections of the widest bracket, relative to its safe end.
     bisections = int(np.ceil(np.log2(max(2.0, float(np.max(1.0 - grid[:-1] / grid[1:])) / width))))
     with progress_bar(progress, SCAN + bisections, "steps", quantity.replace("_", " ")) as tick:
-        for k, x in enumerate(grid[::-1]):
-            failing = fails(np.full(len(open_), x), open_)
-            good[open_[~failing]] = x
-            bad[open_[failing]] = x
-            open_ = open_[~failing]
-            tick(k + 1)
-            if not len(open_):
-                break
+        good, bad = search.brackets(grid, tick)
         refined = np.isfinite(good) & np.isfinite(bad)
-        step = 0
-        while (rows := np.flatnonzero(refined & (good - bad > width * good))).size:
-            middle = 0.5 * (good[rows] + bad[rows])
-            failing = fails(middle, rows)
-            bad[rows[failing]] = middle[failing]
-            good[rows[~failing]] = middle[~failing]
-            step += 1
-            tick(min(SCAN + step, SCAN + bisections))
+        search.bisect(good, bad, width, lambda step: tick(min(SCAN + step, SCAN + bisections)))
     unit = parameter.unit
     return CriticalValues(
         phase=np.rad2deg(angle) * u.deg,
@@ -229,8 +192,74 @@ def critical(
         error=np.where(refined, good - bad, np.nan) * unit,
         quantity=quantity,
         outcome=str(outcome),
-        range=(ends[0] * unit, ends[1] * unit),
+        range=(float(grid[0]) * unit, float(grid[-1]) * unit),
     )
+
+
+class _Search(NamedTuple):
+    """Search of the critical values of one encounter at several phases (rad); `worst` is the accepted severity."""
+
+    body: Body
+    encounter: Encounter
+    parameter: Parameter
+    attitude: Array
+    angle: Array
+    worst: int
+    workers: int | None
+
+    def fails(self, values: Array, rows: NDArray[np.int64]) -> NDArray[np.bool_]:
+        """Mask of the phases `rows` whose outcome is worse than accepted at the values, one for each phase."""
+        scenes = [self.parameter.apply(self.body, self.encounter, float(x)) for x in values]
+        turns = [
+            attitude_at_start(b, e, self.attitude @ about_z(float(a)))
+            for (b, e), a in zip(scenes, self.angle[rows], strict=True)
+        ]
+        table = flyby_many(
+            [b for b, _ in scenes], [e for _, e in scenes], turns, workers=self.workers, progress=False
+        )
+        return np.array([SEVERITY.index(str(v)) > self.worst for v in table.verdict])
+
+    def brackets(self, grid: Array, tick: Callable[[int], object]) -> tuple[Array, Array]:
+        """Scan the grid from its safe, last end: the least safe value and the first failing one of each phase.
+
+        The safe value is infinite where the last value of the grid fails, the failing one nan where none fails.
+        """
+        n = len(self.angle)
+        good, bad = np.full(n, np.inf), np.full(n, np.nan)
+        safe = np.arange(n)
+        for k, x in enumerate(grid[::-1]):
+            failing = self.fails(np.full(len(safe), x), safe)
+            good[safe[~failing]] = x
+            bad[safe[failing]] = x
+            safe = safe[~failing]
+            tick(k + 1)
+            if not len(safe):
+                break
+        return good, bad
+
+    def bisect(self, good: Array, bad: Array, width: float, tick: Callable[[int], object]) -> None:
+        """Halve the brackets in place until they are narrower than `width` times their safe ends."""
+        refined = np.isfinite(good) & np.isfinite(bad)
+        step = 0
+        while (rows := np.flatnonzero(refined & (good - bad > width * good))).size:
+            middle = 0.5 * (good[rows] + bad[rows])
+            failing = self.fails(middle, rows)
+            bad[rows[failing]] = middle[failing]
+            good[rows[~failing]] = middle[~failing]
+            step += 1
+            tick(step)
+
+
+def _grid(parameter: Parameter, low: Quantity | None, high: Quantity | None) -> Array:
+    """Values at which a parameter is scanned, ascending, in its unit."""
+    first, last = (
+        end if given is None else float(to_si(given, parameter.unit, name, low=0.0))
+        for given, end, name in ((low, parameter.low, "low"), (high, parameter.high, "high"))
+    )
+    if not first < last:
+        raise InvalidInput("low", low, f"less than high = {last:g} {parameter.unit}")
+    space = np.geomspace if parameter.logarithmic and first > 0.0 else np.linspace
+    return np.asarray(space(first, last, SCAN))
 
 
 def _parameter(quantity: str) -> Parameter:
