@@ -17,7 +17,7 @@ from astropy.time import Time
 
 from flybystab.catalogues.catalogue import Asteroid
 from flybystab.encounter.encounter import Encounter
-from flybystab.flybys.escalation import HANDED_ON
+from flybystab.flybys.escalation import ESCALATED
 from flybystab.screening.encounters import Passage
 from flybystab.screening.screening import Screening
 from flybystab.screening.settings import settings
@@ -57,7 +57,7 @@ def main(arguments: list[str] | None = None) -> None:
     screened(1.4, 4, 100)  # compiled
     for q in np.arange(1.5, 4.0, 0.1):
         rows, without = screened(float(q), options.samples, None)
-        needing = sum(r["verdict"] in HANDED_ON for r in rows)
+        needing = sum(r["verdict"] in ESCALATED for r in rows)
         if needing <= 0.01 * options.samples:
             break
     rows, seconds = screened(float(q), options.samples, options.grains)

@@ -59,7 +59,7 @@ def test_only_the_samples_that_need_them_are_carried_on():
     assert json.dumps(far) == json.dumps(plain["rows"][1])
     carried = 0
     for before, after in zip(plain["samples"], found["samples"], strict=True):
-        if before["verdict"] in grain_samples.HANDED_ON:
+        if before["verdict"] in grain_samples.ESCALATED:
             carried += after["decided_by"] == "grains"
             assert after["decided_by"] == "grains" or after["error"].startswith("no grains")
             assert after["verdict"] != "BEYOND MODEL" or after["error"]
@@ -148,7 +148,7 @@ def test_a_sample_without_grains_keeps_its_verdict_and_the_reason():
     )
     ((_, found),) = run.results()
     row = found["rows"][0]
-    if row["verdict"] in grain_samples.HANDED_ON:
+    if row["verdict"] in grain_samples.ESCALATED:
         assert row["decided_by"] == "dynamics"
         assert "no grains: InvalidInput: friction_angle" in row["error"]
 

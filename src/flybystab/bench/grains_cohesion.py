@@ -14,6 +14,7 @@ import sys
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from flybystab.body.grain_calibration import PATCH, Friction, friction_table
 from flybystab.body.packing import settled_pile, simulation_of
@@ -33,7 +34,13 @@ STRENGTH = 1.0
 def cohesive_sphere(friction: Friction, seed: int, grains: int = 528) -> Simulation:
     """A settled sphere, cohesive and at rest without gravity."""
     mu_s, beta = friction.mu_s, max(friction.beta, PATCH)
-    inputs = {"shape": np.ones(3), "grains": grains, "seed": seed, "mu_s": mu_s, "beta": beta}
+    inputs: dict[str, ArrayLike] = {
+        "shape": np.ones(3),
+        "grains": grains,
+        "seed": seed,
+        "mu_s": mu_s,
+        "beta": beta,
+    }
     arrays = stored_pile(inputs, lambda: settled_pile(np.ones(3), grains, seed, mu_s, beta))
     sim = simulation_of(arrays, mu_s, beta, cohesion=STRENGTH / (GUESS * beta**2), strength=STRENGTH)
     sim.advance(1.0, gravity=False, drag=3.0)

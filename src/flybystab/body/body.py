@@ -24,11 +24,11 @@ if TYPE_CHECKING:
 YIELD_SURFACES = NAMES
 #: States of a body: one whole body at rest, and the possible states after an encounter.
 STATES = ("rigid", "flowing", "dispersed", "fluid", "partly unbound", "on the ground")
-#: The default yield surface: of the four the one in best agreement with simulations of grains. The cone through
-#: triaxial compression overestimates the strength of a stretched body.
+#: The default yield surface, which of the four agrees best with simulations of grains. The cone through triaxial
+#: compression overestimates the strength of a stretched body.
 DEFAULT_SURFACE = DEFAULT
-#: Bulk densities of an asteroid, kg/m3: below the lightest comets, above the heaviest metal. Values beyond are
-#: mistakes, mostly of the unit.
+#: Bulk densities of an asteroid, kg/m3: below the lightest comets, above the heaviest metal. A value
+#: outside this range is an error, usually of the unit.
 DENSITY_RANGE = (50.0, 25_000.0)
 
 
@@ -43,7 +43,7 @@ class Material:
     cohesion : Quantity
         Mohr-Coulomb cohesion ``Y`` (shear strength at zero pressure), Pa.
     dilatancy : float
-        Below 1 the rate of strain is along the stress deviator with ``tr D = beta |D'|``, ``beta`` this share of the
+        Below 1 the rate of strain is along the stress deviator with ``tr D = beta |D'|``, ``beta`` this fraction of the
         least slope ``k`` of the yield surface; 0 preserves volume. 1 is associative: ``D`` along the true normal.
     yield_surface : str
         One of :data:`YIELD_SURFACES`, Mohr-Coulomb by default. ``"drucker-prager"`` is the cone through triaxial
@@ -117,14 +117,15 @@ class Material:
         more += ["brittle"] if self.brittle else []
         more += [] if self.bulk_modulus is None else [f"bulk modulus {brief(self.bulk_modulus)}"]
         more += [f"tensile strength {brief(self.t_pa * u.Pa)}"] if self.cut_off else []
-        said = [self.yield_surface, brief(self.friction_angle), brief(self.cohesion), *more]
-        return f"<Material {', '.join(said)}>"
+        parts = [self.yield_surface, brief(self.friction_angle), brief(self.cohesion), *more]
+        return f"<Material {', '.join(parts)}>"
 
 
-def check_body(body: Any) -> None:
-    """Raise InvalidInput for anything but a body."""
+def check_body(body: object) -> Body:
+    """Return the body; raise InvalidInput for anything else."""
     if not isinstance(body, Body):
         raise InvalidInput("body", body, "a flybystab.Body (of an asteroid: asteroid.body)")
+    return body
 
 
 def refuse_cut_off(material: Material, what: str) -> None:
@@ -136,11 +137,11 @@ def refuse_cut_off(material: Material, what: str) -> None:
         )
 
 
-def check_settled(body: Any) -> None:
+def check_settled(body: object) -> None:
     """Raise InvalidInput for anything but a body, UnsettledBody for a body that is not at rest."""
-    check_body(body)
-    if body.state != "rigid":
-        raise UnsettledBody("body", body, f"one whole body at rest; this one is {body.state}")
+    state = check_body(body).state
+    if state != "rigid":
+        raise UnsettledBody("body", body, f"one whole body at rest; this one is {state}")
 
 
 @dataclass(frozen=True, eq=False)

@@ -51,19 +51,19 @@ SHELLS, DIRECTIONS = 16, 600
 
 @dataclass(frozen=True, eq=False, repr=False)
 class YieldRegion(Record):
-    """Where the elastic stress exceeds the strength of a material.
+    """Region of a body in which the elastic stress exceeds the strength of a material.
 
     Attributes
     ----------
     share : float
-        Share of the volume.
+        Fraction of the volume.
     point : Quantity, shape (3,)
-        Point at which yield starts if the cohesion decreases, where :attr:`required_cohesion` is needed; principal
-        axes, m.
+        Point at which yield starts if the cohesion decreases, where the body requires :attr:`required_cohesion`;
+        principal axes, m.
     depth : float
         Depth of that point: 0 at the surface, 1 at the centre.
     required_cohesion : Quantity
-        Largest cohesion needed anywhere at the friction angle of the material, Pa.
+        Largest cohesion that any point requires at the friction angle of the material, Pa.
     """
 
     share: float
@@ -105,7 +105,7 @@ class ElasticStress(Record):
 
     @check_arguments
     def yield_region(self, material: Material | None = None) -> YieldRegion:
-        """Share of the volume beyond the yield surface of a material, and where yield starts.
+        """Fraction of the volume beyond the yield surface of a material, and the point at which yield starts.
 
         Parameters
         ----------
@@ -119,16 +119,16 @@ class ElasticStress(Record):
         x = points * self.body.axes
         stress = _stress_rows(x, self.body.axes, self.poisson) @ self._coefficients
         six = np.stack([stress[:, i, j] for i, j in COMPONENTS], axis=-1)
-        needed = np.empty(len(x))
+        required = np.empty(len(x))
         for n, components in enumerate(six):
             p, norm, det = invariants(components)
-            needed[n] = required_cohesion(m.surface_code, m.phi, norm, p, det)
-        worst = int(np.argmax(needed))
+            required[n] = required_cohesion(m.surface_code, m.phi, norm, p, det)
+        worst = int(np.argmax(required))
         return YieldRegion(
-            float(weights[needed > m.c_pa].sum() / weights.sum()),
+            float(weights[required > m.c_pa].sum() / weights.sum()),
             x[worst] * u.m,
             float(1.0 - np.linalg.norm(points[worst])),
-            float(needed[worst]) * u.Pa,
+            float(required[worst]) * u.Pa,
         )
 
 

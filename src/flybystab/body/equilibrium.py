@@ -11,11 +11,11 @@ for equilibrium everywhere inside the body.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
+from numpy.typing import ArrayLike
 
 from flybystab.arguments import check_arguments
 from flybystab.body.body import (
@@ -90,19 +90,19 @@ class Equilibrium(Record):
 
     @check_arguments
     def other_surfaces(self, resolution: Quantity = 0.05 * u.deg) -> str:
-        """Required friction on the default surface or the compression cone where it differs from the body's, as text.
+        """Required friction, as text, on the default surface and the compression cone where it differs from the body's.
 
-        Empty where it does not, by more than `resolution`.
+        Empty if no difference exceeds `resolution`.
         """
         resolution = to_si(resolution, u.deg, "resolution", low=0.0) * u.deg
         own = self.required_friction_angle
-        said = []
+        parts = []
         for name, angle in self.required_by_surface.items():
             differs = angle != own if np.isinf(angle) or np.isinf(own) else abs(angle - own) > resolution
             if name != self.body.material.yield_surface and differs:
                 need = brief(angle) if np.isfinite(angle) else "no friction suffices"
-                said.append(f"{name} {need}")
-        return ", ".join(said)
+                parts.append(f"{name} {need}")
+        return ", ".join(parts)
 
     def __repr__(self) -> str:
         phi = self.required_friction_angle
@@ -115,7 +115,9 @@ class Equilibrium(Record):
         )
 
 
-def point_tide(mass_parameter: Quantity, distance: Quantity, direction: Any = (1.0, 0.0, 0.0)) -> Quantity:
+def point_tide(
+    mass_parameter: Quantity, distance: Quantity, direction: ArrayLike | Quantity = (1.0, 0.0, 0.0)
+) -> Quantity:
     """Tidal tensor ``(GM/d^3)(3 n n - 1)`` of a point mass, shape (3, 3), s^-2, in body axes.
 
     Parameters
@@ -145,7 +147,7 @@ def synchronous(body: Body, mass_parameter: Quantity, distance: Quantity) -> Bod
 
 
 def stress_components(body: Body, tide: Quantity | None = None) -> Array:
-    """Six components (``xx, yy, zz, xy, xz, yz``, body axes, Pa) of the stress that rigidity needs."""
+    """Six components (``xx, yy, zz, xy, xz, yz``, body axes, Pa) of the stress that rigid rotation requires."""
     out = np.empty(6)
     s = body.axes**2
     rigid_stress(s[0], s[1], s[2], body.rho, np.pi * G * body.rho, body.omega, tide_components(tide), out)
@@ -237,8 +239,8 @@ def spin_limits(body: Body, friction_angle: Quantity | None = None) -> Quantity:
     Returns
     -------
     Quantity, shape (..., 2)
-        Angular rates, rad/s; nan where no spin is borne. A lower limit above zero means that the shape is
-        too elongated to exist without spin.
+        Angular rates, rad/s; nan where the material bears no spin. With a lower limit above zero the shape is too
+        elongated to exist without spin.
     """
     base, load = _spin_line(body)
     limits = _loads(body, friction_angle, base, load)
@@ -258,7 +260,7 @@ def failure_distance(
     mass_parameter: Quantity,
     friction_angle: Quantity | None = None,
     *,
-    direction: Any = (1.0, 0.0, 0.0),
+    direction: ArrayLike | Quantity = (1.0, 0.0, 0.0),
     synchronous: bool = False,
 ) -> Quantity:
     """Distance from a point mass inside which a static tide exceeds the strength of the body.
@@ -279,12 +281,12 @@ def failure_distance(
     Returns
     -------
     Quantity, shape (...)
-        Metres; zero where any tide is borne, nan where the body fails far from the planet already.
+        Metres; zero where the body withstands any tide, nan where it fails even far from the planet.
 
     Notes
     -----
-    The stress is affine in ``GM/d^3``, so that the tides that can be borne form one interval. A synchronous
-    body may need a tide: its own lower limit (a distance beyond which it fails) is not returned here.
+    The stress is affine in ``GM/d^3``, so that the tides that the body withstands form one interval. A synchronous
+    body may require a tide: the distance beyond which it fails is not returned.
     """
     refuse_cut_off(body.material, "failure_distance")
     gm = to_si(mass_parameter, u.m**3 / u.s**2, "mass_parameter", low=0.0, open_low=True)

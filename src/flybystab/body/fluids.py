@@ -75,7 +75,7 @@ def roche(a2_a1: float) -> FluidEllipsoid:
 
 
 def roche_limit() -> FluidEllipsoid:
-    """The Roche ellipsoid in the strongest tide: no synchronous fluid satellite exists any closer.
+    """The Roche ellipsoid in the strongest tide: no synchronous fluid satellite exists at a smaller distance.
 
     ``d = R_p (4 rho_p/(3 load rho))^(1/3)``, 2.455 R_p at equal densities.
     """

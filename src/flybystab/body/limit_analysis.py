@@ -39,7 +39,7 @@ from flybystab.units import brief
 TERMS = np.array([[0, 0, 0], [2, 0, 0], [0, 2, 0], [0, 0, 2], [1, 1, 0], [1, 0, 1], [0, 1, 1]])
 #: Every n-th point of the quadrature over the volume at which the stress is optimised.
 THINNING = 24
-#: Sharpness of the smooth maximum of the needed cohesion, over its largest value, in successive minimisations.
+#: Sharpness of the smooth maximum of the required cohesion, over its largest value, in successive minimisations.
 SHARPNESS = (10.0, 50.0, 250.0)
 
 
@@ -54,7 +54,7 @@ class CohesionBounds(Record):
     sufficient : Quantity
         With it no part of the body needs to yield, Pa.
     point : Quantity, shape (3,)
-        Where the best stress field needs that cohesion, principal axes, m; the centre if none is needed.
+        Point at which the best stress field requires that cohesion, principal axes, m; the centre if it requires none.
     """
 
     necessary: Quantity
@@ -89,8 +89,8 @@ def cohesion_bounds(
     average = np.empty(6)
     s = body.axes**2
     rigid_stress(s[0], s[1], s[2], body.rho, np.pi * G * body.rho, body.omega, tide_components(tide), average)
-    necessary = float(_needed(average[None], m)[0])
-    if necessary <= 0.0:  # then the field (5/2) s (1 - m^2) needs none either
+    necessary = float(_required(average[None], m)[0])
+    if necessary <= 0.0:  # the field (5/2) s (1 - m^2) then requires none either
         return CohesionBounds(0.0 * u.Pa, 0.0 * u.Pa, np.zeros(3) * u.m)
     free = self_equilibrated(body.axes)
     points = np.concatenate([ball_quadrature()[0], sphere_directions(DIRECTIONS), np.zeros((1, 3))])
@@ -99,21 +99,21 @@ def cohesion_bounds(
         given = 2.5 * (1.0 - np.sum(at * at, axis=1))[:, None] * average
         return given, np.einsum("nt,ftc->nfc", _terms(at), free)
 
-    given, ways = fields(points[::THINNING])
+    given, modes = fields(points[::THINNING])
     scale = float(np.abs(average).max()) or 1.0
     weights = np.zeros(len(free))
     for sharpness in SHARPNESS:
 
         def smooth(w: Array, s: float = sharpness) -> tuple[float, Array]:
-            stress = given + scale * np.einsum("f,nfc->nc", w, ways)
-            needed, slope = _needed_and_slope(stress, scale * ways, m)
-            e = s / scale * needed
+            stress = given + scale * np.einsum("f,nfc->nc", w, modes)
+            required, slope = _required_and_slope(stress, scale * modes, m)
+            e = s / scale * required
             return float(logsumexp(e) * scale / s) / scale, softmax(e) @ slope / scale
 
         weights = minimize(smooth, weights, jac=True, method="BFGS", options={"gtol": 1e-6}).x
-    given, ways = fields(points)
+    given, modes = fields(points)
     candidates = [
-        _needed(given + scale * np.einsum("f,nfc->nc", w, ways), m) for w in (weights, 0.0 * weights)
+        _required(given + scale * np.einsum("f,nfc->nc", w, modes), m) for w in (weights, 0.0 * weights)
     ]
     best = min(candidates, key=lambda c: float(c.max()))
     worst = int(np.argmax(best))
@@ -163,18 +163,18 @@ def _derivative(powers: Array, axis: int, at: Array) -> float:
     return float(powers[axis] * np.prod(at**lower))
 
 
-def _needed(stress: Array, m: Material) -> Array:
-    """Cohesion needed by stresses (n, 6), Pa; negative where there is a reserve."""
+def _required(stress: Array, m: Material) -> Array:
+    """Cohesion that stresses (n, 6) require, Pa; negative where there is a reserve."""
     return np.array([overload(m.surface_code, m.phi, 0.0, six) for six in stress]) / np.cos(m.phi)
 
 
-def _needed_and_slope(stress: Array, ways: Array, m: Material) -> tuple[Array, Array]:
-    """Needed cohesion (n,) and its derivatives (n, f) along the fields, by central differences."""
+def _required_and_slope(stress: Array, modes: Array, m: Material) -> tuple[Array, Array]:
+    """Required cohesion (n,) and its derivatives (n, f) along the fields, by central differences."""
     size = float(np.abs(stress).max())
-    slope = np.empty(ways.shape[:2])
-    for f in range(ways.shape[1]):
-        step = 1e-5 * size / max(float(np.abs(ways[:, f]).max()), 1e-300)
-        slope[:, f] = (_needed(stress + step * ways[:, f], m) - _needed(stress - step * ways[:, f], m)) / (
-            2.0 * step
-        )
-    return _needed(stress, m), slope
+    slope = np.empty(modes.shape[:2])
+    for f in range(modes.shape[1]):
+        step = 1e-5 * size / max(float(np.abs(modes[:, f]).max()), 1e-300)
+        slope[:, f] = (
+            _required(stress + step * modes[:, f], m) - _required(stress - step * modes[:, f], m)
+        ) / (2.0 * step)
+    return _required(stress, m), slope

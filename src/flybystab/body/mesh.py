@@ -103,7 +103,7 @@ def self_intersections(vertices: Array, facets: Integers) -> Integers:
 
 
 def _pierced(start: Array, end: Array, triangle: Array) -> NDArray[np.bool_]:
-    """Whether the segments ``(n, 3)`` cross the triangles ``(n, 3, 3)`` (Moller & Trumbore 1997)."""
+    """Mask of the segments ``(n, 3)`` that cross their triangles ``(n, 3, 3)`` (Moller & Trumbore 1997)."""
     direction = end - start
     first, second = triangle[:, 1] - triangle[:, 0], triangle[:, 2] - triangle[:, 0]
     normal = np.cross(direction, second)

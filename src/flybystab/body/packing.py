@@ -21,7 +21,7 @@ from flybystab.core.grains.simulation import Simulation
 from flybystab.core.grains.state import CENTRAL_PRESSURE, OVERLAP, Contact, Grains, contact_parameters
 from flybystab.typing import Array
 
-#: Sum of the grains' volumes over that of the ellipsoid, of the first guess.
+#: First estimate of the packing fraction: volume of the grains over that of the ellipsoid.
 _PACKING = 0.6
 #: Number of grains in the initial cloud, over that of the pile.
 _SURPLUS = 1.35
@@ -80,14 +80,14 @@ def settled_pile(
     sim.centre()
     m, _, _, inertia, momentum = moments(g, everything)
     sim.add_spin(-spin_of(inertia, momentum))
-    if shape is None:  # a shape was cut out in its principal axes, and its sides must not be exchanged
+    if shape is None:  # a shape is already in its principal axes, which must not be permuted
         _, turn = semi_axes(m, inertia)
         sim.rotate(turn.T)
     return sim
 
 
 def _scattered(axes: Array, radius: Array, generator: np.random.Generator) -> Array:
-    """Places of spheres at random in an ellipsoid, none overlapping, the largest placed first."""
+    """Random positions of spheres in an ellipsoid without overlaps, placed in order of decreasing radius."""
     x = np.empty((len(radius), 3))
     order = np.argsort(-radius)
     for k, i in enumerate(order):
@@ -131,7 +131,7 @@ def _protrusion(shape: Shape, axes: Array) -> float:
 
 
 def _inside(shape: Shape, x: Array) -> NDArray[np.bool_]:
-    """Which points (m, principal axes) lie inside a polyhedron: the Laplacian of its potential vanishes outside."""
+    """Mask of the points (m, principal axes) inside a polyhedron: the Laplacian of its potential vanishes outside."""
     _, _, gradient = shape.gravity(x * u.m, 1.0 * u.kg / u.m**3)
     trace = np.trace(gradient.value, axis1=1, axis2=2)
     return np.asarray(trace < 0.5 * trace.min()) if trace.min() < 0.0 else np.zeros(len(x), np.bool_)
@@ -152,7 +152,7 @@ def _cut(g: Grains, shape: Shape, count: int) -> NDArray[np.int64]:
             high, more = size, found
         if held.sum() == count:
             break
-    # between two sizes that differ by rounding the order is of no consequence
+    # the two sizes differ by rounding: any grains between them may be taken
     rest = np.flatnonzero(more & ~held)[: count - int(held.sum())]
     return np.sort(np.concatenate([np.flatnonzero(held), rest]))
 

@@ -10,17 +10,17 @@ from __future__ import annotations
 import os
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
 
 import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
+from numpy.typing import ArrayLike
 
 from flybystab.arguments import check_arguments
 from flybystab.body.body import Body, Material, check_settled, refuse_cut_off
 from flybystab.body.grain_calibration import Friction, contact_cohesion, contact_friction
 from flybystab.body.grain_sizes import GrainSizes, grain_sizes
-from flybystab.body.packing import settled_pile, simulation_of
+from flybystab.body.packing import OVERLAP, settled_pile, simulation_of
 from flybystab.body.pile_cache import arrays_of, stored_pile
 from flybystab.body.pile_strength import spin_up
 from flybystab.body.shape import Shape
@@ -32,7 +32,7 @@ from flybystab.errors import InvalidInput
 from flybystab.typing import Array
 from flybystab.units import whole
 
-#: Least and largest number of grains: fewer do not resolve a shape, more take hours.
+#: Least and largest number of grains: fewer do not resolve a shape, more take days to compute.
 LEAST, MOST = 20, 200_000
 #: Memory of a pile, bytes a grain.
 _BYTES = 4000
@@ -82,7 +82,8 @@ def make_pile(
     shape: Shape | None = None,
     sizes: GrainSizes | None = None,
     keep: bool = True,
-    **options: Any,
+    overlap: float = OVERLAP,
+    **options: object,
 ) -> PileState:
     """A pile with the shape, density, spin, friction angle and cohesion of a body.
 
@@ -101,9 +102,10 @@ def make_pile(
         Of the grains.
     keep : bool
         Whether to read the pile from the cache, and to store it there (:mod:`flybystab.body.pile_cache`).
+    overlap : float
+        Mean overlap of the grains over their radius, which sets the stiffness.
     **options
-        Of :class:`flybystab.core.grains.simulation.Simulation`, for tests of the numerics; and `overlap`, the mean
-        overlap that sets the stiffness. Not for piles from the cache.
+        Attributes of :class:`flybystab.core.grains.simulation.Simulation`, for tests of the numerics.
 
     Raises
     ------
@@ -116,7 +118,7 @@ def make_pile(
     friction = friction or contact_friction(body.material.phi)
     cohesion, friction = contact_cohesion(body.material.c_pa, friction, _central_pressure(body))
     axes = body.axes / np.cbrt(np.prod(body.axes))
-    inputs: dict[str, Any] = {
+    inputs: dict[str, ArrayLike] = {
         "shape": axes, "grains": grains, "seed": seed, "mu_s": friction.mu_s, "beta": friction.beta,
     }  # fmt: skip
     if sizes is not None and sizes != GrainSizes():
@@ -131,7 +133,7 @@ def make_pile(
     arrays = stored_pile(inputs, settled) if keep else arrays_of(settled())
     strength = body.material.c_pa / _pressure_unit(body)
     cohesion /= _pressure_unit(body)
-    sim = simulation_of(arrays, friction.mu_s, friction.beta, cohesion=cohesion, strength=strength, **options)
+    sim = simulation_of(arrays, friction.mu_s, friction.beta, overlap, cohesion, strength, **options)
     if cohesion > 0.0:
         sim.advance(_COHERED, drag=_DRAG)
         sim.centre()
@@ -149,12 +151,12 @@ def _pressure_unit(body: Body) -> float:
 
 
 def _central_pressure(body: Body) -> float:
-    """Pressure in the middle of the sphere of equal mass and volume, Pa."""
+    """Central pressure of the sphere of equal mass and volume, Pa."""
     return float(2.0 / 3.0 * np.pi * G * body.rho**2 * np.prod(body.axes) ** (2.0 / 3.0))
 
 
 def checked_number(grains: int) -> int:
-    """Raise InvalidInput for a number of grains out of range."""
+    """The number of grains; raises InvalidInput for one out of range."""
     if not isinstance(grains, int | np.integer) or isinstance(grains, bool) or not grains >= LEAST:
         raise InvalidInput("grains", grains, f"a whole number of grains, {LEAST} or more")
     fitting = int(_memory() / _BYTES) if np.isfinite(_memory()) else MOST
@@ -190,23 +192,23 @@ def spun(sim: Simulation, body: Body, friction: Friction, size: float = 1.0) -> 
     `size` is that of the ellipsoid with the pile's inertia over that of the body.
     """
     g = sim.grains
-    everything = g.mass > 0.0
-    mass, _, _, inertia, _ = moments(g, everything)
+    held = g.mass > 0.0
+    mass, _, _, inertia, _ = moments(g, held)
     axes, _ = semi_axes(mass, inertia)
     length = size * float(np.cbrt(np.prod(body.axes) / np.prod(axes)))
     unit = float(np.sqrt(length**3 / (G * body.mass.to_value(u.kg))))
     spin = body.omega * unit
     start = g.x.copy()
-    sim.add_spin(spin - spin_of(inertia, moments(g, everything)[4]))
+    sim.add_spin(spin - spin_of(inertia, moments(g, held)[4]))
     sim.advance(2.2)
-    # undo the rotation that the pile has made: the best one between the positions (Kabsch 1976)
+    # reverse the rotation of the pile: the best fit between the positions before and after (Kabsch 1976)
     left, _, right = np.linalg.svd(g.x.T @ (g.mass[:, None] * start))
     turn = right.T @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ left.T
     sim.rotate(turn)
     sim.centre()
-    mass, _, _, inertia, momentum = moments(g, everything)
+    mass, _, _, inertia, momentum = moments(g, held)
     sim.add_spin(spin - spin_of(inertia, momentum))
-    mass, _, _, inertia, momentum = moments(g, everything)
+    mass, _, _, inertia, momentum = moments(g, held)
     axes, _ = semi_axes(mass, inertia)
     sim.time = 0.0
     return PileState(sim, length, unit, friction, axes * length, spin_of(inertia, momentum) / unit)

@@ -7,11 +7,11 @@ import io
 import json
 import os
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from flybystab.core.grains.simulation import Simulation
 from flybystab.files import replace_file
@@ -30,7 +30,7 @@ def cache_folder() -> Path:
     return Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache") / "flybystab" / "piles"
 
 
-def stored_pile(inputs: dict[str, Any], make: Callable[[], Simulation]) -> dict[str, Array]:
+def stored_pile(inputs: Mapping[str, ArrayLike], make: Callable[[], Simulation]) -> dict[str, Array]:
     """The arrays of a settled pile, read from disk if they are stored there and intact.
 
     Parameters
@@ -46,7 +46,7 @@ def stored_pile(inputs: dict[str, Any], make: Callable[[], Simulation]) -> dict[
     }
     key = hashlib.sha256(json.dumps([RECIPE, plain], sort_keys=True).encode()).hexdigest()[:32]
     path = cache_folder() / f"{key}.npz"
-    n = int(inputs["grains"])
+    n = int(np.asarray(inputs["grains"]))
     try:
         with np.load(path, allow_pickle=False) as stored:
             found = {k: stored[k] for k in _STORED}
@@ -60,7 +60,7 @@ def stored_pile(inputs: dict[str, Any], make: Callable[[], Simulation]) -> dict[
         content = io.BytesIO()
         np.savez(content, **arrays)  # type: ignore[arg-type]
         replace_file(path, content.getvalue())
-    except OSError:  # without a cache the pile is made anew at every use
+    except OSError:  # without a cache the pile is recomputed at every use
         pass
     return arrays
 

@@ -9,11 +9,11 @@ ends. A deforming body is at yield: brittle cohesion is lost at once.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
+from numpy.typing import ArrayLike
 
 from flybystab.arguments import check_arguments
 from flybystab.body.body import Body, check_body, refuse_cut_off
@@ -31,7 +31,7 @@ from flybystab.tabular import Record
 from flybystab.typing import Array
 from flybystab.units import to_si
 
-#: Duration of the integration of a perturbed body, in dynamical times: at rest it may tumble and yield again.
+#: Duration of the integration of a perturbed body, in dynamical times: a body at rest may tumble and yield again.
 PATIENCE = 100.0
 
 
@@ -61,7 +61,12 @@ class Recovery(Record):
 
 
 def pushed(
-    body: Body, direction: Any, energy: Quantity, *, dilatancy: float | None = None, tolerance: float = 1e-7
+    body: Body,
+    direction: ArrayLike | Quantity,
+    energy: Quantity,
+    *,
+    dilatancy: float | None = None,
+    tolerance: float = 1e-7,
 ) -> Recovery:
     """Motion of a free body after one perturbation.
 
@@ -96,7 +101,7 @@ def pushed(
 @check_arguments
 def recovery_energy(
     body: Body,
-    direction: Any,
+    direction: ArrayLike | Quantity,
     *,
     dilatancy: float | None = None,
     low: float = 3e-4,
@@ -176,8 +181,8 @@ class RecoveryLimit(Record):
     def __repr__(self) -> str:
         if not np.isfinite(self.energy):
             return f"<RecoveryLimit no loss found up to the largest energy tried; {self.runs} runs>"
-        share = float(self.energy / self.binding_energy)
-        return f"<RecoveryLimit {share:.3g} of the binding energy, sampling error {self.error:.2g}; {self.runs} runs>"
+        ratio = float(self.energy / self.binding_energy)
+        return f"<RecoveryLimit {ratio:.3g} of the binding energy, sampling error {self.error:.2g}; {self.runs} runs>"
 
 
 @check_arguments
@@ -288,7 +293,7 @@ class _Search:
         return r.recovered and r.strain <= self.largest_strain
 
     def threshold(self, direction: Array, lost: float) -> float:
-        """Least energy of a loss in a direction, given one, by bisection of its logarithm."""
+        """Least energy in a direction at which the body is lost, by bisection of its logarithm; at `lost` it is."""
         low = lost
         while low > self.low:  # decrease by factors first: the threshold is usually close
             low = max(self.low, low / 3.0)
@@ -338,17 +343,18 @@ def _dilatancy(body: Body, dilatancy: float | None) -> float:
     return float(to_si(own, u.dimensionless_unscaled, "dilatancy", low=0.0, high=1.0))
 
 
-def _push(body: Body, direction: Any, energy: float, dilatancy: float, tolerance: float) -> Run:
+def _push(
+    body: Body, direction: ArrayLike | Quantity, energy: float, dilatancy: float, tolerance: float
+) -> Run:
     d = unit_deviator(direction)
     m = body.material
-    squares = body.axes**2
-    arguments: Any = (*squares, np.zeros(3), m.surface_code, m.phi, 0.0, dilatancy, 0.0)
-    scene = ellipsoid(*arguments)
+    squares = s1, s2, s3 = body.axes**2
+    scene = ellipsoid(s1, s2, s3, np.zeros(3), m.surface_code, m.phi, 0.0, dilatancy, 0.0)
     x = np.empty(5)
     strain_direction(components(d), x)
     _, beta = slope_of_flow(scene, x)  # tr D of the flow rule at |D'| = 1
     gradient = np.empty((3, 3))
-    velocity_gradient(squares[0], squares[1], squares[2], components(d + beta / 3.0 * np.eye(3)), gradient)
+    velocity_gradient(s1, s2, s3, components(d + beta / 3.0 * np.eye(3)), gradient)
     # K = tr(L I L^T)/2 with I = (m/5) S
     unit = body.mass.value / 10.0 * float(np.trace(gradient @ np.diag(squares) @ gradient.T))
     limit = max(LARGEST_AXIS_RATIO, 1.001 * body.axes[0] / body.axes[2])

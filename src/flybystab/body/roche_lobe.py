@@ -48,7 +48,7 @@ class RocheLobe(Tabular):
     inside : ndarray of bool, shape (f,)
         Facets below the level: material at rest there cannot leave the lobe.
     share_outside : float
-        Share of the area on the others.
+        Fraction of the surface area on the other facets.
     """
 
     saddle: Quantity | None

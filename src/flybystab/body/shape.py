@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import TYPE_CHECKING, ClassVar
 
 import astropy.units as u
 import numpy as np
@@ -24,6 +24,9 @@ from flybystab.typing import Array
 from flybystab.units import brief, frozen, to_si, whole
 
 Integers = NDArray[np.int64]
+
+if TYPE_CHECKING:
+    from pyvista import PolyData
 
 #: Facets of shapes that are made in code, by default.
 FACETS = 4000
@@ -245,7 +248,7 @@ class Shape:
     def ellipsoid(self) -> Quantity:
         """Semi-axes, m, of the dynamically equivalent ellipsoid of equal volume.
 
-        Its second moments ``a_i^2/5`` per mass, and so its principal moments of inertia, stand in the same ratios as
+        Its second moments ``a_i^2/5`` per mass, and so its principal moments of inertia, are in the same ratios as
         those of the shape.
         """
         axes = np.sqrt(5.0 * np.diag(self._mass.second_moment) / self._mass.volume)
@@ -328,7 +331,7 @@ class Shape:
         write_mesh(Path(path), self.vertices.value, self.facets, fields or {})
 
     @check_arguments
-    def to_pyvista(self, fields: Mapping[str, Quantity] | None = None) -> Any:
+    def to_pyvista(self, fields: Mapping[str, Quantity] | None = None) -> PolyData:
         """The mesh for pyvista, with quantities by facet: ``.plot(scalars=...)`` shows it in three dimensions.
 
         Parameters

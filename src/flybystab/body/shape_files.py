@@ -263,7 +263,7 @@ def _mesh(vertices: object, facets: object) -> Mesh:
     return points, corners
 
 
-#: By name: whether a file has the format, and its reader.
+#: Test and reader of each format, by its name.
 FORMATS: dict[str, tuple[Callable[[bytes], bool], Callable[[bytes], Mesh]]] = {
     "ply": (lambda data: data[:3] == b"ply", _by_trimesh("ply")),
     "stl": (_is_stl, _by_trimesh("stl")),

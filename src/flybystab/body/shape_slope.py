@@ -22,7 +22,7 @@ from flybystab.typing import Array
 
 @check_arguments
 def shape_slopes(shape: Shape, body: Body, tide: Quantity | None = None) -> SurfaceSlopes:
-    """Slopes over the facets of a shape that rotates as a body does, in an optional tide.
+    """Slopes over the facets of a shape at the spin of a body, in an optional tide.
 
     Parameters
     ----------

@@ -1,10 +1,9 @@
 """State of rotation of a free rigid body: the axis of its spin, and the stability of that motion.
 
-Steady spin about the axis of the intermediate moment of inertia is an equilibrium of the stress and an unstable
-motion (Euler's equations; Landau & Lifshitz, Mechanics, section 37): a small tilt grows as ``exp(rate t)`` with
-``rate = omega sqrt((J2 - J1)(J3 - J2)/(J1 J3))``. A body that does not spin about a principal axis
-tumbles: its angular velocity moves along a polhode and its stress changes with it, so that an equilibrium holds at one
-instant of a cycle only.
+Steady spin about the axis of the intermediate moment of inertia is an equilibrium of the stress and an unstable motion
+(Euler's equations; Landau & Lifshitz, Mechanics, section 37): a small tilt grows as ``exp(rate t)`` with ``rate = omega
+sqrt((J2 - J1)(J3 - J2)/(J1 J3))``. A body that does not spin about a principal axis tumbles: its angular velocity moves
+along a polhode and its stress changes with it, so that an equilibrium holds only at one instant of a cycle.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from flybystab.units import brief
 
 #: Points of a polhode at which the stress is evaluated.
 POLHODE_POINTS = 201
-#: Moments of inertia that differ by less than this share count as equal.
+#: Moments of inertia that differ by less than this fraction of the greatest count as equal.
 EQUAL_MOMENTS = 1e-9
 
 
@@ -35,8 +34,8 @@ class SpinState(Record):
     Attributes
     ----------
     mode : str
-        "no spin", "short axis", "middle axis", "long axis" (steady spin about that principal axis),
-        "short-axis mode", "long-axis mode" or "separatrix" (tumbling: about which axis the spin vector circulates).
+        "no spin", "short axis", "middle axis", "long axis" (steady spin about that principal axis), "short-axis mode",
+        "long-axis mode" or "separatrix" (tumbling, with the axis about which the spin vector circulates).
     steady : bool
         Whether the angular velocity is constant in the body.
     growth_rate : Quantity
@@ -128,8 +127,8 @@ def polhode(moments: NDArray[np.float64], omega: NDArray[np.float64]) -> NDArray
         if abs(d) > 1e-12:
             low, high = (max(low, -w / d), min(high, np.inf)) if d > 0.0 else (low, min(high, -w / d))
     # dense at the ends, where omega_i ~ sqrt(distance)
-    share = 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, POLHODE_POINTS)))
-    points = squares + (low + share[:, None] * (high - low)) * along
+    fraction = 0.5 * (1.0 - np.cos(np.linspace(0.0, np.pi, POLHODE_POINTS)))
+    points = squares + (low + fraction[:, None] * (high - low)) * along
     return np.asarray(np.sqrt(np.maximum(points, 0.0)))
 
 
@@ -142,7 +141,7 @@ def _principal_axis(moments: NDArray[np.float64], omega: NDArray[np.float64]) ->
     if spread > EQUAL_MOMENTS * moments[2]:
         return None
     axis = moving[-1]
-    if axis == 1:  # of an oblate or prolate body, the middle axis is no separate axis
+    if axis == 1:  # the middle axis of an oblate or prolate body is not distinct
         if moments[2] - moments[1] <= EQUAL_MOMENTS * moments[2]:
             return 2
         if moments[1] - moments[0] <= EQUAL_MOMENTS * moments[2]:

@@ -15,10 +15,11 @@ not associative no potential exists and the number is an estimate. The differenc
 its quality; :func:`flybystab.recovery` integrates the full dynamics of perturbed bodies and is the reference: over
 16 directions it gives 0.92 to 1.44 of the barrier, with and without cohesion (``python benchmarks/stability.py push``).
 
-Below associative flow a body near yield can have critical energies of zero although it is admissible: once it flows,
-its pressure is the reaction, which can be less than that of the equilibrium, so that friction no longer stops it. An
-example is 1 : 1 : 0.6 with ``omega^2/(pi G rho)`` = 0.8 and 28.2 deg, of which it requires 27.9: any perturbation grows
-at first. It need not leave the model: that takes 0.12 of the binding energy (Mohr-Coulomb, dilatancy 0).
+With a dilatancy below that of associative flow, a body near yield can have critical energies of zero although it is
+admissible: once it flows, its pressure is the reaction to the flow rule, which can be less than that of the
+equilibrium, so that friction no longer stops it. An example is 1 : 1 : 0.6 with ``omega^2/(pi G rho)`` = 0.8 and 28.2
+deg, of which it requires 27.9: any perturbation grows at first. It does not necessarily leave the model, which takes
+0.12 of the binding energy (Mohr-Coulomb, dilatancy 0).
 
 Without a plastic bulk modulus the pressure is that reaction. With one, ``kappa``, it starts at the pressure of
 equilibrium and falls as the material dilates, ``pdot = -kappa tr D``. Under associative flow neither has an effect:
@@ -30,11 +31,12 @@ that paper were not available, and its figures are not claimed to be reproduced.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple
+from typing import Generic, NamedTuple, TypeVar, cast
 
 import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
+from numpy.typing import ArrayLike
 
 from flybystab.arguments import check_arguments
 from flybystab.body.body import DEFAULT_SURFACE, Body, check_body, refuse_cut_off
@@ -45,6 +47,7 @@ from flybystab.core.ellipsoid.potential import carlson_fd
 from flybystab.core.ellipsoid.tide import tensor
 from flybystab.core.energy import stability_row as columns
 from flybystab.core.energy.perturbation import (
+    Ellipsoid,
     ellipsoid,
     loss_at,
     loss_rate,
@@ -59,8 +62,10 @@ from flybystab.tabular import Record
 from flybystab.typing import Array
 from flybystab.units import to_si
 
-#: numpy's, as all flags of the kernels.
-WITH_INERTIA: Any = np.bool_(False)
+#: A numpy boolean, as all flags of the kernels: each kernel is compiled for one type.
+WITH_INERTIA = cast(bool, np.bool_(False))
+
+T = TypeVar("T")
 
 LEVELS = (
     "inadmissible",
@@ -70,12 +75,12 @@ LEVELS = (
 )
 
 
-class Orders(NamedTuple):
+class Orders(NamedTuple, Generic[T]):
     """Values at second order, at third order and from the barrier."""
 
-    second: Any
-    third: Any
-    barrier: Any
+    second: T
+    third: T
+    barrier: T
 
 
 class BodyUnits(NamedTuple):
@@ -116,11 +121,11 @@ class Stability(Record):
         ``P2 < 0`` along the direction that flows first decides for associative flow; otherwise whether the overload
         of the body at rest falls along its flow, whose direction turns with the stress.
     critical_energy : Orders of Quantity
-        Least kinetic energy of deformation, J, that a perturbation of fixed direction needs to overcome friction;
-        inf where none does at that order. The barrier is the least energy that leads to the strain where slow flow
-        goes on by itself, or out of the model (`barrier_kind`). Below associative flow there may be directions in which
-        friction does not stop a perturbation that keeps its direction, although the body is stable and the dynamics
-        turn the direction and stop it: the series to second and third order are then nan, the barrier is not.
+        Least kinetic energy of deformation, J, that a perturbation of fixed direction needs to overcome friction; inf
+        where none does at that order. The barrier is the least energy that leads to the strain at which slow flow
+        continues by itself, or out of the model (`barrier_kind`). Below associative flow there may be directions in
+        which friction does not stop a perturbation that keeps its direction, although the body is stable and the
+        dynamics turn the direction and stop it: the series to second and third order are then nan, the barrier is not.
     critical_strain : Orders of float
         Least strain ``e t`` (measured with ``|D'| = 1``) at which a perturbation begins to grow, at second and third
         order; for the barrier, the strain at which the least barrier is passed. In a direction at the apex
@@ -128,21 +133,21 @@ class Stability(Record):
     directions : Orders of ndarray, shape (3, 3)
         Rate of strain in body axes that has the least critical energy.
     direction : ndarray, shape (3, 3)
-        The one of the second order.
+        That of the second order.
     at_apex : Orders of bool
         Whether that direction dilates faster than the flow rule of the cone (apex of the yield surface).
     barrier_kind : str
         "maximum": beyond the barrier the deformation gains energy; "edge": there the axis ratio passes 6:1, while
-        friction still prevails; "none": no path has either; "inadmissible": the body is not in equilibrium.
+        friction still prevails; "none": no path reaches either; "inadmissible": the body is not in equilibrium.
     spread : float
         Largest over least critical energy of the three orders, less one: the error of the approximation.
     binding_energy : Quantity
         ``(3/5) G m^2 R_F``, J, for scale.
     curvature_at_yield : float
-        ``Phi''/(p V)`` along the direction that flows first if only the required friction were there;
-        negative: stability needs more friction than equilibrium does. nan without a deviator.
+        ``Phi''/(p V)`` along the direction that flows first if only the required friction were available;
+        negative: stability requires more friction than equilibrium. nan without a deviator.
     stable_at_yield : bool
-        Whether that is positive.
+        True if `curvature_at_yield` is positive.
     kappa_crit : Quantity or None
         Plastic bulk modulus above which a body at yield is unstable, Pa; None for associative or
         volume-preserving flow, where ``kappa`` has no effect.
@@ -155,8 +160,8 @@ class Stability(Record):
     steady : bool
         Whether the spin is about a principal axis; for a tumbling body the criterion holds at the present instant.
     spin_state : SpinState
-        State of rotation. Spin about the middle axis is an unstable motion, at the growth rate given there, whatever
-        the levels say: they hold the angular velocity for the short time of a deformation.
+        State of rotation. Spin about the middle axis is an unstable motion, with the growth rate given there,
+        regardless of the level: the criterion holds the angular velocity constant for the short time of a deformation.
     """
 
     body: Body
@@ -165,10 +170,10 @@ class Stability(Record):
     level: int
     admissible: bool
     stable_infinitesimal: bool
-    critical_energy: Orders
-    critical_strain: Orders
-    directions: Orders
-    at_apex: Orders
+    critical_energy: Orders[Quantity]
+    critical_strain: Orders[float]
+    directions: Orders[Array]
+    at_apex: Orders[bool]
     barrier_kind: str
     spread: float
     binding_energy: Quantity
@@ -200,17 +205,17 @@ class Stability(Record):
 
     @check_arguments
     def other_surfaces(self, resolution: float = 0.01) -> str:
-        """Barrier on the default surface or the compression cone where it differs from the body's, as text.
+        """Barrier, as text, on the default surface and the compression cone where it differs from the body's.
 
-        Empty where it does not, by more than `resolution` relative.
+        Empty if no relative difference exceeds `resolution`.
         """
         own = self.critical_energy.barrier.value
-        said = []
+        parts = []
         for name, energy in self.barrier_by_surface.items():
             differs = not np.isclose(energy.value, own, rtol=resolution, atol=0.0)
             if name != self.body.material.yield_surface and differs:
-                said.append(f"{name} {energy.value:.3g} J")
-        return ", ".join(said)
+                parts.append(f"{name} {energy.value:.3g} J")
+        return ", ".join(parts)
 
     @property
     def verdict(self) -> str:
@@ -257,17 +262,15 @@ def stability(body: Body, *, dilatancy: float | None = 1.0) -> Stability:
     row = np.empty(columns.COLUMNS)
     found = np.empty((columns.DIRECTIONS, 5))
     kappa = 0.0 if m.bulk_modulus is None else m.bulk_modulus.to_value(u.Pa)
-    shape: Any = (*(body.axes**2), body.omega * units.time, m.surface_code, m.phi)
-    flow: Any = (flow_cohesion(body) / units.stress, beta, kappa / units.stress)
-    out: Any = (5, row, found)
-    arguments: Any = (*shape, m.c_pa / units.stress, *flow, *out)
+    s1, s2, s3 = body.axes**2
+    spin, code, cohesion = body.omega * units.time, m.surface_code, m.c_pa / units.stress
+    flowing, modulus = flow_cohesion(body) / units.stress, kappa / units.stress
     e = equilibrium(body)
-    classify(*arguments)
+    classify(s1, s2, s3, spin, code, m.phi, cohesion, flowing, beta, modulus, 5, row, found)
     if not e.admissible and row[columns.LEVEL] > 0 and m.cut_off:
         row[columns.LEVEL] = 0
         row[columns.ENERGY_2 : columns.STRAIN_B + 1] = 0.0
-    arguments = (*shape, *flow)
-    scene = ellipsoid(*arguments)
+    scene = ellipsoid(s1, s2, s3, spin, code, m.phi, flowing, beta, modulus)
     energies = Orders(
         *(row[i] * units.energy * u.J for i in (columns.ENERGY_2, columns.ENERGY_3, columns.ENERGY_B))
     )
@@ -333,11 +336,13 @@ class Push(Record):
     direction: Array
     powers: tuple[Quantity, Quantity, Quantity]
     strain: Array
-    loss: Orders
+    loss: Orders[Quantity]
 
 
 @check_arguments
-def push(body: Body, direction: Any, strain: Any, *, dilatancy: float = 1.0) -> Push:
+def push(
+    body: Body, direction: ArrayLike | Quantity, strain: ArrayLike | Quantity, *, dilatancy: float = 1.0
+) -> Push:
     """Kinetic energy lost by a perturbation in a given direction, against strain.
 
     Parameters
@@ -368,8 +373,11 @@ def push(body: Body, direction: Any, strain: Any, *, dilatancy: float = 1.0) -> 
     m = body.material
     refuse_cut_off(m, "push")
     units = body_units(body)
-    arguments: Any = (
-        *(body.axes**2),
+    s1, s2, s3 = body.axes**2
+    scene = ellipsoid(
+        s1,
+        s2,
+        s3,
         body.omega * units.time,
         m.surface_code,
         m.phi,
@@ -377,7 +385,6 @@ def push(body: Body, direction: Any, strain: Any, *, dilatancy: float = 1.0) -> 
         to_si(dilatancy, u.dimensionless_unscaled, "dilatancy", low=0.0, high=1.0),
         0.0 if m.bulk_modulus is None else m.bulk_modulus.to_value(u.Pa) / units.stress,
     )
-    scene = ellipsoid(*arguments)
     p1, p2, p3 = powers(scene, x)
     t = to_si(strain, u.dimensionless_unscaled, "strain", shape=None)
     second = -(t * p1 + t**2 / 2 * p2)
@@ -391,7 +398,7 @@ def push(body: Body, direction: Any, strain: Any, *, dilatancy: float = 1.0) -> 
     )
 
 
-def _kind(scene: Any, x: Array, row: Array) -> str:
+def _kind(scene: Ellipsoid, x: Array, row: Array) -> str:
     """End of the path of the least barrier."""
     if row[columns.LEVEL] < 1:
         return "inadmissible"
@@ -401,12 +408,12 @@ def _kind(scene: Any, x: Array, row: Array) -> str:
     return "edge" if strain > 0.0 and loss_rate(scene, x, strain) > 1e-6 * MASS else "maximum"
 
 
-def _loss(scene: Any, x: Array, t: float) -> float:
+def _loss(scene: Ellipsoid, x: Array, t: float) -> float:
     """Energy that the perturbation has lost at strain `t`, in the units of the kernels."""
     return float(loss_at(scene, x, t, WITH_INERTIA))
 
 
-def _strain_rate(scene: Any, x: Array) -> tuple[Array, bool]:
+def _strain_rate(scene: Ellipsoid, x: Array) -> tuple[Array, bool]:
     """Rate of strain tensor of a direction, and whether it is at the apex."""
     if not np.all(np.isfinite(x)):
         return np.full((3, 3), np.nan), False
@@ -421,7 +428,7 @@ def _inverse_radius(body: Body) -> float:
     return float(carlson_fd(*(body.axes**2))[0])
 
 
-def unit_deviator(direction: Any) -> Array:
+def unit_deviator(direction: ArrayLike | Quantity) -> Array:
     """Deviator (3, 3) of the symmetric part of a rate of strain, scaled to ``|D'| = 1``."""
     d = to_si(direction, u.dimensionless_unscaled, "direction", shape=(3, 3))
     d = 0.5 * (d + d.T)

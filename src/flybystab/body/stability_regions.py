@@ -1,6 +1,6 @@
 """Stability of many bodies at once, and maps over shape and spin: arrays in, arrays out.
 
-The kernels release the interpreter, so that a thread per core shares the rows.
+The kernels release the interpreter lock: the rows are divided among threads, one for each core.
 """
 
 from __future__ import annotations
@@ -8,12 +8,11 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
 from difflib import get_close_matches
-from typing import Any
 
 import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from flybystab.body.body import DEFAULT_SURFACE, YIELD_SURFACES, Body, refuse_cut_off
 from flybystab.body.stability import LEVELS, flow_cohesion
@@ -42,7 +41,7 @@ class StabilityTable:
     required_cohesion, mean_pressure : Quantity
         Pa; pi G rho^2 a^2 with the mean radius ``a`` in a map.
     level : ndarray of int
-        Index into :data:`~flybystab.body.stability.LEVELS`; -1 where the shape is not one.
+        Index into :data:`~flybystab.body.stability.LEVELS`; -1 where the axis ratios are not those of an ellipsoid.
     curvature_at_yield : ndarray
         ``Phi''/(p V)`` with the required friction mobilised.
     energy_second, energy_third, energy_barrier : Quantity
@@ -92,7 +91,7 @@ def stability_many(
     dilatancy : float
         ``beta/min k`` of the test; 1 is associative flow.
     depth : str
-        One of :data:`DEPTHS`: how far to go.
+        One of :data:`DEPTHS`: the last level that is computed.
     workers : int, optional
         Number of threads; one per processor by default.
     threads : int, optional
@@ -139,9 +138,9 @@ def stability_many(
 
 
 def stability_map(
-    a2_a1: Any,
-    a3_a1: Any,
-    w2: Any,
+    a2_a1: ArrayLike,
+    a3_a1: ArrayLike,
+    w2: ArrayLike,
     friction_angle: Quantity,
     *,
     cohesion: float = 0.0,
@@ -156,8 +155,8 @@ def stability_map(
     Parameters
     ----------
     a2_a1, a3_a1, w2 : array_like
-        Axis ratios and ``omega^2/(pi G rho)``, broadcast against each other: for the (a2/a1, a3/a1) plane, say,
-        shapes (1, n), (m, 1) and (). Where ``1 >= a2/a1 >= a3/a1 > 0`` fails there is no shape: level -1, nan.
+        Axis ratios and ``omega^2/(pi G rho)``, broadcast against each other: for example with
+        shapes (1, n), (m, 1) and () for the (a2/a1, a3/a1) plane. Level -1 and nan unless ``1 >= a2/a1 >= a3/a1 > 0``.
     friction_angle : Quantity, scalar
         Of the material.
     cohesion : float
@@ -222,7 +221,7 @@ def _rows(
     beta = to_si(dilatancy, u.dimensionless_unscaled, "dilatancy", low=0.0, high=1.0)
     n = len(s)
     out = np.empty((n, columns.COLUMNS))
-    # Small interleaved chunks: neighbouring cells of a map cost alike, distant ones do not.
+    # Small chunks balance the load: the cost of a cell varies over a map, but little between neighbours.
     size = max(1, min(512, -(-n // (8 * workers))))
     contiguous = [np.ascontiguousarray(v) for v in (s, spin, phi, cohesion, in_flow, kappa)]
 

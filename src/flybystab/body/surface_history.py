@@ -1,8 +1,8 @@
 """Slope and effective acceleration on every facet of a shape, as functions of time.
 
 On each facet the effective acceleration of loose material is ``g = grad U + (K_t - Omega^2 - Omegadot) x``
-(:mod:`flybystab.body.shape_slope`). Its component along the outward normal decides on lift-off, its angle to the inward
-normal is the slope.
+(:mod:`flybystab.body.shape_slope`). Its component along the outward normal determines whether material lifts off; its
+angle to the inward normal is the slope.
 """
 
 from __future__ import annotations
@@ -92,13 +92,13 @@ class SurfaceHistory(Tabular):
         )
 
     def share_past(self, repose: Quantity) -> Array:
-        """Share of the area steeper than an angle of repose at each instant, shape (m,)."""
+        """Fraction of the area steeper than an angle of repose at each instant, shape (m,)."""
         limit = to_si(repose, u.deg, "repose", low=0.0, high=180.0)
         return self._shares(self.slope.value > limit)
 
     @property
     def share_lifted(self) -> Array:
-        """Share of the area whose effective acceleration points outward at each instant, shape (m,)."""
+        """Fraction of the area whose effective acceleration points outward at each instant, shape (m,)."""
         return self._shares(self.outward.value > 0.0)
 
     def refreshed(self, *, repose: Quantity | None = None, rise: Quantity | None = None) -> NDArray[np.bool_]:
@@ -122,7 +122,7 @@ class SurfaceHistory(Tabular):
         return out
 
     def share_refreshed(self, *, repose: Quantity | None = None, rise: Quantity | None = None) -> float:
-        """Share of the area on those facets (arguments: :meth:`refreshed`)."""
+        """Fraction of the area on those facets (arguments: :meth:`refreshed`)."""
         return float(self._shares(self.refreshed(repose=repose, rise=rise)[None])[0])
 
     def fields(self) -> dict[str, Quantity]:

@@ -43,7 +43,7 @@ class SurfaceSlopes(Tabular):
     slope: Quantity
 
     def share_above(self, angle: Quantity) -> float:
-        """Share of the area whose slope passes an angle of repose."""
+        """Fraction of the area whose slope passes an angle of repose."""
         limit = to_si(angle, u.deg, "angle", low=0.0, high=180.0)
         return _share(self.slope.value > limit, self.area.value)
 
@@ -82,14 +82,14 @@ class SlopeChange(Tabular):
         return np.maximum(self.greatest - self.before, self.before - self.least)
 
     def share_passing(self, angle: Quantity) -> float:
-        """Share of the area that was below an angle of repose and passes it during the encounter."""
+        """Fraction of the area that was below an angle of repose and passes it during the encounter."""
         limit = to_si(angle, u.deg, "angle", low=0.0, high=180.0)
         passing = (self.before.value <= limit) & (self.greatest.value > limit)
         return _share(passing, self.area.value)
 
     @property
     def share_lifted(self) -> float:
-        """Share of the area whose slope passes 90 deg at some instant: material is lifted off."""
+        """Fraction of the area whose slope passes 90 deg at some instant: material is lifted off."""
         return _share(self.greatest.value > 90.0, self.area.value)
 
 
@@ -116,7 +116,7 @@ def surface_slopes(body: Body, tide: Quantity | None = None, *, count: int = 400
     Parameters
     ----------
     body : Body
-        Any spin vector: a tumbling body has its Euler acceleration.
+        With any spin vector; for a tumbling body the Euler acceleration is included.
     tide : Quantity, shape (3, 3), optional
         Tidal tensor in body axes, s^-2.
     count : int

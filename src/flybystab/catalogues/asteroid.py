@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import astropy.units as u
 import numpy as np
@@ -101,7 +101,7 @@ class Asteroid(Record):
         orbit: Orbit | None = None,
         body: Body | None = None,
         pole: Quantity | None = None,
-        sigmas: Mapping[str, Any] | None = None,
+        sigmas: Mapping[str, Quantity] | None = None,
         sources: Mapping[str, str] | None = None,
         name: str = "",
     ) -> None:
@@ -254,7 +254,7 @@ class Asteroid(Record):
             row.update(zip(SHAPE, map(repr, axes.tolist()), strict=True))
         return replace(self, row=row)
 
-    def __reduce__(self) -> tuple[Any, ...]:
+    def __reduce__(self) -> tuple[type[Asteroid], tuple[object, ...]]:
         # Without the cached orbit and body, which are rebuilt from the new row.
         return Asteroid, (dict(self.row), self.material, self.file, self.covariance, self.own_orbit)
 
@@ -423,7 +423,9 @@ class Asteroid(Record):
         return ecliptic_direction(float(lon), float(lat))
 
     @check_arguments
-    def attitude(self, angle: Quantity, *, phase: float = 0.0, pole: Any = None) -> np.ndarray:
+    def attitude(
+        self, angle: Quantity, *, phase: float = 0.0, pole: Sequence[float] | Array | None = None
+    ) -> Array:
         """Rotation from body axes to ICRF.
 
         Parameters

@@ -8,7 +8,6 @@ from difflib import get_close_matches
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
-from typing import Any
 
 import astropy.units as u
 import numpy as np
@@ -78,7 +77,7 @@ def _embedded() -> tuple[Asteroid, ...]:
     return tuple(Asteroid(row, file=file) for row, _ in read_native(text, file))
 
 
-def catalogue(path: Any = None) -> tuple[Asteroid, ...]:
+def catalogue(path: object = None) -> tuple[Asteroid, ...]:
     """All asteroids of the embedded catalogue, or of a file, in their order.
 
     The format is found from the content of the file (:mod:`flybystab.catalogues.readers`), which may be

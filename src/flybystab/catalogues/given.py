@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from difflib import get_close_matches
-from typing import Any
 
 import astropy.units as u
 import numpy as np
+from astropy.units import Quantity
 
 from flybystab.body.body import Body, check_body
 from flybystab.catalogues.readers.conversion import state_row
@@ -30,7 +30,7 @@ QUANTITIES: Mapping[str, tuple[u.UnitBase, str]] = {
 _ERRORS = ("axes", "density", "period")
 
 
-def checked_orbit(orbit: Any) -> Orbit:
+def checked_orbit(orbit: object) -> Orbit:
     """The orbit; raises InvalidInput for anything else."""
     if not isinstance(orbit, Orbit):
         raise InvalidInput("orbit", orbit, "an Orbit: Orbit.from_elements or Orbit.from_state")
@@ -66,7 +66,7 @@ def body_columns(body: Body) -> dict[str, str]:
     return row | {"spin_period_h": repr(period), "spin_state": "principal"}
 
 
-def pole_columns(pole: Any) -> dict[str, str]:
+def pole_columns(pole: Quantity) -> dict[str, str]:
     """Ecliptic longitude and latitude (J2000) of a pole.
 
     Parameters
@@ -83,7 +83,7 @@ def pole_columns(pole: Any) -> dict[str, str]:
     }
 
 
-def error_columns(sigmas: Mapping[str, Any]) -> dict[str, str]:
+def error_columns(sigmas: Mapping[str, Quantity]) -> dict[str, str]:
     """Columns of 1-sigma errors: ``axes`` (one value or three), ``density``, ``period``."""
     row = {}
     for key, value in sigmas.items():

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+
+from flybystab.typing import Array
 
 #: Diameter of a body of ``H = 0`` and albedo 1, m.
 ZERO = 1.329e6
 
 
-def diameter_of(magnitude: Any, albedo: Any) -> Any:
-    """Diameter, m, of an absolute magnitude and a geometric albedo; numbers or arrays."""
-    return ZERO / np.sqrt(albedo) * 10.0 ** (-magnitude / 5.0)
+def diameter_of(magnitude: float | Array, albedo: float | Array) -> Array:
+    """Diameters, m, of absolute magnitudes and geometric albedos, which broadcast."""
+    return np.asarray(ZERO / np.sqrt(albedo) * 10.0 ** (-magnitude / 5.0))
 
 
-def magnitude_of(diameter: Any, albedo: Any) -> Any:
-    """Absolute magnitude of a diameter (m) and a geometric albedo; numbers or arrays."""
-    return 5.0 * np.log10(ZERO / (diameter * np.sqrt(albedo)))
+def magnitude_of(diameter: float | Array, albedo: float | Array) -> Array:
+    """Absolute magnitudes of diameters (m) and geometric albedos, which broadcast."""
+    return np.asarray(5.0 * np.log10(ZERO / (diameter * np.sqrt(albedo))))

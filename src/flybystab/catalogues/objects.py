@@ -13,20 +13,25 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
+
+from astropy.units import Quantity
 
 from flybystab.catalogues.readers import FRAME, READERS
 from flybystab.catalogues.readers.element_table import entries_of
 from flybystab.errors import InvalidInput
+from flybystab.typing import Document
 
 if TYPE_CHECKING:
+    from astropy.table import Table
+
     from flybystab.catalogues.asteroid import Asteroid
     from flybystab.catalogues.readers import Entry
 
 _FILE = "object"
 
 
-def asteroids_of(orbit: Any, phys: Any = None) -> tuple[Asteroid, ...]:
+def asteroids_of(orbit: object, phys: object = None) -> tuple[Asteroid, ...]:
     """Asteroids of an object of astroquery or sbpy.
 
     Parameters
@@ -58,7 +63,7 @@ def asteroids_of(orbit: Any, phys: Any = None) -> tuple[Asteroid, ...]:
     return tuple(replace(a, row=dict(a.row) | body) for a, body in zip(found, bodies, strict=True))
 
 
-def _entries(given: Any) -> list[Entry]:
+def _entries(given: object) -> list[Entry]:
     from astropy.table import Table
 
     table = getattr(given, "table", given)
@@ -67,7 +72,7 @@ def _entries(given: Any) -> list[Entry]:
             return _read(_csv(table))
         return entries_of(table, _FILE)
     if isinstance(given, Mapping):
-        return _read(json.dumps(_answer(given) if "orbit" in given else given, default=_plain))
+        return _read(json.dumps(_answer(dict(given)) if "orbit" in given else given, default=_plain))
     if (
         isinstance(given, Sequence)
         and not isinstance(given, str)
@@ -86,7 +91,7 @@ def _read(text: str) -> list[Entry]:
     return found.read(text, _FILE)
 
 
-def _csv(table: Any) -> str:
+def _csv(table: Table) -> str:
     import csv
     import io
 
@@ -99,14 +104,14 @@ def _csv(table: Any) -> str:
     return out.getvalue()
 
 
-def _plain(value: Any) -> Any:
+def _plain(value: object) -> object:
     """A number of a Quantity, array or numpy scalar, for JSON."""
-    if hasattr(value, "to_value"):
+    if isinstance(value, Quantity):
         value = value.value
     return value.tolist() if hasattr(value, "tolist") else str(value)
 
 
-def _items(values: Mapping[str, Any]) -> list[dict[str, Any]]:
+def _items(values: Mapping[str, object]) -> list[Document]:
     """Values with their ``_sig`` and ``_ref`` as the list that the API of JPL gives."""
     out = []
     for name, value in values.items():
@@ -119,12 +124,12 @@ def _items(values: Mapping[str, Any]) -> list[dict[str, Any]]:
     return out
 
 
-def _printed(value: Any) -> str:
+def _printed(value: object) -> str:
     plain = _plain(value) if hasattr(value, "to_value") or hasattr(value, "tolist") else value
     return repr(plain) if isinstance(plain, float) else str(plain)
 
 
-def _answer(given: Mapping[str, Any]) -> dict[str, Any]:
+def _answer(given: Document) -> Document:
     """An answer of SBDB in the form of the API, from the mapping made by astroquery."""
     orbit = dict(given["orbit"])
     if isinstance(orbit.get("elements"), list):
@@ -148,7 +153,7 @@ _PHYSICAL = {"H": "mag", "diameter": "km", "rot_per": "h", "density": "g/cm3", "
 _SBPY = {"absmag": "H", "d": "diameter", "D": "diameter", "diam": "diameter", "period": "rot_per"}
 
 
-def _physical_rows(phys: Any) -> list[dict[str, str]]:
+def _physical_rows(phys: object) -> list[dict[str, str]]:
     """Physical columns of each row of a table or mapping.
 
     Raises
@@ -156,9 +161,13 @@ def _physical_rows(phys: Any) -> list[dict[str, str]]:
     InvalidInput
         A value without its unit.
     """
+    from astropy.table import Table
+
     from flybystab.catalogues.readers.sbdb_answer import physical
 
     table = getattr(phys, "table", phys)
+    if not isinstance(table, Mapping | Table):
+        raise InvalidInput("phys", phys, "a mapping or a table of physical parameters, or sbpy.data.Phys")
     rows = [table] if isinstance(table, Mapping) else [{c: row[c] for c in table.colnames} for row in table]
     out = []
     for row in rows:

@@ -9,7 +9,6 @@ import unicodedata
 from collections.abc import Mapping
 from functools import cached_property
 from types import MappingProxyType
-from typing import Any
 
 import astropy.units as u
 import numpy as np
@@ -185,7 +184,7 @@ class Record:
         return MappingProxyType(found)
 
     @cached_property
-    def record(self) -> Mapping[str, Any]:
+    def record(self) -> Mapping[str, Quantity | str | None]:
         """The whole row: a Quantity where the column has a unit, text otherwise, None where unknown."""
         return MappingProxyType(
             {

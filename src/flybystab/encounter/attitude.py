@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -60,7 +59,7 @@ def rotation_rates(y: Array, moments: Array, torque: Array | None = None) -> Arr
     return np.concatenate([0.5 * np.array(turn), euler / moments])
 
 
-def attitude_matrix(attitude: Any) -> Array:
+def attitude_matrix(attitude: object) -> Array:
     """Rotation matrix (3, 3), checked, of a matrix or scipy Rotation; the identity for None."""
     if attitude is None:
         return np.eye(3)
@@ -80,7 +79,7 @@ def attitude_matrix(attitude: Any) -> Array:
     return matrix
 
 
-def attitude_matrices(attitudes: Sequence[Any] | None, n: int) -> tuple[Array, NDArray[np.object_]]:
+def attitude_matrices(attitudes: Sequence[object] | None, n: int) -> tuple[Array, NDArray[np.object_]]:
     """Rotation matrices (n, 3, 3) of attitudes, and for each the reason why it is invalid (empty if it is valid)."""
     out = np.broadcast_to(np.eye(3), (n, 3, 3)).copy()
     failures = np.full(n, "", dtype=object)

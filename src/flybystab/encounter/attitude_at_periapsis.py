@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from flybystab.arguments import check_arguments
@@ -17,7 +15,7 @@ _TOLERANCE = 1e-11
 
 
 @check_arguments
-def attitude_at_start(body: Body, encounter: Encounter, at_periapsis: Any) -> Array:
+def attitude_at_start(body: Body, encounter: Encounter, at_periapsis: object) -> Array:
     """Attitude at the start of an encounter of a body that would have a given one at closest approach without a tide.
 
     Parameters

@@ -9,11 +9,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, ClassVar
+from typing import ClassVar
 
 import astropy.units as u
 import numpy as np
-from astropy.table import QTable
+from astropy.table import QTable, Row
 from astropy.time import Time
 from astropy.units import Quantity
 from numpy.typing import NDArray
@@ -70,7 +70,7 @@ class EncounterDistribution(Tabular):
 
     planet: Planet
     time: Time
-    nominal: Any = field(repr=False)
+    nominal: Row = field(repr=False)
     clones: tuple[Orbit, ...] = field(repr=False)
     found: NDArray[np.bool_] = field(repr=False)
     time_offset: Quantity = field(repr=False)
@@ -136,7 +136,7 @@ class EncounterDistribution(Tabular):
 
 @check_arguments
 def encounter_distribution(
-    orbit: Any,
+    orbit: object,
     planet: str | Planet,
     time: Time | str,
     *,
@@ -219,7 +219,7 @@ def encounter_distribution(
 
 
 def distributions(
-    orbit: Any,
+    orbit: object,
     table: QTable,
     *,
     n: int = 1000,
@@ -272,7 +272,7 @@ def _pairs(progress: Progressing) -> bool | Callable[[int, int, int], None] | No
     return (lambda done, total, _: progress(done, total)) if callable(progress) else progress
 
 
-def clone_passages(
+def clone_encounters(
     clones: Sequence[Orbit],
     planet: str | Planet,
     time: Time,
@@ -311,7 +311,7 @@ def clone_passages(
 
 
 def _distribution(
-    orbit: Orbit, nominal: Any, clones: tuple[Orbit, ...], points: int, found: QTable, reach: float
+    orbit: Orbit, nominal: Row, clones: tuple[Orbit, ...], points: int, found: QTable, reach: float
 ) -> EncounterDistribution:
     """The encounters that correspond to one of the nominal orbit; `found` has the clones, then the sigma points."""
     covariance = orbit.covariance
@@ -356,7 +356,7 @@ def _belonging(found: QTable, body: Planet, time: Time, n: int, reach: float) ->
     return columns
 
 
-def _path(orbit: Any) -> Orbit:
+def _path(orbit: object) -> Orbit:
     path = getattr(orbit, "orbit", orbit)
     if not isinstance(path, Orbit):
         raise InvalidInput("orbit", orbit, "an Orbit, or an object with one as its attribute 'orbit'")
@@ -374,7 +374,7 @@ def add_clones(table: QTable, found: Sequence[EncounterDistribution | None]) -> 
     ``p_impact_high``, and ``p_impact_linear``. nan where fewer than two clones have the encounter.
     """
 
-    def column(value: Callable[[EncounterDistribution], Any], least: int = 2) -> Array:
+    def column(value: Callable[[EncounterDistribution], float], least: int = 2) -> Array:
         return np.array(
             [value(d) if d is not None and d.found.sum() >= least else np.nan for d in found], dtype=float
         )

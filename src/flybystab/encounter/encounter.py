@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -130,7 +131,9 @@ class Encounter(EncounterPath):
         """
         body = find_planet(planet)
         if np.ndim(periapsis) or np.ndim(v_inf):
-            return cls._array(periapsis, v_inf, planet, start_distance, settle, j2, pole)
+            return _array(
+                lambda q, v: cls.hyperbolic(planet, q, v, start_distance, settle, j2, pole), periapsis, v_inf
+            )
         q = to_si(periapsis, u.m, "periapsis", low=1.0)
         v = to_si(v_inf, u.m / u.s, "v_inf", low=0.0)
         wait = to_si(settle, u.s, "settle", low=0.0)
@@ -145,22 +148,6 @@ class Encounter(EncounterPath):
         from flybystab.encounter.hyperbolic import scripted
 
         return scripted(cls, body, q, v, start, wait, j2, axis)
-
-    @classmethod
-    def _array(cls, periapsis: Quantity, v_inf: Quantity, planet: str | Planet, *options: Any) -> Any:
-        """Array of encounters, of the shape to which the arrays of periapsis and speed broadcast."""
-        q = to_si(periapsis, u.m, "periapsis", shape=None, low=1.0)
-        v = to_si(v_inf, u.m / u.s, "v_inf", shape=None, low=0.0)
-        try:
-            q, v = np.broadcast_arrays(q, v)
-        except ValueError:
-            raise InvalidInput(
-                "v_inf", f"shape {np.shape(v_inf)}", f"a shape that broadcasts with {np.shape(q)}"
-            ) from None
-        out = np.empty(q.shape, dtype=object)
-        for k in np.ndindex(q.shape):
-            out[k] = cls.hyperbolic(planet, float(q[k]) * u.m, float(v[k]) * u.m / u.s, *options)
-        return out
 
     @classmethod
     def from_trajectory(
@@ -390,3 +377,21 @@ class Encounter(EncounterPath):
         from flybystab.encounter.from_orbit import followed
 
         return followed(cls, path, body, time.tdb, accuracy, start, wait, reach, largest, ephemeris, forces)
+
+
+def _array(
+    make: Callable[[Quantity, Quantity], Encounter], periapsis: Quantity, v_inf: Quantity
+) -> Any:  # the type of a Quantity does not distinguish scalars from arrays
+    """Array of encounters, of the shape to which the arrays of periapsis and speed broadcast."""
+    q = to_si(periapsis, u.m, "periapsis", shape=None, low=1.0)
+    v = to_si(v_inf, u.m / u.s, "v_inf", shape=None, low=0.0)
+    try:
+        q, v = np.broadcast_arrays(q, v)
+    except ValueError:
+        raise InvalidInput(
+            "v_inf", f"shape {np.shape(v_inf)}", f"a shape that broadcasts with {np.shape(q)}"
+        ) from None
+    out = np.empty(q.shape, dtype=object)
+    for k in np.ndindex(q.shape):
+        out[k] = make(float(q[k]) * u.m, float(v[k]) * u.m / u.s)
+    return out

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import astropy.units as u
 import numpy as np
@@ -52,7 +52,7 @@ class SampledTrack:
     time: float
     last: float
     last_state: Array
-    difference: Any
+    difference: CubicHermiteSpline
 
     def states(self, t: Array) -> Array:
         """Position (m) and velocity (m/s), shape (n, 6), at ``t`` s from closest approach, shape (n,)."""
@@ -75,7 +75,9 @@ def _two_body_states(gm: float, state: Array, t: Array) -> Array:
     return out
 
 
-def samples(times: Any, positions: Quantity, velocities: Quantity) -> tuple[Array, Array, Time | None]:
+def samples(
+    times: Time | Quantity, positions: Quantity, velocities: Quantity
+) -> tuple[Array, Array, Time | None]:
     """Checked samples: times (s, from the first), states (n, 6) in SI, and the epoch of the first, if known."""
     epoch = None
     if isinstance(times, Time):
@@ -201,7 +203,7 @@ def _track(body: Planet, t: Array, states: Array) -> tuple[SampledTrack, float]:
     return track(zero), zero
 
 
-def _crossing(radius: Any, outer: float, inner: float, level: float) -> float:
+def _crossing(radius: Callable[[float], float], outer: float, inner: float, level: float) -> float:
     """Time between an outer and an inner one at which the distance is `level`; the outer one if it is not reached."""
     if radius(outer) <= level:
         return outer

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import astropy.units as u
 import numpy as np
+from astropy.table import Row
 from astropy.units import Quantity
 from scipy.integrate import quad
 from scipy.stats import norm
@@ -83,7 +83,7 @@ def disc_probability(centre: Array, covariance: Array, radius: float) -> float:
     return float(quad(slice_, low, high, points=middle or None, limit=200, epsabs=0.0, epsrel=1e-8)[0])
 
 
-def linear_plane(points: Array, nominal: Any, body: Planet) -> LinearPlane | None:
+def linear_plane(points: Array, nominal: Row, body: Planet) -> LinearPlane | None:
     """The linear map from pairs of rows: time, distance, B.T, B.R (SI) at plus and minus one sigma."""
     centre = np.array([nominal["b_t"].to_value(u.m), nominal["b_r"].to_value(u.m)])
     pairs = points[:, :4].reshape(-1, 2, 4)

@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from types import ModuleType
 
 import numpy as np
 from astropy.time import Time
@@ -59,7 +59,7 @@ class Samples:
 
 
 @contextmanager
-def _kernel(path: Path) -> Iterator[Any]:
+def _kernel(path: Path) -> Iterator[ModuleType]:
     try:
         import spiceypy
     except ImportError:
@@ -82,7 +82,7 @@ def _first_line(error: Exception) -> str:
     return lines[1] if len(lines) > 1 else str(error)
 
 
-def _target(spice: Any, path: Path, target: int | str | None) -> int:
+def _target(spice: ModuleType, path: Path, target: int | str | None) -> int:
     """Identifier of a body of the kernel, by its identifier or number; None for the only small body."""
     known = [int(x) for x in spice.spkobj(str(path))]
     small = [x for x in known if x > 1_000_000]
@@ -141,7 +141,7 @@ def spk_samples(
         return _dense(states, zero, low, high, planet, start, name)
 
 
-def _spans(spice: Any, path: Path, body: int, et: float) -> list[tuple[float, float]]:
+def _spans(spice: ModuleType, path: Path, body: int, et: float) -> list[tuple[float, float]]:
     """Spans of a body, s from `et`, a second inside their ends."""
     cover = spice.spkcov(str(path), body)
     count = int(spice.wncard(cover))
@@ -149,7 +149,7 @@ def _spans(spice: Any, path: Path, body: int, et: float) -> list[tuple[float, fl
     return [(float(a) - et + 1.0, float(b) - et - 1.0) for a, b in found]
 
 
-def _centre(spice: Any, path: Path, body: int, et: float) -> int:
+def _centre(spice: ModuleType, path: Path, body: int, et: float) -> int:
     """Centre of the segment of a body at a time."""
     _, descriptor, _ = spice.spksfs(body, et, 80)
     integers = spice.dafus(descriptor, 2, 6)[1]

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Any
-
+from skyfield.timelib import Time
 from skyfield.vectorlib import VectorFunction
 
 from flybystab.constants import DAY
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
 from flybystab.orbit.vector_function import shaped, whole_and_fraction
+from flybystab.typing import Array
 
 
 class EncounterVector(VectorFunction):
@@ -40,7 +40,7 @@ class EncounterVector(VectorFunction):
         """Description of the target."""
         return str(self.target)
 
-    def _at(self, t: Any) -> tuple[Any, Any, None, None]:
+    def _at(self, t: Time) -> tuple[Array, Array, None, None]:
         assert self._encounter.time is not None
         whole, fraction = whole_and_fraction(t)
         zero = self._encounter.time.tdb

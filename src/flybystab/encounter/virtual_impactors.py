@@ -10,8 +10,6 @@ be found.
 
 from __future__ import annotations
 
-from typing import Any
-
 import astropy.units as u
 import numpy as np
 from astropy.time import Time
@@ -28,7 +26,7 @@ from flybystab.orbit.planets import Planet, planet
 from flybystab.orbit.target_plane import capture_radius
 from flybystab.progress import Progressing, progress_bar
 from flybystab.result_table import ResultTable
-from flybystab.typing import Array
+from flybystab.typing import Array, Document
 from flybystab.units import checked_time, to_si, whole
 
 #: Orbits of a refinement, and how often it is repeated at most.
@@ -39,7 +37,7 @@ _STEP = 0.2
 
 @check_arguments
 def virtual_impactors(
-    orbit: Any,
+    orbit: object,
     start: Time | str,
     stop: Time | str,
     planet: str | Planet = "earth",
@@ -158,7 +156,7 @@ def _minima(table: ResultTable, count: int) -> list[tuple[int, Time]]:
 
 def _impact(
     line: LineOfVariations, way: Array, sigma: float, spacing: float, time: Time, reach: float
-) -> dict[str, Any] | None:
+) -> Document | None:
     """The possible impact around a minimum of distance along the line; None where the encounter is lost."""
     half = spacing
     best = np.full(5, np.nan)
@@ -201,9 +199,9 @@ def _impact(
     }
 
 
-def _distinct(rows: list[dict[str, Any]]) -> list[dict[str, Any]]:
+def _distinct(rows: list[Document]) -> list[Document]:
     """The rows without repetitions: minima that were refined to the same orbit."""
-    out: list[dict[str, Any]] = []
+    out: list[Document] = []
     for r in rows:
         same = (
             abs(seconds(r["time"], o["time"])) < 600.0 and abs(r["sigma"] - o["sigma"]) < 1e-3 for o in out

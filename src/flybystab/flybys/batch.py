@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import astropy.units as u
 import numpy as np
@@ -26,32 +26,31 @@ from flybystab.units import to_si
 
 def verdict_rows(
     rows: NDArray[np.int64],
-    bodies: NDArray[Any],
+    bodies: NDArray[np.void],
     encounters: Encounters,
     limits: Limits,
     required: bool,
     output: Output,
 ) -> None:
-    """:func:`flybystab.core.dynamics.verdict_row.verdict_rows`; without the kernels of flow as long as no body yields.
+    """:func:`flybystab.core.dynamics.verdict_row.verdict_rows`; without the kernels of flow while no body yields.
 
     In a process in which no body has yielded yet the bodies are first followed up to yield, by kernels that are
     compiled (or loaded) in a fraction of the time. The outcomes are the same.
     """
-    full: Any = kernels.verdict_rows
-    if not getattr(full, "overloads", True):
+    if not getattr(kernels.verdict_rows, "overloads", True):
         kernels.rigid_rows(rows, bodies, encounters, limits, output)
         rows = rows[output.outcomes["verdict"][rows] == kernels.YIELDS]
     if len(rows):
-        full(rows, bodies, encounters, limits, required, output)
+        kernels.verdict_rows(rows, bodies, encounters, limits, required, output)
 
 
-#: Default step tolerance: an error of 1e-8 in the shape of the reference cases (``flybystab bench flyby``).
+#: Default step tolerance, with an error of 1e-8 in the shape of the reference cases (``flybystab bench flyby``).
 TOLERANCE = 1e-8
 
 #: Largest tolerance, and the factor between the tolerances of the two runs whose difference measures the error.
 LARGEST, LOOSER = 1e-3, 30.0
 
-#: Steps after which a run is given up.
+#: Largest number of steps of a run.
 MAX_STEPS = 200_000
 
 
@@ -77,7 +76,7 @@ class RowInputs(NamedTuple):
     """Records of bodies and encounters: the rows to compute, and the first arguments of `verdict_rows`."""
 
     rows: NDArray[np.int64]
-    bodies: NDArray[Any]
+    bodies: NDArray[np.void]
     encounters: Encounters
 
 
@@ -156,7 +155,7 @@ def one_row(body: Body, encounter: Encounter, rotation: Array | None = None) -> 
 
 def records(
     bodies: Sequence[Body], rotations: Array, encounters: Sequence[Encounter]
-) -> tuple[NDArray[Any], Encounters]:
+) -> tuple[NDArray[np.void], Encounters]:
     """Records of bodies and encounters; the same encounter is stored once."""
     met = {id(e): e for e in encounters}
     place = {key: k for k, key in enumerate(met)}
@@ -184,7 +183,7 @@ def body_rows(
     cohesion: Array,
     material: Material,
     encounter: NDArray[np.int64] | int = 0,
-) -> NDArray[Any]:
+) -> NDArray[np.void]:
     """Records of n bodies (BODY) from arrays in SI units.
 
     Parameters
@@ -246,7 +245,7 @@ def span_of(encounter: Encounter) -> Array:
     return np.array([encounter.t_start, stop, limit], dtype=float)
 
 
-def failure_of(out: Any, encounter: Encounter, tolerance: float) -> str:
+def failure_of(out: np.void, encounter: Encounter, tolerance: float) -> str:
     """Reason that an outcome has no verdict; empty if it has one."""
     if out["verdict"] != FAILED:
         return ""

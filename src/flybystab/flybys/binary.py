@@ -32,7 +32,7 @@ from flybystab.typing import Array
 from flybystab.units import counted, to_si, whole
 
 BOUND, ESCAPE, COLLISION = "bound", "escape", "collision"
-#: Points of a step at which the distance of the two is checked against contact.
+#: Points of a step, as fractions of it, at which the separation is compared with that of contact.
 _CHECKS = np.linspace(0.1, 1.0, 10)
 _MAX_STEPS = 100_000
 #: Relative tolerance of a step.
@@ -106,7 +106,7 @@ def binary_flyby(
     samples: int = 64,
     seed: int = 0,
 ) -> BinarySample:
-    """Carry the companion of a binary through an encounter, at random phases.
+    """Integrate the mutual orbit of a binary through an encounter, at random phases.
 
     Parameters
     ----------
@@ -118,8 +118,8 @@ def binary_flyby(
     semi_major_axis, eccentricity
         Of the mutual orbit before the encounter.
     mass_ratio : float
-        Mass of the companion over that of the primary, 0.01 by default; it has the density of the primary. Not with
-        `companion`.
+        Mass of the companion over that of the primary, 0.01 by default; it has the density of the primary. Not together
+        with `companion`.
     companion : Body, optional
         An ellipsoid in synchronous rotation: its longest axis points to the primary at the start, and it turns about
         its shortest axis, which is normal to the orbit, with the mean motion. Its own spin is not used.
@@ -284,7 +284,7 @@ def _states(e: float, mean_anomaly: Array, frames: Array) -> Array:
 def _carried(
     state: Array, encounter: Encounter, unit: float, contact: float, figures: Figures | None = None
 ) -> tuple[Array, Array, NDArray[np.bool_]]:
-    """Integrate all members together; returns final states, smallest separations, and which of them touched.
+    """Integrate all members together; returns final states, smallest separations, and the mask of those in contact.
 
     A member that touches keeps its state from then on, while the others are integrated further.
     """

@@ -4,10 +4,10 @@ With the second moments ``S`` over the mass of a body (``int x x dm/m``) the mut
 
     V = -G m1 m2 [1/d + q1(d) + q2(d)],      q(d) = (3 d.S d - d^2 tr S)/(2 d^5),
 
-so that the separation obeys ``d'' = G (m1 + m2) grad(1/d + q1 + q2) + K d``. The companion turns by Euler's equations
-in the torque of its second moments in the tidal tensor of the encounter plus that of the primary as a point mass
-(MacCullagh's torque). The primary turns fast about a fixed pole: its figure is averaged about it. All arrays are over
-the members of a sample, in any consistent units.
+so that the separation obeys ``d'' = G (m1 + m2) grad(1/d + q1 + q2) + K d``. The companion rotates by Euler's equations
+under the torque on its second moments by the tidal tensors of the encounter and of the primary as a point mass
+(MacCullagh's torque). The primary rotates fast about a fixed pole, about which its figure is averaged. All arrays are
+over the members of a sample, in any consistent units.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ class Figures(NamedTuple):
         Second moments over the mass in the frame of the encounter, constant; zero for a point mass.
     companion : ndarray (3,)
         Principal second moments over the mass, greatest first.
-    share : float
+    mass_fraction : float
         Mass of the primary over that of both.
     """
 
     primary: Array
     companion: Array
-    share: float
+    mass_fraction: float
 
 
 def averaged(axes: Array, poles: Array) -> Array:
@@ -87,9 +87,9 @@ def rates(y: Array, tide: Array, figures: Figures) -> Array:
     out = np.empty_like(y)
     out[:, :3] = v
     out[:, 3:6] = -x / r3[:, None] + quadrupole_field(figures.primary + own, x) + x @ tide
-    # tidal tensor on the companion along its axes, (share/d^3)(3 n n - 1) + K
+    # tidal tensor on the companion along its axes, (f/d^3)(3 n n - 1) + K, f the mass fraction
     along = np.einsum("nij,ni->nj", turned, x)
-    pull = figures.share / r3
+    pull = figures.mass_fraction / r3
     off = 3.0 * (pull / r2)[:, None, None] * np.einsum("ni,nj->nij", along, along)
     field = off + np.einsum("nji,jk,nkl->nil", turned, tide, turned)
     # N_i = eps_ijk S_jl K_lk for diagonal S

@@ -81,7 +81,7 @@ class CriticalValues(Tabular):
         rotating body.
     value : Quantity (n,)
         Least value for which the outcome is no worse than `outcome`; infinite if no value of the range is
-        enough, and the lower end of the range where every value is. A periapsis is in radii of the planet.
+        sufficient, the lower end of the range if all are. A periapsis is in radii of the planet.
     error : Quantity (n,)
         Width of the last bracket; nan where `value` is an end of the range.
     quantity, outcome : str
@@ -106,7 +106,7 @@ class CriticalValues(Tabular):
 
     @property
     def largest(self) -> Quantity:
-        """Critical value at the least favourable phase: it is sufficient at every phase."""
+        """Critical value at the least favourable phase, which is sufficient at every phase."""
         return self.value.max()
 
     def __repr__(self) -> str:

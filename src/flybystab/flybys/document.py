@@ -7,7 +7,7 @@ never replaced by text. Each kind of document has a JSON schema, named under ``s
 from __future__ import annotations
 
 import math
-from typing import Any
+from typing import Any, Literal
 
 import astropy.units as u
 import numpy as np
@@ -21,6 +21,7 @@ from flybystab.flybys.result import FlybyResult
 from flybystab.flybys.spin_sample import SpinSample
 from flybystab.flybys.verdict_margins import VerdictMargins
 from flybystab.saving import DOCUMENT_UNITS, with_unit
+from flybystab.typing import Array, Document
 
 
 def plain(value: object, name: str = "") -> Any:
@@ -167,9 +168,9 @@ def sample_document(sample: SpinSample) -> dict[str, object]:
     levels = (0.0, 0.05, 0.5, 0.95, 1.0)
     verdicts, counts = np.unique(sample.verdict, return_counts=True)
 
-    def quantiles(x: Any) -> dict[str, float]:
+    def quantiles(x: Array) -> dict[str, float]:
         # linear interpolation next to an infinite value would give nan
-        method: Any = "linear" if np.isfinite(x).all() else "inverted_cdf"
+        method: Literal["linear", "inverted_cdf"] = "linear" if np.isfinite(x).all() else "inverted_cdf"
         values = np.quantile(x, levels, method=method)
         return {f"q{round(100 * p)}": float(v) for p, v in zip(levels, values, strict=True)}
 
@@ -185,7 +186,7 @@ def sample_document(sample: SpinSample) -> dict[str, object]:
     }
 
 
-def table_document(table: QTable) -> dict[str, Any]:
+def table_document(table: QTable) -> Document:
     """Document of a table, row by row; a column with a unit is named ``name_unit``, such as ``v_inf_km_s``."""
     rows = []
     for row in table:

@@ -51,7 +51,7 @@ def elastic_change(
     Returns
     -------
     ElasticChange
-        For the spin and attitude of the rigid body. Inertia of elastic waves is left out: their periods are seconds.
+        For the spin and attitude of the rigid body. Elastic waves are neglected: their periods are seconds.
     """
     course = rigid_course(body, encounter, attitude)
     rows = 0, int(np.argmin(course.distance.value))

@@ -20,16 +20,16 @@ from flybystab.flybys.verdict import Verdict, letter_of
 from flybystab.progress import Progressing
 from flybystab.typing import Array
 
-#: Verdicts of the ellipsoid after which the encounter is computed with grains: the outcome is not determined.
-HANDED_ON = (Verdict.BEYOND_MODEL, Verdict.MASS_LOSS, Verdict.DISRUPTED)
+#: Verdicts after which the encounter is computed with grains, since the ellipsoid does not determine the outcome.
+ESCALATED = (Verdict.BEYOND_MODEL, Verdict.MASS_LOSS, Verdict.DISRUPTED)
 #: Number of grains where it is not given.
 GRAINS = 500
 
 
 class Request(NamedTuple):
-    """When to run grains, and how many: ``grains=``, ``seeds=`` and ``model=`` of ``flyby``, checked."""
+    """Checked arguments ``grains=``, ``seeds=`` and ``model=`` of ``flyby``."""
 
-    grains: int  #: 0 for never
+    grains: int  #: number of grains; 0 for never
     always: bool
     seeds: list[int]
 
@@ -37,7 +37,7 @@ class Request(NamedTuple):
 def request(
     grains: int | str | None, seeds: int | Sequence[int] | None, model: str | None, pile: Pile | None = None
 ) -> Request:
-    """Check ``grains=``, ``seeds=`` and ``model=``; a pile is always run, by default alone.
+    """Check ``grains=``, ``seeds=`` and ``model=``; a pile is always simulated as grains, by default with its own seed.
 
     Raises
     ------
@@ -65,7 +65,7 @@ def request(
     return Request(count, model == "grains" or grains == "always", chosen)
 
 
-def handed_on(
+def escalated(
     result: FlybyResult,
     body: Body,
     encounter: Encounter,
@@ -74,17 +74,17 @@ def handed_on(
     pile: Pile | None = None,
     progress: Progressing = None,
 ) -> FlybyResult:
-    """The result of the ellipsoid, or that of grains where they are needed or requested.
+    """The result of the ellipsoid, or that of grains where they are required or requested.
 
-    They are needed past the largest axis ratio of the ellipsoid, for a loss of mass, and where the material of the
-    ellipsoid is out of contact at the end. They are not run where the centre of the body reaches the ground.
+    They are required beyond the largest axis ratio of the ellipsoid, for a loss of mass, and where the material of the
+    ellipsoid is out of contact at the end. They are not simulated where the centre of the body reaches the ground.
     """
     if asked.grains == 0:
         return result
     check_grains(body, asked.grains)
     contacts = [name for name, _ in result.events if name in ("contact", "loss of contact")]
     apart = contacts[-1:] == ["loss of contact"]
-    needed = result.verdict in HANDED_ON or (apart and result.verdict != Verdict.IMPACT)
+    needed = result.verdict in ESCALATED or (apart and result.verdict != Verdict.IMPACT)
     if encounter.impact or not (asked.always or needed):
         return result
     outcome = grains_flyby(

@@ -20,7 +20,7 @@ from flybystab.flybys.batch import (
     one_row,
     step_tolerance,
 )
-from flybystab.flybys.escalation import handed_on, request
+from flybystab.flybys.escalation import escalated, request
 from flybystab.flybys.inputs import FlybyInputs
 from flybystab.flybys.result import FlybyResult
 from flybystab.flybys.rigid_course import check_tension
@@ -69,7 +69,7 @@ def flyby(
         Further yield surfaces; the verdict is robust if they all agree. By default the result has the verdicts on all
         four for a body that stays rigid, at negligible cost.
     max_axis_ratio : float
-        Axis ratio beyond which the homogeneous model is left.
+        Axis ratio beyond which the homogeneous model does not apply.
     robustness : bool or int
         Number of spin phases (True: 8) at which the encounter is repeated; it is also repeated with a friction angle 3
         deg larger and smaller and on all yield surfaces: ``result.robustness``.
@@ -134,11 +134,11 @@ def flyby(
     result = FlybyResult(inputs, run, comparison, verdicts)
     if phases:
         result = result.with_(robustness=robustness_of(inputs, run, phases))
-    return handed_on(result, body, encounter, rotation, asked, pile, progress)
+    return escalated(result, body, encounter, rotation, asked, pile, progress)
 
 
 def _comparison(inputs: FlybyInputs, row: RowInputs) -> FlybyRun:
-    """The run that measures the error: with a tighter tolerance where flow stalls the looser one."""
+    """The run that measures the error; with a smaller tolerance where the larger one does not converge."""
     tolerance = inputs.tolerance
     try:
         return inputs._replace(tolerance=comparison_tolerance(tolerance)).run(required=True, row=row)

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any, TypeVar
+from collections.abc import Iterable, Sequence
+from typing import TypeVar
 
 import astropy.units as u
 import numpy as np
@@ -40,7 +40,7 @@ T = TypeVar("T")
 def flyby_many(
     bodies: Sequence[Body],
     encounters: Sequence[Encounter],
-    attitudes: Sequence[Any] | None = None,
+    attitudes: Sequence[object] | None = None,
     *,
     tolerance: float = TOLERANCE,
     max_axis_ratio: float = 6.0,
@@ -58,7 +58,7 @@ def flyby_many(
     tolerance, max_axis_ratio
         As in :func:`flyby`.
     workers : int, optional
-        Threads (kernels release the interpreter lock), one a core by default; no result depends on it.
+        Number of threads, one for each core by default; no result depends on it.
     progress : bool or function, optional
         Whether to show a bar (:mod:`flybystab.progress`); after two seconds on a terminal by default.
 
@@ -100,7 +100,7 @@ def flyby_many(
 
 
 def follow_rows(
-    rows: NDArray[Any],
+    rows: NDArray[np.void],
     encounters: Sequence[Encounter],
     *,
     tolerance: float = TOLERANCE,
@@ -128,14 +128,14 @@ def follow_rows(
 
 
 def _outcomes(
-    bodies: NDArray[Any],
+    bodies: NDArray[np.void],
     encounters: Encounters,
     rows: NDArray[np.int64],
     tolerance: float,
     max_axis_ratio: float,
     threads: int,
     progress: Progressing,
-) -> NDArray[Any]:
+) -> NDArray[np.void]:
     """Outcomes (OUTCOME) of the bodies in `rows`; the others are marked as not computed."""
     out = np.empty(len(bodies), OUTCOME)
     _fail(out)
@@ -159,7 +159,7 @@ def _outcomes(
 
 
 def _table(
-    out: NDArray[Any],
+    out: NDArray[np.void],
     phi: Array,
     encounters: Sequence[Encounter],
     failures: NDArray[np.object_],
@@ -187,7 +187,7 @@ def _table(
     )
 
 
-def _fail(rows: Any) -> None:
+def _fail(rows: NDArray[np.void] | np.void) -> None:
     """Mark outcomes as not computed."""
     for name in OUTCOME.names or ():
         rows[name] = FAILED if OUTCOME[name].kind == "i" else np.nan
@@ -195,25 +195,28 @@ def _fail(rows: Any) -> None:
 
 def _broadcast(
     bodies: object, encounters: object, attitudes: object
-) -> tuple[list[Body], list[Encounter], list[Any] | None]:
+) -> tuple[list[Body], list[Encounter], list[object] | None]:
     """The arguments as lists; a single body, encounter or rotation is used for all rows."""
     if hasattr(attitudes, "as_matrix"):  # a scipy Rotation, of one or of many
         attitudes = attitudes.as_matrix()
     one_attitude = isinstance(attitudes, np.ndarray) and attitudes.shape == (3, 3)
+    first = [bodies] if isinstance(bodies, Body) else _all(Body, bodies, "bodies")
+    second = [encounters] if isinstance(encounters, Encounter) else _all(Encounter, encounters, "encounters")
+    third = [attitudes] if attitudes is None or one_attitude else _all(object, attitudes, "attitudes")
     single = isinstance(bodies, Body), isinstance(encounters, Encounter), attitudes is None or one_attitude
-    lists: tuple[list[Any], ...] = (
-        [bodies] if single[0] else _all(Body, bodies, "bodies"),
-        [encounters] if single[1] else _all(Encounter, encounters, "encounters"),
-        [attitudes] if single[2] else _all(object, attitudes, "attitudes"),
-    )
-    n = next((len(x) for x, one in zip(lists, single, strict=True) if not one), 1)
-    first, second, third = (x * n if one else x for x, one in zip(lists, single, strict=True))
-    return first, second, None if attitudes is None else third
+    lengths = len(first), len(second), len(third)
+    n = next((length for length, one in zip(lengths, single, strict=True) if not one), 1)
+    first, second = first * n if single[0] else first, second * n if single[1] else second
+    if attitudes is None:
+        return first, second, None
+    return first, second, third * n if single[2] else third
 
 
-def _all(kind: type[T], values: Any, name: str) -> list[T]:
+def _all(kind: type[T], values: object, name: str) -> list[T]:
     """The values as a list; an error names the first that is not of the kind."""
     try:
+        if not isinstance(values, Iterable):
+            raise TypeError
         out = list(values.ravel() if isinstance(values, np.ndarray) and values.dtype == object else values)
     except TypeError:
         raise InvalidInput(name, values, "a sequence, one for each row") from None

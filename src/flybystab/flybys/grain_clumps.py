@@ -68,7 +68,7 @@ def at_positions(sim: Simulation) -> Grains:
     return sim.grains._replace(v=sim.u, w=sim.s)
 
 
-def _share(g: Grains, member: NDArray[np.bool_]) -> float:
+def _mass_fraction(g: Grains, member: NDArray[np.bool_]) -> float:
     """Mass of some grains over that of the body; exactly one for all of them."""
     return 1.0 if member.all() else float(g.mass[member].sum())
 
@@ -83,7 +83,7 @@ def _clumps(g: Grains) -> tuple[Array, NDArray[np.int64]]:
 
 
 def largest_clump(sim: Simulation) -> LargestClump:
-    """The largest clump now."""
+    """The largest clump at the present time of a simulation."""
     g = at_positions(sim)
     sizes, label = _clumps(g)
     largest = int(np.argmax(sizes)) if len(sizes) else -1
@@ -96,8 +96,8 @@ def largest_clump(sim: Simulation) -> LargestClump:
     inside = (label >= 0) & bound[np.where(label >= 0, label, 0)]
     return LargestClump(
         sim.time,
-        _share(g, member),
-        _share(g, inside),
+        _mass_fraction(g, member),
+        _mass_fraction(g, inside),
         axes,
         spin_of(inertia, momentum),
         np.sort(sizes[sizes >= SMALLEST])[::-1],
@@ -147,7 +147,7 @@ def fragments_of(sim: Simulation, pile: PileState) -> tuple[QTable, NDArray[np.i
         row_of[member] = row
         mass, centre, velocity, inertia, momentum = moments(g, member)
         axes, _ = semi_axes(mass, inertia)
-        found.append(_Fragment(_share(g, member), axes, spin_of(inertia, momentum), centre, velocity))
+        found.append(_Fragment(_mass_fraction(g, member), axes, spin_of(inertia, momentum), centre, velocity))
     n = len(found)
     parents, a, e = np.full(n, -1, np.int64), np.full(n, np.nan), np.full(n, np.nan)
     for i in range(n):

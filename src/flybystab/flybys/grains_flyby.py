@@ -4,7 +4,8 @@ Every seed gives a different pile with the body's shape, density, spin and frict
 pile to pile, so that a result is a distribution.
 
 The class (Richardson et al. 1998) is that of the largest clump at the end: S up to half of the mass, B up to 0.9, M
-above if mass escapes. Satellites, which are bound to the largest clump but apart from it, count in the bound mass only.
+above if mass escapes. Satellites, bound to the largest clump but not in contact with it, contribute only to the bound
+mass.
 """
 
 from __future__ import annotations
@@ -31,12 +32,12 @@ from flybystab.typing import Array
 
 #: Default number of seeds.
 SEEDS = 8
-#: Fewer grains than this warn.
+#: Number of grains below which a warning is issued.
 FEW = 100
 
 
 def warn_of_few(grains: int) -> None:
-    """Warn of a number of grains too small to resolve fragments."""
+    """Issue a warning if there are too few grains to resolve fragments."""
     if grains < FEW:
         warnings.warn(
             f"{grains} grains show whether a body is disrupted, but neither the masses of its fragments nor its "
@@ -68,7 +69,7 @@ def grains_flyby(
     rotation : ndarray (3, 3)
         Body axes -> frame of the encounter, at its start.
     grains : int
-        Number of grains of a pile; fewer than 100 warn.
+        Number of grains of a pile; a warning is issued below 100.
     seeds : int or sequence of int
         Number of piles, or their seeds.
     threads : int, optional
@@ -140,7 +141,7 @@ def seeds_of(seeds: int | Sequence[int]) -> list[int]:
     InvalidInput
     """
     if isinstance(seeds, bool):
-        raise InvalidInput("seeds", seeds, "how many piles, or a sequence of seeds")
+        raise InvalidInput("seeds", seeds, "a number of piles, or a sequence of seeds")
     if isinstance(seeds, int | np.integer):
         if seeds < 1:
             raise InvalidInput("seeds", seeds, "one pile or more")

@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from astropy.table import QTable
 
 
-#: A pile from which nothing escapes is whole if its largest clump has more than this fraction of the mass: the rest are
-#: loose grains and small satellites.
+#: A pile from which nothing escapes counts as whole if its largest clump has more than this fraction of the mass; the
+#: remainder is loose grains and small satellites.
 WHOLE = 0.9
 
 
@@ -88,7 +88,7 @@ class GrainsRun(Record):
     axes_directions : ndarray (3, 3)
         Principal axes of the largest clump as columns, frame of the encounter.
     settled : bool
-        Whether clumps had stopped changing at the end of the run.
+        Whether the clumps no longer changed at the end of the run.
     end_time : Quantity
         Of the run, since closest approach.
     course : GrainsCourse
@@ -168,7 +168,7 @@ class GrainsOutcome(Collection):
 
     @property
     def median(self) -> GrainsRun:
-        """The run with the median mass of the largest clump, the lower one of two."""
+        """The run with the median mass of the largest clump (the lower of two middle ones)."""
         ordered = sorted(self.runs, key=lambda r: (r.largest_fraction, r.bound_fraction, -r.stretch))
         return ordered[(len(ordered) - 1) // 2]
 
@@ -202,7 +202,7 @@ class GrainsOutcome(Collection):
     def resolution_errors(self) -> ResolutionErrors:
         """Errors of :attr:`largest_fraction` and of the stretch of the median run from the finite number of grains.
 
-        They are systematic and come on top of the spread over the seeds. Estimated
+        They are systematic and add to the spread over the seeds. Estimated
         (:mod:`flybystab.flybys.grains_resolution`) from flybys with up to 4,000 grains.
         """
         run = self.median
@@ -229,8 +229,8 @@ class GrainsOutcome(Collection):
 
     def __repr__(self) -> str:
         low, high = self.largest_range
-        shares = ", ".join(f"{v} {p[0]:.2g}" for v, p in self.probabilities().items())
+        fractions = ", ".join(f"{v} {p[0]:.2g}" for v, p in self.probabilities().items())
         return (
-            f"<GrainsOutcome {piles_of(len(self.runs))}: {shares}; largest clump {self.largest_fraction:.3g} "
+            f"<GrainsOutcome {piles_of(len(self.runs))}: {fractions}; largest clump {self.largest_fraction:.3g} "
             f"({low:.3g} to {high:.3g}), {len(self.fragments)} clumps of 1 % or more, {brief(self.wall_time, u.s)}>"
         )

@@ -39,8 +39,8 @@ def resolution_errors(grains: int, largest: float, stretch: float, *, whole: boo
     whole : bool
         Whether the body has stayed in one piece, apart from loose grains.
     """
-    share = (REFERENCE / grains) ** EXPONENT
+    scale = (REFERENCE / grains) ** EXPONENT
     if whole:
-        return ResolutionErrors(LOST * share * (1.0 - largest), ELONGATION * share * abs(stretch - 1.0))
-    relative = (SMALL if largest <= 0.5 else LARGE) * share
+        return ResolutionErrors(LOST * scale * (1.0 - largest), ELONGATION * scale * abs(stretch - 1.0))
+    relative = (SMALL if largest <= 0.5 else LARGE) * scale
     return ResolutionErrors(min(relative, 1.0) * largest, np.nan)

@@ -1,7 +1,7 @@
 """Integration of one pile of grains through an encounter.
 
-A run continues after the encounter until its clumps have not changed for :data:`QUIET` (every clump of at least
-:data:`flybystab.flybys.grain_clumps.SMALLEST` of the mass has kept its mass to that fraction), or to a limit.
+A run continues after the encounter until its clumps have not changed for :data:`QUIET`, or to a limit: the mass of no
+clump above the fraction :data:`flybystab.flybys.grain_clumps.SMALLEST` has changed by more than that fraction.
 """
 
 from __future__ import annotations

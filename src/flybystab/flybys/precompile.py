@@ -1,7 +1,7 @@
-"""Compilation of the kernels of a flyby in a second process, while this one looks for the encounter.
+"""Compilation of the kernels of a flyby in a second process, while the first one searches for the encounter.
 
-On a fresh machine the kernels of the orbit and those of the body take about as long to compile. numba compiles in one
-thread of a process only; a second process leaves its kernels on the disk, from where this one loads them.
+On a fresh machine the kernels of the orbit and those of the body take about as long to compile. numba compiles in only
+one thread of a process; a second process writes its kernels to the disk, from which the first one loads them.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Any
 from flybystab.core.dynamics import verdict_row
 from flybystab.core.numerics.jit import CACHE
 
-#: A flyby and a sample of attitudes without yield, whose kernels are those of the first answer.
+#: A flyby and a sample of attitudes without yield: the kernels of the first result.
 _RIGID = """
 import astropy.units as u
 import flybystab as fs
@@ -27,7 +27,7 @@ _running: subprocess.Popen[bytes] | None = None
 
 
 def on_disk(kernel: Any) -> bool:
-    """Whether a kernel that is up to date lies on the disk, or nothing can be said about it."""
+    """Whether a kernel is stored on the disk and up to date; True if that cannot be determined."""
     try:
         return bool(kernel._cache._cache_file._load_index())
     except AttributeError:  # without a cache, or with another version of numba
@@ -35,7 +35,7 @@ def on_disk(kernel: Any) -> bool:
 
 
 def start() -> bool:
-    """Start to compile the kernels that are not cached; returns False if that would save no time."""
+    """Start the compilation of kernels that are not cached; False if that would save no time."""
     global _running
     if _running is None and CACHE and (os.cpu_count() or 1) > 1 and not on_disk(verdict_row.rigid_rows):
         _running = subprocess.Popen(
@@ -46,9 +46,9 @@ def start() -> bool:
 
 
 def wait() -> None:
-    """Return when the process that :func:`start` has begun has ended; at once without one.
+    """Wait for the end of the process that :func:`start` began; return immediately without one.
 
-    Kernels that it has not compiled are compiled here.
+    Kernels that it has not compiled are compiled in this process.
     """
     global _running
     if _running is not None:

@@ -30,14 +30,14 @@ INSTANTS = 60
 
 @dataclass(frozen=True, eq=False)
 class RefreshDistance(Record):
-    """Distance within which encounters refresh a share of the surface.
+    """Distance within which encounters refresh a given fraction of the surface.
 
     Attributes
     ----------
     planet : Planet
     distance : Quantity
-        Largest periapsis distance at which at least that fraction is refreshed, km; nan where no encounter outside the
-        planet refreshes so much.
+        Largest periapsis distance at which at least that fraction is refreshed, km; nan if no encounter outside the
+        planet refreshes that fraction.
     area : float
         Given fraction of the area, as the mean over the attitudes.
     low, high : Quantity
@@ -77,7 +77,7 @@ def refresh_distance(
     seed: int = 0,
     progress: Progressing = None,
 ) -> RefreshDistance:
-    """Periapsis distance within which an encounter refreshes a share of the surface.
+    """Periapsis distance within which an encounter refreshes a given fraction of the surface.
 
     Parameters
     ----------
@@ -88,9 +88,10 @@ def refresh_distance(
     v_inf : Quantity
         Hyperbolic excess speed.
     area : float
-        Share of the area, above 0 and below 1.
+        Fraction of the area, above 0 and below 1.
     repose, rise : Quantity, optional
-        When a facet counts as refreshed (:meth:`SurfaceHistory.refreshed`); a rise of 2 deg if neither is given.
+        Criterion by which a facet counts as refreshed (:meth:`SurfaceHistory.refreshed`); a rise of 2 deg if neither is
+        given.
     attitudes : int
         Isotropic attitudes at the start.
     seed : int
@@ -114,7 +115,7 @@ def refresh_distance(
         rise = 2.0 * u.deg
     rotations = spin_states(body, whole(attitudes, "attitudes", 1), seed).rotations
 
-    def shares(radii: float) -> Array:
+    def fractions(radii: float) -> Array:
         encounter = Encounter.hyperbolic(home, radii * home.radius * u.m, v_inf)
         return np.array(
             [
@@ -133,7 +134,7 @@ def refresh_distance(
         for step in range(BISECTIONS + 1):
             radii = low if step == 0 else float(np.sqrt(low * high))
             if radii not in found:
-                found[radii] = shares(radii)
+                found[radii] = fractions(radii)
                 tick(min(len(found), 3 * BISECTIONS))
             reached = float(getattr(np, statistic)(found[radii])) >= share
             if step == 0:

@@ -22,11 +22,11 @@ from flybystab.flybys.history import FlybyError, History, history_of, measured_e
 from flybystab.flybys.inputs import FlybyInputs, modelled
 from flybystab.flybys.remnant import body_after, final_attitude
 from flybystab.flybys.robustness import Robustness, surface_verdicts
-from flybystab.flybys.surface_change import slopes_on_the_way
+from flybystab.flybys.surface_change import slopes_of
 from flybystab.flybys.verdict import Verdict, letter_of, settled
 from flybystab.flybys.verdict_margins import VerdictMargins, verdict_margins
 from flybystab.tabular import Record
-from flybystab.typing import Array
+from flybystab.typing import Array, Document
 from flybystab.units import brief
 
 if TYPE_CHECKING:
@@ -176,7 +176,7 @@ class FlybyResult(Record):
         """Whether the body is at rest, disperses permanently or is outside the model at the end of the run.
 
         Otherwise it still flows or is out of contact, with too little energy to disperse: a body without friction
-        oscillates without end. Its verdict and bound mass fraction are then those of one instant of that motion.
+        oscillates indefinitely. Its verdict and bound mass fraction are then those of one instant of that motion.
         """
         return settled(self._run.verdict, self._run.regime, self.energy.value)
 
@@ -208,7 +208,7 @@ class FlybyResult(Record):
 
     @cached_property
     def margin(self) -> Quantity:
-        """Friction angle of the material less the largest required one, deg: positive if the body never yields."""
+        """Friction angle of the material less the largest required one, deg; positive if the body never yields."""
         return np.rad2deg(self.inputs.body.material.phi - self._run.friction) * u.deg
 
     @cached_property
@@ -277,7 +277,7 @@ class FlybyResult(Record):
     @cached_property
     def surface(self) -> SlopeChange:
         """Slopes of the surface on the rigid course: ``surface.share_passing(angle)``, ``surface.share_lifted``."""
-        return slopes_on_the_way(self.inputs)
+        return slopes_of(self.inputs)
 
     @cached_property
     def modelled(self) -> tuple[str, ...]:
@@ -311,7 +311,7 @@ class FlybyResult(Record):
             return None
         return "path" if self.encounter.impact else "body"
 
-    def _columns(self) -> tuple[dict[str, Any], dict[str, object]]:
+    def _columns(self) -> tuple[dict[str, object], dict[str, object]]:
         values = {name: getattr(self, name) for name in _COLUMNS}
         row = {
             name: value[None] if isinstance(value, Quantity) else np.asarray(value)[None]
@@ -323,7 +323,7 @@ class FlybyResult(Record):
         about |= {"distance": encounter.distance, "v_inf": encounter.v_inf}
         return row, {**self._about(), **{k: encoded(v) for k, v in about.items()}}
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Document:
         """JSON document of the result (schema ``flyby/1``): units in the keys, numbers or None."""
         from flybystab.flybys.document import flyby_document
 

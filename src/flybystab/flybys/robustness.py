@@ -49,11 +49,11 @@ class Robustness(Record):
 
     @property
     def robust(self) -> bool:
-        """Whether every one of the verdicts is the same."""
+        """Whether all verdicts agree."""
         return len({*map(str, self.surface.values()), *self.phase_verdict, *self.friction_verdict}) == 1
 
     def __repr__(self) -> str:
-        said = [
+        parts = [
             f"{name} {'agree' if len(set(map(str, found))) == 1 else 'differ'}"
             for name, found in (
                 (f"{len(self.surface)} yield surfaces", list(self.surface.values())),
@@ -61,18 +61,18 @@ class Robustness(Record):
                 ("friction angles +-3 deg", self.friction_verdict),
             )
         ]
-        return f"<Robustness: {', '.join(said)}>"
+        return f"<Robustness: {', '.join(parts)}>"
 
 
-def surface_verdicts(inputs: FlybyInputs, run: FlybyRun, everything: bool = False) -> dict[str, Verdict]:
-    """Verdicts on all yield surfaces of a body that stays rigid (or `everything`), else on its own.
+def surface_verdicts(inputs: FlybyInputs, run: FlybyRun, all_surfaces: bool = False) -> dict[str, Verdict]:
+    """Verdicts on all yield surfaces of a body that stays rigid (or `all_surfaces`), else on its own.
 
     A surface on which the run cannot be followed is left out.
     """
     material = inputs.body.material
     verdicts = {material.yield_surface: run.verdict}
     yields = any(name == "onset" for name, _, _ in run.events)
-    for name in () if yields and not everything else YIELD_SURFACES:
+    for name in () if yields and not all_surfaces else YIELD_SURFACES:
         if name not in verdicts:
             same = inputs.body.with_(material=material.with_(yield_surface=name))
             try:
@@ -96,7 +96,7 @@ def robustness_of(inputs: FlybyInputs, run: FlybyRun, phases: int) -> Robustness
     momentum = (momentum.sum() - momentum) * body.omega
     size = float(np.linalg.norm(momentum))
     axis = inputs.rotation @ (momentum / size if size > 0.0 else np.array([0.0, 0.0, 1.0]))
-    # half a turn about a principal axis leaves an ellipsoid as it was
+    # half a turn about a principal axis maps an ellipsoid onto itself
     principal = np.count_nonzero(momentum) <= 1
     angles = np.linspace(0.0, np.pi if principal else 2.0 * np.pi, phases, endpoint=False)
     phi = material.phi + np.array([-FRICTION, 0.0, FRICTION])
@@ -111,7 +111,7 @@ def robustness_of(inputs: FlybyInputs, run: FlybyRun, phases: int) -> Robustness
     )  # fmt: skip
     low, high = table.verdict[phases:]
     return Robustness(
-        surface=surface_verdicts(inputs, run, everything=True),
+        surface=surface_verdicts(inputs, run, all_surfaces=True),
         phase=np.rad2deg(angles) * u.deg,
         phase_verdict=table.verdict[:phases],
         friction_angle=np.rad2deg(phi) * u.deg,

@@ -66,7 +66,7 @@ class ShapeSpin(Record):
     Attributes
     ----------
     before, after : RotationState
-        At the start of the encounter and when it ends.
+        At the start and at the end of the encounter.
     attitude : ndarray (3, 3)
         At the end, principal axes -> frame of the encounter.
     spin : Quantity, shape (3,)
@@ -76,8 +76,8 @@ class ShapeSpin(Record):
     octupole_included : bool
         Whether the torque of the third moments is part of the motion.
     octupole_effect : float
-        Length of the change of the final angular momentum by it, over the change of the angular momentum in the
-        encounter; nan where it is not included.
+        Magnitude of its effect on the final angular momentum, over the change of the angular momentum in the encounter;
+        nan where it is not included.
     """
 
     before: RotationState
@@ -102,7 +102,7 @@ class ShapeSpin(Record):
     def __repr__(self) -> str:
         return (
             f"<ShapeSpin rate x {self.spin_ratio:.4g}, pole moves {brief(self.pole_change)}, "
-            f"octupole share {self.octupole_share:.1e}>"
+            f"octupole ratio {self.octupole_share:.1e}>"
         )
 
 
@@ -114,12 +114,12 @@ def shape_spin(
     Parameters
     ----------
     body, encounter, attitude
-        As in :func:`flybystab.flybys.flyby.flyby`. Any spin vector: a tumbling body, too.
+        As in :func:`flybystab.flybys.flyby.flyby`. The body may tumble.
     shape : Shape
         The true shape, of which `body` is the equivalent ellipsoid.
     error : float
-        Relative error allowed for the torque, 1e-10 to 1e-2: the octupole is included where its share is larger, and
-        the tolerance of the integration is a hundred times smaller.
+        Relative error allowed for the torque, 1e-10 to 1e-2: the octupole is included where its relative size is
+        larger, and the tolerance of the integration is a hundred times smaller.
 
     Returns
     -------
@@ -141,8 +141,8 @@ def shape_spin(
     q0 = Rotation.from_matrix(start).as_quat(scalar_first=True)
     first = np.concatenate([q0, body.omega])
     plain, torques = motion.followed(first, octupole=False, tolerance=STEP * allowed)
-    share = torques[1] / torques[0] if torques[0] > 0.0 else 0.0
-    included, effect, last = share > allowed, np.nan, plain
+    ratio = torques[1] / torques[0] if torques[0] > 0.0 else 0.0
+    included, effect, last = ratio > allowed, np.nan, plain
     if included:
         last, _ = motion.followed(first, octupole=True, tolerance=STEP * allowed)
         change = motion.momentum(last) - motion.momentum(first)
@@ -153,7 +153,7 @@ def shape_spin(
         motion.state(last),
         _matrix(last),
         last[4:] * u.rad / u.s,
-        float(share),
+        float(ratio),
         bool(included),
         effect,
     )
@@ -165,7 +165,7 @@ def free_rotation(moments: Array, omega: Array, attitude: Array) -> RotationStat
     Parameters
     ----------
     moments : ndarray (3,)
-        Principal moments of inertia over the mass, m2, in rising order.
+        Principal moments of inertia over the mass, m2, in ascending order.
     omega : ndarray (3,)
         Angular velocity, principal axes, rad/s.
     attitude : ndarray (3, 3)

@@ -53,8 +53,8 @@ class SpinForecast(Tabular):
 
     def __repr__(self) -> str:
         low, mid, high = np.quantile(self.precession_period.value, [0.05, 0.5, 0.95])
-        share = np.mean(self.mode == "SAM")
-        return f"<SpinForecast {len(self)} phases: precession {mid:.1f} h ({low:.1f} to {high:.1f}), SAM {share:.0%}>"
+        short = np.mean(self.mode == "SAM")
+        return f"<SpinForecast {len(self)} phases: precession {mid:.1f} h ({low:.1f} to {high:.1f}), SAM {short:.0%}>"
 
     @property
     def ecliptic(self) -> tuple[Quantity, Quantity]:

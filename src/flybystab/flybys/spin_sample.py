@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any, NamedTuple, Protocol
+from typing import NamedTuple, Protocol
 
 import astropy.units as u
 import numpy as np
@@ -103,7 +103,7 @@ def spin_sample(
     tolerance : float
         As in :func:`flybystab.flybys.flyby.flyby`.
     workers : int, optional
-        Threads; one a core by default. The result does not depend on it.
+        Number of threads, one for each core by default; the result does not depend on it.
     progress : bool or function, optional
         Whether to show a bar (:mod:`flybystab.progress`); after two seconds on a terminal by default.
 
@@ -156,7 +156,7 @@ class SpinSampleStates(NamedTuple):
     omega: Array
     rotations: Array
 
-    def rows(self) -> NDArray[Any]:
+    def rows(self) -> NDArray[np.void]:
         """Records of the bodies in encounters of frame ICRF, all in the first encounter."""
         b = self.body
         n = len(self.omega)
@@ -166,7 +166,7 @@ class SpinSampleStates(NamedTuple):
         )  # fmt: skip
 
     def bodies(self) -> list[Body]:
-        """The same as bodies."""
+        """The bodies with their spins."""
         if (self.omega == self.body.omega).all():
             return [self.body] * len(self.omega)
         return [self.body.with_(spin=omega * u.rad / u.s) for omega in self.omega]

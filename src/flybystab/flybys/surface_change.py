@@ -58,7 +58,7 @@ def check_shape(shape: Shape, body: Body) -> None:
         raise InvalidInput("shape", shape, "a Shape whose equivalent ellipsoid is the body (Body.from_shape)")
 
 
-def slopes_on_the_way(inputs: FlybyInputs) -> SlopeChange:
-    """`surface_change` of a flyby that has been run."""
+def slopes_of(inputs: FlybyInputs) -> SlopeChange:
+    """`surface_change` of the encounter of a flyby."""
     attitude = inputs.encounter.periapsis_axes @ inputs.rotation
     return surface_change(inputs.body, inputs.encounter, attitude)

@@ -39,7 +39,7 @@ def surface_history(
         The true shape, of which `body` is the equivalent ellipsoid (:meth:`Body.from_shape`).
     instants : int
         Rows of the result: the first, the last and the closest approach, the others equally spaced in
-        ``asinh(t/tau)``, ``tau`` the time scale of the passage.
+        ``asinh(t/tau)``, ``tau`` the time scale of the encounter.
 
     Returns
     -------
@@ -55,7 +55,7 @@ def surface_history(
 
 
 def history_of(inputs: FlybyInputs, shape: Shape) -> SurfaceHistory:
-    """`surface_history` of a flyby that has been computed."""
+    """`surface_history` of the encounter of a flyby."""
     attitude = inputs.encounter.periapsis_axes @ inputs.rotation
     return surface_history(inputs.body, inputs.encounter, attitude, shape=shape)
 

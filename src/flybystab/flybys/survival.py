@@ -36,12 +36,12 @@ class Survival(Tabular):
     Attributes
     ----------
     verdict : ndarray of str, shape (n,)
-        ``INTACT`` also for a clone that does not come near the planet.
+        ``INTACT`` also for a clone without an encounter.
     near : ndarray of bool, shape (n,)
-        Clones that do come near.
+        Clones with an encounter.
     margin : Quantity, shape (n,)
-        Friction angle of the material less the one mobilised, a lower limit to it where `bounded`; nan for clones that
-        do not come near and for impacts.
+        Friction angle of the material less the one mobilised, a lower limit to it where `bounded`; nan for clones
+        without an encounter and for impacts.
     failure : ndarray of str, shape (n,)
         Reason why a clone could not be computed; its verdict is ``FAILED``.
     bounded : ndarray of bool, shape (n,)
@@ -100,9 +100,9 @@ def survival(
 ) -> Survival:
     """Probabilities of the verdicts on a body whose orbit is uncertain.
 
-    Each clone passes the planet on its own two-body path through closest approach (which has the tide of the
-    real one to about 1e-4 of its peak near the planet), with its own attitude of the body. Where a bound on the
-    stress (:mod:`flybystab.core.ellipsoid.yield_bound`) proves that the body cannot yield, nothing is integrated.
+    Each clone passes the planet on its own two-body path through closest approach (whose tide agrees with that of the
+    real path to about 1e-4 of its peak near the planet), with its own attitude of the body. Where a bound on the stress
+    (:mod:`flybystab.core.ellipsoid.yield_bound`) proves that the body cannot yield, nothing is integrated.
 
     Parameters
     ----------
@@ -186,7 +186,7 @@ def _bounds(
 def _periapsis_axes(distribution: EncounterDistribution) -> Array:
     """Rotations (n, 3, 3), ICRF -> x to the asteroid at closest approach, z along the orbital angular momentum."""
     r, v = distribution.position.value, distribution.velocity.value
-    with np.errstate(invalid="ignore"):  # clones that do not come near
+    with np.errstate(invalid="ignore"):  # clones without an encounter
         h = np.cross(r, v)
         x, z = (a / np.linalg.norm(a, axis=1)[:, None] for a in (r, h))
     return np.stack([x, np.cross(z, x), z], axis=1)

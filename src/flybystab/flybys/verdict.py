@@ -33,7 +33,7 @@ class Verdict(StrEnum):
     NOT_IN_EQUILIBRIUM = "NOT IN EQUILIBRIUM"
 
 
-#: Verdicts from the least to the most severe, then those without one.
+#: Verdicts from the least to the most severe, then those that are no outcome of an encounter.
 SEVERITY: tuple[str, ...] = (
     Verdict.INTACT,
     Verdict.RESHAPED,
@@ -141,6 +141,6 @@ def letter_of(verdict: Verdict, bound: float) -> str | None:
 
 
 def settled(verdict: Verdict, regime: str, energy: float) -> bool:
-    """Whether a run ended with a body at rest, dispersing permanently (`energy` not negative), or outside the model."""
+    """True if the body is at rest at the end, disperses permanently (`energy` not negative) or is outside the model."""
     left = (Verdict.BEYOND_MODEL, Verdict.IMPACT, Verdict.NOT_IN_EQUILIBRIUM)
     return regime == "rigid" or verdict in left or energy >= 0.0

@@ -23,7 +23,7 @@ ROWS = 20_000
 
 @dataclass(frozen=True, repr=False)
 class VerdictMargins(Record):
-    """Distances of a verdict from its edges. A verdict is not to be relied on where `nearest` is small.
+    """Distances of a verdict from its edges. A verdict is unreliable where `nearest` is small.
 
     Attributes
     ----------
@@ -31,8 +31,8 @@ class VerdictMargins(Record):
         Friction angle less the largest required one, deg: the threshold of INTACT.
     axis_ratio : float
         Largest ``a1/a3`` during the encounter. A body that passes `limit` is followed beyond it, to five times the
-        limit, with the homogeneous model continued outside its range, to find whether the elongation stops. Infinite if
-        the run cannot be followed.
+        limit, with the homogeneous model extrapolated beyond its range, to determine whether the elongation stops.
+        Infinite if the run cannot be followed.
     limit : float
         Axis ratio beyond which the verdict is BEYOND MODEL.
     strain : float
@@ -42,7 +42,7 @@ class VerdictMargins(Record):
     bound_fraction_upper : float
         The same in the potential of the whole body.
     relative : dict of str to float
-        Distance from each edge that the verdict has, relative: ``"friction"`` (over the friction angle),
+        Relative distance from each edge that applies to the verdict: ``"friction"`` (over the friction angle),
         ``"axis ratio"`` (``1 - axis_ratio/limit``), ``"bound fraction"`` (to the nearest edge of a class).
         Negative beyond the edge.
     """

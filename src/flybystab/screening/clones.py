@@ -15,7 +15,7 @@ import numpy as np
 from astropy.time import Time
 
 from flybystab.catalogues.asteroid import identity
-from flybystab.encounter.distribution import clone_passages, encounter_distribution
+from flybystab.encounter.distribution import clone_encounters, encounter_distribution
 from flybystab.encounter.reach import far_enough
 from flybystab.errors import FlybystabError
 from flybystab.orbit.epochs import later
@@ -59,7 +59,7 @@ class Clones(NamedTuple):
         """The passages of clones `first` to ``last - 1``; those of one clone do not depend on the others."""
         p = self.passage
         clones = p.asteroid.orbit.clones(self.samples, self.key, first=first, last=last)
-        offset, distance, v_inf = clone_passages(
+        offset, distance, v_inf = clone_encounters(
             clones, p.planet, self.time, search=_SEARCH, within=self.within * u.m, workers=1
         )
         out = []

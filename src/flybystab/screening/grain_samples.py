@@ -14,7 +14,7 @@ import numpy as np
 
 from flybystab.encounter.attitude import periapsis_axes
 from flybystab.errors import FlybystabError
-from flybystab.flybys.escalation import HANDED_ON
+from flybystab.flybys.escalation import ESCALATED
 from flybystab.flybys.grains_flyby import grains_flyby
 from flybystab.screening.clones import Clones
 from flybystab.screening.draws import Attitudes
@@ -81,4 +81,4 @@ class GrainSample:
 
 def needing_grains(first: int, verdicts: Sequence[str]) -> dict[int, str]:
     """Numbers and verdicts of the samples from `first` on where the ellipsoid ends."""
-    return {first + k: str(v) for k, v in enumerate(verdicts) if v in HANDED_ON}
+    return {first + k: str(v) for k, v in enumerate(verdicts) if v in ESCALATED}

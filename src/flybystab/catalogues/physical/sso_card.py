@@ -9,7 +9,6 @@ same weight.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from flybystab.catalogues.readers.conversion import number
 from flybystab.catalogues.spin_solutions import SpinSolution
 from flybystab.errors import InvalidInput
 from flybystab.files import parse_json
+from flybystab.typing import Document
 
 
 def _is_card(text: str) -> bool:
@@ -44,13 +44,13 @@ def read_card(text: str, file: str) -> list[PhysicalData]:
         row = _row(physical, file)
         spins = physical.get("spins", physical.get("spin")) or []
         solutions = list(spins.values()) if isinstance(spins, Mapping) else list(spins)
-        found = tuple(_solution(s, file) for s in solutions if isinstance(s, Mapping) and s.get("period"))
+        found = tuple(_solution(s, file) for s in solutions if isinstance(s, dict) and s.get("period"))
     except (KeyError, TypeError, AttributeError) as error:
         raise InvalidInput("ssoCard", file, f"a card of SsODNet ({error})") from None
     return [PhysicalData(tuple(str(n) for n in names if n), row, found)]
 
 
-def _value(item: Any, name: str, file: str) -> tuple[float, float]:
+def _value(item: object, name: str, file: str) -> tuple[float, float]:
     """Value and error of a quantity; the error is zero if it is not given."""
     if not isinstance(item, Mapping):
         return number(item, name, file), 0.0
@@ -59,14 +59,14 @@ def _value(item: Any, name: str, file: str) -> tuple[float, float]:
     return number(item.get("value"), name, file), float(np.mean(ends)) if ends else 0.0
 
 
-def _known(item: Any) -> bool:
+def _known(item: object) -> bool:
     return item not in (None, "", {}) and not (isinstance(item, Mapping) and item.get("value") in (None, ""))
 
 
-def _row(physical: Mapping[str, Any], file: str) -> dict[str, str]:
+def _row(physical: Document, file: str) -> dict[str, str]:
     row: dict[str, str] = {}
 
-    def source(item: Mapping[str, Any]) -> str:
+    def source(item: Document) -> str:
         return source_of("SsODNet", item.get("bibref") or [], file)
 
     magnitude = physical.get("absolute_magnitude") or {}
@@ -102,7 +102,7 @@ def _row(physical: Mapping[str, Any], file: str) -> dict[str, str]:
     return row
 
 
-def _solution(item: Mapping[str, Any], file: str) -> SpinSolution:
+def _solution(item: Document, file: str) -> SpinSolution:
     period, sigma = _value(item["period"], "period", file)
     pole = None
     if _known(item.get("long")) and _known(item.get("lat")):
