@@ -42,7 +42,7 @@ def _day(jd: float) -> Time:
 
 @dataclass(frozen=True, eq=False, init=False)
 class Asteroid(Record):
-    """An asteroid with its orbit and body, from a row of a catalogue or from values of the user.
+    """An asteroid with its orbit and body, from a row of a catalogue or from given values.
 
     Parameters
     ----------
@@ -284,9 +284,9 @@ class Asteroid(Record):
 
         The elements are a, e, i, node, peri, M, or q and the time of perihelion in place of a and M.
 
-        Its covariance is, in this order: that given for the asteroid; the one in the package; the diagonal of the
-        1-sigmas of the row, marked as uncorrelated; an estimate from digits and U
-        (:mod:`flybystab.catalogues.orbit_errors`); otherwise None.
+        Its covariance is the first of these that exists: that given for the asteroid; that in the package; the diagonal
+        of the 1-sigmas of the row, marked as uncorrelated; an estimate from digits and U
+        (:mod:`flybystab.catalogues.orbit_errors`). Otherwise it is None.
         """
         from flybystab.orbit.forces import NonGravitational, au_per_day2
         from flybystab.orbit.orbit import Orbit
@@ -309,7 +309,7 @@ class Asteroid(Record):
         elements = [self._number(c) * unit for c, unit in zip(ORBIT[1:], ORBIT_SI.tolist(), strict=True)]
         return Orbit._from_si_elements(epoch, elements, push, self.name, self._covariance(epoch))
 
-    def _state_by_perihelion(self) -> np.ndarray:
+    def _state_by_perihelion(self) -> Array:
         """Heliocentric state (m, m/s), shape (6,), by the distance and the time of perihelion; any conic."""
         from flybystab.constants import AU
         from flybystab.orbit.elements import state_from_elements
@@ -324,7 +324,9 @@ class Asteroid(Record):
         if self.file.startswith("embedded") and (known := embedded_covariance(self.row.get("number", ""))):
             return known
         sigmas = tuple("sigma_" + c for c in ORBIT[1:])
-        if not self.knows(*sigmas) or not any(self._number(c) for c in sigmas):  # zeros: not given
+        if not self.knows(*sigmas) or not any(
+            self._number(c) for c in sigmas
+        ):  # zeros mean that they are not given
             from flybystab.catalogues.orbit_errors import error_of
 
             return error_of(self.row, epoch)
@@ -373,7 +375,7 @@ class Asteroid(Record):
         Body
             Spinning about its short axis, or with the angular velocity of the tumbling solution (a
             homogeneous ellipsoid with the two observed periods). A tumbler without a solution spins about
-            its short axis with its main lightcurve period: `assumptions` says so.
+            its short axis with its main lightcurve period: this is listed in `assumptions`.
         """
         material = material or self.material
         missing = [c for c in (*SHAPE, "density_kg_m3") if not self.row.get(c)]
@@ -405,7 +407,7 @@ class Asteroid(Record):
         return np.tile(self.body_with().omega, (len(phase), 1))
 
     @cached_property
-    def _tumbling(self) -> tuple[np.ndarray, float, float]:
+    def _tumbling(self) -> tuple[Array, float, float]:
         """Moments of inertia per mass (m2) of the ellipsoid, angular momentum per mass, L^2/(2E) per mass."""
         squares = self.semi_axes.value**2
         moments = (squares.sum() - squares) / 5.0
@@ -415,7 +417,7 @@ class Asteroid(Record):
         return moments, *tumbling_state(moments, precession, rotation, self.row["tumbling_mode"])
 
     @property
-    def pole(self) -> np.ndarray | None:
+    def pole(self) -> Array | None:
         """Unit vector, ICRF, of the spin pole (angular momentum of a tumbler); None where not known."""
         if not self.knows("pole_ecl_lon_deg", "pole_ecl_lat_deg"):
             return None
@@ -433,7 +435,7 @@ class Asteroid(Record):
         angle : Quantity
             Rotation angle about the pole. It cannot be predicted for a date decades away.
         phase : float
-            For a tumbler: the phase given to `body_with`.
+            Phase of a tumbler, as given to `body_with`.
         pole : ndarray (3,), optional
             Direction, ICRF, of the angular momentum instead of the catalogued one.
 
@@ -467,8 +469,8 @@ class Asteroid(Record):
             out.append("density")
         if self.spin_solutions:
             total = sum(s.weight for s in self.spin_solutions)
-            share = max(s.weight for s in self.spin_solutions) / total
-            out.append(f"one of {len(self.spin_solutions)} rival spin solutions (weight {share:.0%})")
+            weight = max(s.weight for s in self.spin_solutions) / total
+            out.append(f"one of {len(self.spin_solutions)} rival spin solutions (weight {weight:.0%})")
         if self.pole is None:
             out.append("pole unknown")
         if "spin_state" in self.assumed:

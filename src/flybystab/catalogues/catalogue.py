@@ -48,7 +48,7 @@ def find(asteroids: Sequence[Asteroid], name: str | int, where: str) -> Asteroid
 
 
 def _other_names(text: str) -> list[str]:
-    """Names in a text of several, as ``Bennu (101955)``, and the number of an identifier of JPL, 20101955, a0101955."""
+    """Names in a text such as ``Bennu (101955)``, and the number of an identifier of JPL (20101955, a0101955)."""
     parts = name_columns(text)
     found = [parts[c] for c in ("number", "designation", "name") if parts.get(c)]
     if after := re.fullmatch(r"(.*\S)\s*\((\d+)\)", text.strip()):
@@ -80,7 +80,7 @@ def _embedded() -> tuple[Asteroid, ...]:
 def catalogue(path: object = None) -> tuple[Asteroid, ...]:
     """All asteroids of the embedded catalogue, or of a file, in their order.
 
-    The format is found from the content of the file (:mod:`flybystab.catalogues.readers`), which may be
+    The format is recognised from the content of the file (:mod:`flybystab.catalogues.readers`), which may be
     gzipped: the catalogue's own columns, or those of an agency or program (``docs/inputs.md``). Objects of astroquery
     and sbpy are accepted as well (:mod:`flybystab.catalogues.objects`).
 

@@ -29,7 +29,7 @@ _LETTERS = "ABCDEFGHJKLMNOPQRSTUVWXYZ"
 
 
 def unpacked(text: str) -> str:
-    """Number or designation from its packed form; other texts are returned unchanged.
+    """Number or designation from its packed form; any other text is returned unchanged.
 
     ``K04M04N`` is 2004 MN4, ``a0001`` 360001, ``~0K8Q`` 697402 (620000 and a number in base 62), ``_QC0000``
     2026 CA620, ``PLS2040`` 2040 P-L, ``CK20F030`` C/2020 F3, ``0001P`` 1P
@@ -39,7 +39,7 @@ def unpacked(text: str) -> str:
         cycle = 10 * _DIGITS.index(text[4]) + int(text[5])
         return f"{_year(text)} {text[3]}{text[6]}{cycle or ''}"
     if re.fullmatch(r"_[0-9A-Za-z][A-HJ-Y][0-9A-Za-z]{4}", text):
-        order = _base62(text[3:])  # from cycle 620 on: 15,500 designations of the half-month are behind
+        order = _base62(text[3:])  # counted from cycle 620, after 15,500 designations of the half-month
         year = 2000 + _DIGITS.index(text[1])
         return f"{year} {text[2]}{_LETTERS[order % 25]}{620 + order // 25}"
     if re.fullmatch(r"(PLS|T[123]S)\d{4}", text):

@@ -1,4 +1,4 @@
-"""Catalogue rows from values of the user: orbit, body and pole, with errors and sources."""
+"""Catalogue rows from given values: orbit, body and pole, with errors and sources."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def body_columns(body: Body) -> dict[str, str]:
     Raises
     ------
     InvalidInput
-        For another rotation.
+        For any other rotation.
     """
     check_body(body)
     axes = np.asarray(body.semi_axes.to_value(u.m), dtype=float)

@@ -1,4 +1,4 @@
-"""Trusted spin periods of near-Earth asteroids (LCDB: Warner, Harris & Pravec 2009, release 2021)."""
+"""Reliable spin periods of near-Earth asteroids (LCDB: Warner, Harris & Pravec 2009, release 2021)."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ import numpy as np
 
 from flybystab.typing import Array
 
-#: Number of bodies of similar size among which a period is drawn.
+#: Number of bodies of similar size from which a period is drawn.
 NEIGHBOURS = 200
 
 
 @lru_cache(maxsize=1)
 def lightcurves() -> dict[str, dict[str, str]]:
-    """Rows of ``data/lightcurves.csv`` by number, or designation where there is none."""
+    """Rows of ``data/lightcurves.csv`` by number, or by designation without one."""
     text = resources.files("flybystab.data").joinpath("lightcurves.csv").read_text(encoding="utf-8")
     return {r["number"] or r["designation"]: r for r in csv.DictReader(io.StringIO(text, newline=""))}
 

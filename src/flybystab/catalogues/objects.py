@@ -44,7 +44,7 @@ def asteroids_of(orbit: object, phys: object = None) -> tuple[Asteroid, ...]:
     Raises
     ------
     InvalidInput
-        The object is none of these, or is invalid for the same reasons as a file.
+        The object is none of these, or its content is invalid.
     """
     from flybystab.catalogues.asteroid import Asteroid
 

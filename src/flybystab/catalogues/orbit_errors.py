@@ -1,16 +1,16 @@
 """Uncertainty of an orbit without a published covariance: the digits of its elements, and its parameter U.
 
-The Minor Planet Center prints elements to the decimals of MPCORB and no errors. U (JPL: condition code) is a class of
+The Minor Planet Center gives elements to the decimals of MPCORB, without errors. U (JPL: condition code) is a class of
 the runoff in longitude after ten years (https://minorplanetcenter.net/iau/info/UValue.html). Here two thirds of the
-runoff at the centre of its class count as one sigma of the mean motion of an asteroid that was at its observed place in
-the middle of the arc. The factor was chosen on half of the asteroids with a later orbit of JPL: it is the least of 1/3,
-1/2, 2/3 and 1 with which three sigma cover 99 % within the error of the sample. On the other half they cover 99 %
+runoff at the centre of its class are taken as one sigma of the mean motion, for an orbit through the observed position
+in the middle of the arc. The factor was chosen on half of the asteroids with a later orbit of JPL, as the least of 1/3,
+1/2, 2/3 and 1 for which three sigma cover 99 % within the error of the sample. On the other half they cover 99 %
 (``python benchmarks/orbit_errors.py factor``). The errors have wider tails than a normal distribution, so that one
 sigma covers more than 68 %.
 
-Of weak orbits (one opposition, or U of 3 and more) from observations that are years old, U says little: no such factor
-makes three sigma cover 99 %. The whole runoff is their sigma, which covers 68 %, and the covariance is marked as not
-reliable, so that no encounter of them is called determined.
+For weak orbits (one opposition, or U of 3 and more) from observations that are years old, U is not reliable: with no
+such factor do three sigma cover 99 %. Their sigma is the whole runoff, which covers 68 %, and the covariance is marked
+as unreliable, so that none of their encounters is classified as determined.
 """
 
 from __future__ import annotations
@@ -31,8 +31,8 @@ _HALF_UNITS = {"n": 5e-9, "e": 5e-8, "angle": 5e-6}
 _STEP = np.log(648000.0) / 9.0
 #: One sigma in units of the runoff: of an orbit, and of one for which U is not reliable.
 SHARE, SHARE_UNRELIABLE = 2.0 / 3.0, 1.0
-#: Age of observations, from the middle of the arc to the epoch of the elements, beyond which U of a weak orbit is not
-#: reliable, s, and the largest U of other orbits.
+#: Age of observations (middle of the arc to epoch of the elements, s) beyond which U of a weak orbit is not reliable,
+#: and the largest U of an orbit that is not weak.
 _RECENT, _WELL_KNOWN = 4.0 * YEAR, 2
 
 
@@ -61,35 +61,35 @@ def error_of(row: Mapping[str, str], epoch: Time) -> Covariance | None:
     elements = np.array([axis, ecc, *angles])
     middle = _state(elements)
     motion = np.sqrt(GM_SUN / axis**3)
-    ways = []
-    said = []
+    modes = []
+    bases = []
     reliable = True
     if row.get("orbit_source", "").startswith("MPC ("):
         half = np.array([0.0, _HALF_UNITS["e"], *[_HALF_UNITS["angle"] * one] * 4])
         half[0] = 2.0 / 3.0 * axis * _HALF_UNITS["n"] * one / DAY / motion
-        ways += [_state(elements + way) - middle for way in np.diag(half / np.sqrt(3.0))]
-        said.append("digits")
+        modes += [_state(elements + step) - middle for step in np.diag(half / np.sqrt(3.0))]
+        bases.append("digits")
     elif row.get("orbit_source", "").startswith("JPL SBDB ("):
         half = printed_half_units(row)
-        ways += [_state(elements + way) - middle for way in np.diag(half / np.sqrt(3.0))]
-        said.append("digits")
+        modes += [_state(elements + step) - middle for step in np.diag(half / np.sqrt(3.0))]
+        bases.append("digits")
     if row.get("condition_code", "").isdigit():
         ago = (epoch.tdb.jd - float(row.get("observed_jd") or epoch.tdb.jd)) * DAY
         reliable = u_is_reliable(row, ago)
         drift = runoff(int(row["condition_code"])) * (SHARE if reliable else SHARE_UNRELIABLE)
-        ways.append(_kicked(middle, axis, ago, -drift / motion) - middle)
-        said.append("U")
-    if not said:
+        modes.append(_kicked(middle, axis, ago, -drift / motion) - middle)
+        bases.append("U")
+    if not bases:
         return None
-    words = " and ".join(said)
-    source = f"{words} of {row.get('orbit_source') or 'the row'}"
-    caveat = f"by the {words} of its elements" if reliable else UNRELIABLE
-    matrix = np.transpose(ways) @ np.array(ways)
+    basis = " and ".join(bases)
+    source = f"{basis} of {row.get('orbit_source') or 'the row'}"
+    caveat = f"by the {basis} of its elements" if reliable else UNRELIABLE
+    matrix = np.transpose(modes) @ np.array(modes)
     return Covariance(epoch, SETS["cartesian"], middle, matrix, source, False, caveat)
 
 
 def u_is_reliable(row: Mapping[str, str], ago: float) -> bool:
-    """Whether U covers the error of an orbit whose arc has its middle `ago` s before the epoch."""
+    """True if U covers the error of an orbit; the middle of its arc is `ago` s before the epoch."""
     weak = row.get("single_opposition") == "Y" or int(row["condition_code"]) > _WELL_KNOWN
     return not weak or ago < _RECENT
 
@@ -97,7 +97,7 @@ def u_is_reliable(row: Mapping[str, str], ago: float) -> bool:
 def printed_half_units(row: Mapping[str, str]) -> Array:
     """Half a unit in the last printed digit of a, e, i, node, peri, M (m, rad), shape (6,).
 
-    All angles are assigned the largest number of decimals of the four, since tables leave out trailing zeros.
+    All angles are assigned the largest number of decimals of the four, since tables omit trailing zeros.
     """
     a, e, *angles = (_decimals(row[c]) for c in ("a_au", "e", "i_deg", "node_deg", "peri_deg", "M_deg"))
     angle = np.radians(0.5 * 10.0 ** -max(angles))

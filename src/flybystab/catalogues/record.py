@@ -96,7 +96,7 @@ BODILY = frozenset(
 SHAPE = ("semi_axis_a_m", "semi_axis_b_m", "semi_axis_c_m")
 
 
-#: Smallest and largest value of each column: values beyond are mistakes, mostly of the unit.
+#: Smallest and largest value of each column; a value outside is an error, usually of the unit.
 LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType(
     dict.fromkeys(_LENGTH, (0.05, 5e6))
     | dict.fromkeys(_HOURS, (1e-4, 1e5))
@@ -122,7 +122,7 @@ def key_of(name: object) -> str:
 
 
 class Record:
-    """A row of a catalogue: text in the file, numbers with units here.
+    """A row of a catalogue, with units for its numbers.
 
     Attributes
     ----------
@@ -153,7 +153,7 @@ class Record:
 
     @property
     def label(self) -> str:
-        """Number and name, as astronomers write them."""
+        """Number in brackets and name, as ``(99942) Apophis``."""
         return self.name if self.number is None else f"({self.number}) {self.name}"
 
     @cached_property

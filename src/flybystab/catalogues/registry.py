@@ -1,4 +1,4 @@
-"""File formats that are found by their place: each module of a package of readers registers its format."""
+"""Registry of file formats: each module of a package of readers registers its format."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ class Format(Protocol):
 
     @property
     def identify(self) -> Callable[[str], bool]:
-        """Whether a text has this format; it must not raise."""
+        """Test of a text for this format, which must not raise."""
 
 
 F = TypeVar("F", bound=Format)

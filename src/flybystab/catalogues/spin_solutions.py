@@ -91,7 +91,7 @@ def solutions_of(row: Mapping[str, str]) -> tuple[SpinSolution, ...]:
 
 
 def chosen(solutions: Sequence[SpinSolution], uniform: Array) -> NDArray[np.int64]:
-    """Numbers of the solutions that uniform numbers in [0, 1) choose in proportion to the weights, shape (n,)."""
-    share = np.cumsum([s.weight for s in solutions])
-    number = np.searchsorted(share / share[-1], uniform, side="right")
+    """Indices of solutions drawn in proportion to their weights by uniform numbers in [0, 1), shape (n,)."""
+    total = np.cumsum([s.weight for s in solutions])
+    number = np.searchsorted(total / total[-1], uniform, side="right")
     return np.minimum(number, len(solutions) - 1).astype(np.int64)

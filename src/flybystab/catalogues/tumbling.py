@@ -96,7 +96,7 @@ def tumbling_state(
     Raises
     ------
     InvalidInput
-        The two periods are not possible for these moments of inertia.
+        The two periods are impossible for these moments of inertia.
     """
     from scipy.optimize import brentq
 
@@ -104,7 +104,7 @@ def tumbling_state(
         raise UnknownName("tumbling mode", mode, list(MODES))
     j1, j2, j3 = (float(x) for x in moments)
     if not 0.0 < j1 < j2 < j3:
-        raise InvalidInput("moments", moments, "three different moments of inertia in rising order")
+        raise InvalidInput("moments", moments, "three different moments of inertia in ascending order")
     low, high = (j2, j3) if mode == "SAM" else (j1, j2)
     edge = 1e-9 * (high - low)
 
@@ -118,7 +118,7 @@ def tumbling_state(
         raise InvalidInput(
             "rotation period / precession period",
             f"{wanted:.6g}",
-            f"a ratio in ({between[0]:.4g}, {between[1]:.4g}): what a {mode} of this body can have",
+            f"a ratio in ({between[0]:.4g}, {between[1]:.4g}): the range of a {mode} of this body",
         )
     j = brentq(excess, low + edge, high - edge, xtol=1e-15 * j3, rtol=1e-15)
     # Both periods go as 1/L.

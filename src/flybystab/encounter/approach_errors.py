@@ -43,7 +43,7 @@ class ApproachErrors:
 
 
 def horizon(orbit: Orbit, beside: Deviations, window: Window, forces: tuple[str, ...], largest: float) -> str:
-    """Addition to the message "no encounter" where the orbit is not predictable that far; empty otherwise."""
+    """Addition to a message of no encounter if the orbit cannot be predicted to that time; empty otherwise."""
     found = errors_at(orbit, beside, window, forces, 0.0)
     gap = max(float(found.displacement[0]), float(found.model_error[0]))
     if predictability(largest, gap) is Predictability.DETERMINED:
@@ -69,7 +69,7 @@ def approach_errors(
     ----------
     chosen : Approach
     others : tuple of Approach or None
-        The same with all forces and with a smaller tolerance; without an approach the numerical error is infinite.
+        The approaches with all forces and with a smaller tolerance; if one is None the numerical error is infinite.
     t : float
         Closest approach, or first contact on an impact, s from the epoch of the window.
     """

@@ -10,13 +10,13 @@ from flybystab.encounter.attitude import attitude_matrix, rotation_rates
 from flybystab.encounter.encounter import Encounter
 from flybystab.typing import Array
 
-#: Relative tolerance of the rotation of a tumbler.
+#: Relative tolerance of the integration of a tumbling rotation.
 _TOLERANCE = 1e-11
 
 
 @check_arguments
 def attitude_at_start(body: Body, encounter: Encounter, at_periapsis: object) -> Array:
-    """Attitude at the start of an encounter of a body that would have a given one at closest approach without a tide.
+    """Attitude at the start of an encounter that without a tide leads to a given one at closest approach.
 
     Parameters
     ----------

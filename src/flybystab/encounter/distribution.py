@@ -1,8 +1,8 @@
 """An uncertain orbit at an encounter: distances, target-plane points and impacts of its clones.
 
-Two methods that have only the integrator in common: clones, which assume only a normal distribution at the epoch and
-have a sampling error; and the linear map of the covariance to the target plane, where the distribution remains normal
-as long as the map is linear, which is measured.
+Two methods are used that have only the integrator in common. Clones assume no more than a normal distribution at the
+epoch and have a sampling error. The linear map of the covariance to the target plane is valid where the map is linear;
+its nonlinearity is measured.
 """
 
 from __future__ import annotations
@@ -48,8 +48,8 @@ class EncounterDistribution(Tabular):
         The row of :func:`flybystab.find_encounters` for the nominal orbit.
     clones : tuple of Orbit, length n
     found : ndarray of bool, shape (n,)
-        Clones that have a closest approach near this time. The values below are nan for the others, which pass at
-        another time or not at all.
+        Clones that have a closest approach near this time. The values below are nan for the others, whose
+        encounter is at another time or absent.
     time_offset : Quantity, shape (n,)
         Time of closest approach less that of the nominal orbit.
     distance, v_inf : Quantity, shape (n,)
@@ -347,7 +347,7 @@ def _belonging(found: QTable, body: Planet, time: Time, n: int, reach: float) ->
     if len(found):
         offset = (found["time"] - time).to_value(u.s)
         here = np.flatnonzero((found["planet"] == body.name) & (np.abs(offset) <= reach))
-        # The last one written stays: an impact before any other minimum, then the one nearest in time.
+        # Later assignments prevail: an impact before any other minimum, then the minimum nearest in time.
         order = here[np.lexsort((np.abs(offset[here]), ~found["impact"][here]))[::-1]]
         every = [offset, *(found[c].to_value(u.m) for c in ("distance", "b_t", "b_r"))]
         every += [found["v_inf"].to_value(u.m / u.s), found["impact"]]

@@ -225,7 +225,7 @@ class Encounter(EncounterPath):
         planet : str or Planet
             The body encountered. It comes from `ephemeris` unless the trajectory is relative to it.
         time : Time or str
-            Near closest approach (text: TDB); the minimum of distance nearest to it counts.
+            Near closest approach (text: TDB); the minimum of distance nearest to it is used.
         start_distance, settle, search, ephemeris
             As in :meth:`from_orbit`.
         j2, pole
@@ -331,7 +331,7 @@ class Encounter(EncounterPath):
         planet : str or Planet
             The body encountered.
         time : Time or str
-            Near closest approach (text: TDB); the minimum of distance nearest to it counts.
+            Near closest approach (text: TDB); the minimum of distance nearest to it is used.
         error : Quantity
             Allowed displacement: forces whose estimated displacement is larger are modelled, the others are listed.
             Sources of tide are modelled down to a tenth of the corresponding relative error of the tide.
@@ -348,7 +348,7 @@ class Encounter(EncounterPath):
         ephemeris : str or Ephemeris, optional
             ``"de421"``, ``"de440"``; the best installed by default.
         forces : tuple of str, optional
-            Exactly these forces, names as in ``flybystab.orbit.forces.FORCES``, instead of choosing by `error`.
+            Exactly these forces, names as in ``flybystab.orbit.forces.FORCES``, instead of those chosen by `error`.
 
         Raises
         ------

@@ -33,7 +33,7 @@ class Track(Protocol):
 
 @dataclass(frozen=True, eq=False)
 class EncounterPath:
-    """Path relative to the planet, tide, and how well both are known.
+    """Path relative to the planet, tide, and the errors of both.
 
     The attributes are described in :class:`flybystab.Encounter`, which adds the constructors.
     """
@@ -154,7 +154,7 @@ class EncounterPath:
     @cached_property
     def periapsis_axes(self) -> Array:
         """Rotation matrix, `frame` -> periapsis frame: x to the asteroid, z along the angular momentum."""
-        # A track that ends on the planet has no periapsis: use that of the two-body orbit at its end.
+        # A track that ends at an impact has no periapsis: that of the two-body orbit at its end is used.
         ended = self.impact and self.t_stop < 0.0
         state = self.track.states(np.array([self.t_stop if ended else 0.0]))[0]
         r, v = state[:3], state[3:]

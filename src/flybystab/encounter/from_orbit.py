@@ -124,8 +124,8 @@ def _panels(
 ) -> tuple[TidePanels, float]:
     """Chebyshev panels of a tide, narrower until their error is below 1e-10 of the peak; and that error.
 
-    An encounter with the Moon varies faster than one with the Earth. An error below 1e-10 would be that of the
-    rounding of barycentric coordinates.
+    The tide of the Moon varies faster than that of the Earth. Errors below 1e-10 are not resolved: they are those of
+    the rounding of barycentric coordinates.
     """
     for width in (0.5, 0.25, 0.125, 0.0625):
         panels, miss = tide_panels(tide, start, stop, tau, width=width)

@@ -62,13 +62,13 @@ def approach_near(
 ) -> Approach | None:
     """The minimum of distance within ``reach`` s of the epoch of the window and nearest to it, or None."""
     start = seconds(orbit.epoch, window.epoch)
-    # Both directions start at the epoch of the orbit, which avoids the error of an integration forth and back.
+    # Both directions start at the epoch of the orbit, which avoids the error of integrating back and forth.
     parts: list[Array] = []
     for direction in (-1.0, 1.0):
         if (direction * reach - start) * direction <= 0.0:
             continue
         flight = orbit.flight(window, forces, epsilon)
-        # From an epoch outside of the interval: a row of the log at its edge.
+        # If the epoch is outside of the interval, the log has a row at the edge of the interval.
         stops = [s for s in (-direction * reach, direction * reach) if (s - start) * direction > 0.0]
         part = np.concatenate([flight.log_to(s)[(i > 0) :] for i, s in enumerate(stops)])
         parts.append(part[::-1] if direction < 0.0 else part[len(parts) :])

@@ -1,9 +1,9 @@
 """Line of variations: orbits along the direction of largest uncertainty, and their encounters with a planet.
 
 An orbit is given by standard normal variables z of the covariance (Milani et al. 2005). Between the epoch and the first
-encounter that bends the line, the state is a smooth function of the position on the line. Some orbits are integrated up
-to there, and all others start there, from a spline: in a search around 2182 for an orbit of 2011 with an encounter in
-2135 that saves three quarters of the time.
+encounter that makes the line curve strongly, the state is a smooth function of the position on the line. Some orbits
+are integrated to that time, and all others start there from a spline. In a search around 2182 for an orbit of 2011
+with an encounter in 2135 this saves three quarters of the time.
 """
 
 from __future__ import annotations
@@ -39,11 +39,11 @@ TOGETHER = 10.0 * DAY
 #: Deviations of the elements from which those of the state follow, in standard deviations.
 _SMALL = 1e-2
 #: Nodes of the spline along the line, and its largest error over the displacement by one sigma. Integrations differ by
-#: 1e-3 sigma for Bennu, whose sigma is 11 m at the epoch; a shift of the line by that does not matter.
+#: 1e-3 sigma for Bennu, whose sigma is 11 m at the epoch; a shift of the line by that amount is negligible.
 _NODES, _SPLINE = 65, 5e-3
 #: Largest ratio of the distances between nodes: beyond an encounter the derivatives vary along the line.
 _EVEN = 1.25
-#: Interval of the times that are tried, s, and tolerance of the integration up to there.
+#: Interval of the candidate times, s, and tolerance of the integration to them.
 _PAUSE, _FINE = 0.5 * YEAR, 1e-15
 
 
@@ -139,7 +139,7 @@ class LineOfVariations:
         return self.covariance.deviations(parameters)
 
     def _carried(self, z: Array, times: Array) -> Array:
-        """Barycentric states (m, m/s), shape (m, times, 6), of the orbits of z; nan where one was lost."""
+        """Barycentric states (m, m/s), shape (m, times, 6), of the orbits of z; nan where an integration failed."""
         orbits = deviated(self.orbit, self.covariance.epoch, *self._at_epoch(z), "node", self.eph)
         window = self._window
         forces = without_itself(default_forces(self.orbit, *BODIES), self.orbit, window)
@@ -218,7 +218,7 @@ class LineOfVariations:
         return table[table["planet"] == self.body.name]
 
     def near(self, z: Array, time: Time, within: float) -> Array:
-        """Time (s from `time`), distance (m), b (m), v_inf (m/s) of the encounter nearest to a time; nan without."""
+        """Time (s from `time`), distance (m), b (m), v_inf (m/s) of the encounter nearest to a time, or nan."""
         table = self.encounters(z, later(time, -TOGETHER), later(time, TOGETHER), within)
         out = np.full((len(z), 5), np.nan)
         late = np.array([seconds(t, time) for t in table["time"]])

@@ -33,7 +33,7 @@ class LinearPlane(Record):
         Probability inside the capture radius of the nominal ``v_inf``.
     nonlinearity : float
         Largest deviation of the middle of a pair of one-sigma points from the nominal, over the longer
-        semi-axis of the ellipse: the map and the probability are valid if it is far below one.
+        semi-axis of the ellipse: the map and the probability are valid if it is much less than one.
     """
 
     centre: Quantity
@@ -63,7 +63,7 @@ def disc_probability(centre: Array, covariance: Array, radius: float) -> float:
     Parameters
     ----------
     centre, covariance : ndarray, shapes (2,) and (2, 2)
-        Any unit, the same as that of `radius`.
+        In the unit of `radius` and its square.
     """
     values, vectors = np.linalg.eigh(covariance)
     short, long = np.sqrt(np.maximum(values, (1e-12 * radius) ** 2))

@@ -48,7 +48,7 @@ class Samples:
     error : float
         Estimated error of the interpolation near closest approach, m.
     ephemeris : str
-        Of the planet; empty where the file has it.
+        Ephemeris of the planet; empty if the trajectory is relative to it.
     """
 
     epoch: Time
@@ -162,7 +162,7 @@ def _centre(spice: ModuleType, path: Path, body: int, et: float) -> int:
 def _origin(
     centre: int | str, planet: Planet, zero: Time, low: float, high: float, ephemeris: str | Ephemeris | None
 ) -> tuple[Callable[[Array], Array], str]:
-    """Position of a planet relative to the centre of a trajectory, as a function of s from `zero`; its ephemeris."""
+    """State of a planet relative to the centre of a trajectory, at s from `zero`; name of its ephemeris."""
     where = _CENTRES[centre] if isinstance(centre, int) else centre
     if where == planet.name:
         return lambda t: np.zeros((len(t), 6)), ""
@@ -187,7 +187,7 @@ def _dense(
     start: float | None,
     name: str,
 ) -> Samples:
-    """Samples around the minimum of distance nearest to t = 0, doubled until the interpolation is good enough."""
+    """Samples around the minimum of distance nearest to t = 0, doubled until the interpolation error is small."""
     t = np.linspace(low, high, _COARSE)
     distance = np.linalg.norm(states(t)[:, :3], axis=1)
     minima = 1 + np.flatnonzero((distance[1:-1] <= distance[:-2]) & (distance[1:-1] < distance[2:]))
@@ -237,7 +237,7 @@ def oem_samples(path: str | Path, planet: Planet, ephemeris: str | Ephemeris | N
     """Samples of an orbit ephemeris message relative to a planet.
 
     Keywords: CCSDS 502.0-B-3, section 5 (key-value notation). Accelerations and covariances of the message
-    are not used. Of several segments all samples with the same centre, frame and time system are used.
+    are not used. All segments must have the same centre, frame and time system.
 
     Raises
     ------

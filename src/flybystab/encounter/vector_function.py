@@ -25,7 +25,7 @@ class EncounterVector(VectorFunction):
     Raises
     ------
     InvalidInput
-        A scripted encounter: it has no date.
+        A scripted encounter, which has no date.
     """
 
     def __init__(self, encounter: Encounter) -> None:

@@ -1,11 +1,11 @@
 """Virtual impactors: search for possible impacts along the line of variations.
 
 Orbits at equal distances along the direction of largest uncertainty (Milani et al. 2005) are integrated over a span.
-Encounters of consecutive orbits at nearly the same time belong together, and each minimum of the distance along the
-line is refined. Around it the target-plane coordinates b are linear in the standard normal variables z of the
+Encounters of consecutive orbits at nearly the same time are grouped, and each minimum of the distance along the line is
+refined. Around it the target-plane coordinates b are linear in the standard normal variables z of the
 covariance, ``b = b0 + M (z - z0)``, so that b is normal with mean ``b0 - M z0`` and covariance ``M M^T``. The impact
-probability is that of the disc from which the planet is hit. Probabilities far below one over the number of orbits can
-be found.
+probability is that of the disc of impact parameters that lead to an impact. Probabilities far below the reciprocal of
+the number of orbits can be found.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ from flybystab.result_table import ResultTable
 from flybystab.typing import Array, Document
 from flybystab.units import checked_time, to_si, whole
 
-#: Orbits of a refinement, and how often it is repeated at most.
+#: Number of orbits of a refinement, and largest number of refinements.
 _GRID, _ROUNDS = 9, 14
 #: Displacement on the target plane of the differences for M, over the radius of the disc.
 _STEP = 0.2
@@ -79,7 +79,7 @@ def virtual_impactors(
         surface) of the closest orbit on the line, ``sigma`` (its position on the line), ``stretching`` (km of the
         target plane for one sigma along the line), ``width`` (km, standard deviation across it), ``probability``,
         ``v_inf`` (km/s).
-        Impacts whose part of the line is shorter than the distance of two orbits can be missed.
+        Impacts on a part of the line shorter than the spacing of the orbits can be missed.
 
     Raises
     ------
@@ -130,7 +130,7 @@ def virtual_impactors(
 
 
 def _minima(table: ResultTable, count: int) -> list[tuple[int, Time]]:
-    """Orbits (number, time) at a local minimum of distance among the encounters that belong together.
+    """Orbits (number, time) at a local minimum of distance among the encounters of a group.
 
     Minima from which the distance rises so slowly that it cannot reach zero between two orbits are left out.
     """
@@ -157,7 +157,7 @@ def _minima(table: ResultTable, count: int) -> list[tuple[int, Time]]:
 def _impact(
     line: LineOfVariations, way: Array, sigma: float, spacing: float, time: Time, reach: float
 ) -> Document | None:
-    """The possible impact around a minimum of distance along the line; None where the encounter is lost."""
+    """The possible impact around a minimum of distance along the line; None if an orbit has no encounter there."""
     half = spacing
     best = np.full(5, np.nan)
     for _ in range(_ROUNDS):

@@ -1,6 +1,6 @@
-"""Readers of files with physical parameters of asteroids, one module per publisher, found by the content of a file.
+"""Readers of files with physical parameters of asteroids, one module per publisher, chosen by the content of a file.
 
-A module of this package registers a function with :func:`physical_reader`; nothing else is edited to add a format.
+A module of this package registers a function with :func:`physical_reader`; a further format is one further module.
 """
 
 from __future__ import annotations
@@ -47,11 +47,11 @@ class PhysicalReader:
     ----------
     name : str
     identify : callable
-        Whether a text has this format; it must not raise.
+        Test of a text for this format, which must not raise.
     read : callable
         Bodies of a text; the second argument is the name of the file.
     physical, spin : str
-        What is read, for the table in ``docs/inputs.md``.
+        Parameters that are read, for the table in ``docs/inputs.md``.
     """
 
     name: str
@@ -99,8 +99,8 @@ def read_physical(path: str | Path) -> list[PhysicalData]:
 def with_physical(asteroid: Asteroid, *paths: str | Path) -> Asteroid:
     """An asteroid with the values of files in place of its own.
 
-    A file without names is taken for this asteroid; of a table, the rows with one of its names. Later files replace
-    values of earlier ones; their spin solutions are rivals. A new diameter scales known semi-axes.
+    A file without names is assumed to be of this asteroid; of a table, the rows with one of its names are used. Later
+    files replace values of earlier ones; their spin solutions are rivals. A new diameter scales known semi-axes.
 
     Raises
     ------
@@ -133,7 +133,7 @@ def with_physical(asteroid: Asteroid, *paths: str | Path) -> Asteroid:
 
 
 def body_of(asteroid: Asteroid, given: Mapping[str, str]) -> dict[str, str]:
-    """Columns of new values of a body: known semi-axes are scaled to a new diameter, and its old errors are gone."""
+    """Columns of new values of a body: known semi-axes scaled to a new diameter, errors of replaced values empty."""
     from flybystab.catalogues.record import SHAPE
 
     out = dict(given)

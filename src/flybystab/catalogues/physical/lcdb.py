@@ -1,10 +1,11 @@
 """Rows of the Asteroid Lightcurve Database (LCDB) as CSV, and tables of rival spin solutions.
 
-Columns of the LCDB: its ``readme.pdf``, section 4 (Warner, Harris & Pravec 2009, Icarus 202, 134; https://minplanobs.org):
-Number, Name, Desig, Class, Diam (km), H, Period (h), AmpMax (mag), U (quality of the period, 3 is unambiguous), Notes
-(``T``: tumbling); ``-`` and -9.99 are missing values. A period or an amplitude with the flag ``<`` or ``>`` (PFlag,
-AmpFlag) is a bound and is not read. Copies with numbers before the names of columns (``19-Period``) are read too. Of
-several rows of one asteroid those of the best quality are rival solutions of the same weight.
+Columns of the LCDB: its ``readme.pdf``, section 4 (Warner, Harris & Pravec 2009, Icarus 202, 134;
+https://minplanobs.org): Number, Name, Desig, Class, Diam (km), H, Period (h), AmpMax (mag), U (quality of the period, 3
+is unambiguous), Notes (``T``: tumbling); ``-`` and -9.99 are missing values. A period or an amplitude with the flag
+``<`` or ``>`` (PFlag, AmpFlag) is a bound and is not read. Copies with numbers before the names of columns
+(``19-Period``) are read too. Of several rows of one asteroid those of the best quality are rival solutions of the same
+weight.
 
 A table of spin solutions has the columns ``period_h``, and as far as known ``sigma_h``, ``lon_deg``, ``lat_deg``
 (ecliptic J2000), ``weight``, ``source``, ``name``.
@@ -50,7 +51,7 @@ def read_lcdb(text: str, file: str) -> list[PhysicalData]:
 
 
 def bodies_of(rows: Iterable[Mapping[str, str]], file: str) -> list[PhysicalData]:
-    """Rows by the names of the columns, put together by asteroid."""
+    """Rows by the names of the columns, grouped by asteroid."""
     bodies: dict[tuple[str, ...], list[dict[str, str]]] = {}
     for raw in rows:
         row = {c: v for c, v in raw.items() if v not in _MISSING}
