@@ -14,6 +14,7 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.arguments import check_arguments
+from flybystab.body.generated_shapes import FACETS, distance_to_surface, gaussian_relief, sphere_mesh
 from flybystab.body.mesh import MassProperties, edges_of, mass_properties, self_intersections
 from flybystab.body.shape_files import facet_fields, read_mesh, write_mesh
 from flybystab.constants import G
@@ -27,11 +28,6 @@ Integers = NDArray[np.int64]
 
 if TYPE_CHECKING:
     from pyvista import PolyData
-
-#: Facets of shapes that are made in code, by default.
-FACETS = 4000
-#: Largest number of facets of a generated shape, for the memory that it takes.
-MOST_FACETS = 1_000_000
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +139,7 @@ class Shape:
     def from_ellipsoid(cls, semi_axes: Quantity, *, facets: int = FACETS) -> Shape:
         """A triangulated ellipsoid with its vertices on the surface; about ``12/facets`` of the volume is cut off."""
         axes = to_si(semi_axes, u.m, "semi_axes", shape=(3,), low=0.0, open_low=True)
-        directions, triangles = _sphere(facets)
+        directions, triangles = sphere_mesh(facets)
         return cls(directions * axes * u.m, triangles)
 
     @classmethod
@@ -165,8 +161,8 @@ class Shape:
         axes = to_si(semi_axes, u.m, "semi_axes", shape=(3,), low=0.0, open_low=True)
         size = to_si(amplitude, u.dimensionless_unscaled, "amplitude", low=0.0, high=0.3)
         highest = whole(degree, "degree", 2)
-        directions, triangles = _sphere(facets)
-        relief = _relief(directions, highest, np.random.default_rng(whole(seed, "seed", 0)))
+        directions, triangles = sphere_mesh(facets)
+        relief = gaussian_relief(directions, highest, np.random.default_rng(whole(seed, "seed", 0)))
         return cls(directions * np.exp(size * relief)[:, None] * axes * u.m, triangles)
 
     @classmethod
@@ -194,8 +190,10 @@ class Shape:
         depth *= min(one[0], two[0])
         # the common point lies in the middle of the overlap
         shift_one, shift_two = -(one[0] - 0.5 * depth), two[0] - 0.5 * depth
-        directions, triangles = _sphere(facets)
-        radius = np.maximum(_exit(directions, one, shift_one), _exit(directions, two, shift_two))
+        directions, triangles = sphere_mesh(facets)
+        radius = np.maximum(
+            distance_to_surface(directions, one, shift_one), distance_to_surface(directions, two, shift_two)
+        )
         return cls(directions * radius[:, None] * u.m, triangles)
 
     @property
@@ -404,47 +402,3 @@ def _principal_axes(second: Array) -> Array:
             axes[:, i] = -axes[:, i]
     axes[:, 2] = np.cross(axes[:, 0], axes[:, 1])
     return axes
-
-
-def _sphere(facets: int) -> tuple[Array, Integers]:
-    """Unit vectors of a Fibonacci lattice and the triangles of their convex hull, about `facets` of them."""
-    from scipy.spatial import ConvexHull
-
-    if whole(facets, "facets", 20) > MOST_FACETS:
-        raise InvalidInput("facets", facets, f"at most {MOST_FACETS:,}")
-    count = facets // 2 + 2
-    i = np.arange(count) + 0.5
-    z = 1.0 - 2.0 * i / count
-    longitude = np.pi * (1.0 + np.sqrt(5.0)) * i
-    r = np.sqrt(1.0 - z * z)
-    x = np.column_stack([r * np.cos(longitude), r * np.sin(longitude), z])
-    hull = ConvexHull(x)
-    triangles = hull.simplices.astype(np.int64)
-    a, b, c = (x[triangles[:, k]] for k in range(3))
-    inward = np.einsum("ni,ni->n", a, np.cross(b, c)) < 0.0
-    triangles[inward] = triangles[inward][:, ::-1]
-    return x, triangles
-
-
-def _exit(directions: Array, axes: Array, shift: float) -> Array:
-    """Distance from the origin to the surface of an ellipsoid whose centre is at ``(shift, 0, 0)``; origin inside."""
-    d = directions / axes
-    s = np.array([shift / axes[0], 0.0, 0.0])
-    aa, ab, bb = np.einsum("ni,ni->n", d, d), d @ s, s @ s
-    return (ab + np.sqrt(ab * ab - aa * (bb - 1.0))) / aa
-
-
-def _relief(directions: Array, degree: int, rng: np.random.Generator) -> Array:
-    """Gaussian field on the sphere of unit variance: a sum of zonal waves about random poles."""
-    field_ = np.zeros(len(directions))
-    total = 0.0
-    for ell in range(2, degree + 1):
-        weight = 1.0 / ell**2
-        total += weight
-        for _ in range(2 * ell + 1):
-            pole = rng.normal(size=3)
-            pole /= np.linalg.norm(pole)
-            wave = np.polynomial.legendre.Legendre.basis(ell)(directions @ pole)
-            field_ += rng.normal() * np.sqrt(weight) * wave
-    # P_l has the mean square 1/(2l + 1), and 2l + 1 waves are added
-    return field_ / np.sqrt(total)

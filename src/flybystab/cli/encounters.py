@@ -119,7 +119,8 @@ def _with_clones(table: QTable, asteroids: list[Asteroid], clones: int, seed: in
     """Add the columns of the clones to the table."""
     import numpy as np
 
-    from flybystab.encounter.distribution import add_clones, distributions
+    from flybystab.encounter.clone_columns import add_clones
+    from flybystab.encounter.distribution import distributions
 
     found: list[Any] = [None] * len(table)
     for i in np.unique(table["index"]).tolist():
