@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping
 from datetime import date
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from flybystab.catalogues.designations import name_columns, unpacked
 from flybystab.catalogues.readers import Contents, reader
@@ -21,6 +21,7 @@ from flybystab.catalogues.readers.parameters import (
 )
 from flybystab.errors import InvalidInput
 from flybystab.files import parse_json
+from flybystab.typing import Document
 
 if TYPE_CHECKING:
     from flybystab.catalogues.readers import Entry
@@ -113,7 +114,7 @@ def read_comets_json(text: str, file: str) -> list[Entry]:
     return [_json_entry(row, file) for row in parse_json(text, "catalogue file", file)]
 
 
-def _json_entry(row: Mapping[str, Any], file: str) -> Entry:
+def _json_entry(row: Document, file: str) -> Entry:
     names = [k for k, v in row.items() if v and looks_like_parameter(k) and k not in _OTHER]
     check_parameters("table", names, file)
     try:

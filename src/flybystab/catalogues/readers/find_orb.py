@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -28,6 +28,7 @@ from flybystab.catalogues.readers.parameters import check_parameters, looks_like
 from flybystab.catalogues.readers.sigmas import sigmas_of
 from flybystab.errors import InvalidInput
 from flybystab.files import parse_json
+from flybystab.typing import Document
 
 if TYPE_CHECKING:
     from flybystab.catalogues.readers import Entry
@@ -84,7 +85,7 @@ def read_elements(text: str, file: str) -> list[Entry]:
         raise InvalidInput("orbit file", file, f"objects with elements ({error})") from None
 
 
-def _entry(name: str, elements: Mapping[str, Any], file: str) -> Entry:
+def _entry(name: str, elements: Document, file: str) -> Entry:
     if elements.get("central body") != "Sun" or not str(elements.get("frame", "")).startswith("J2000 ecl"):
         given = f"{elements.get('central body')}, {elements.get('frame')}"
         raise InvalidInput("central body, frame", given, f"Sun, J2000 ecliptic in {file}")

@@ -9,7 +9,7 @@ service does not give their law.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from flybystab.catalogues.designations import name_columns
 from flybystab.catalogues.readers import Contents, reader
@@ -18,6 +18,7 @@ from flybystab.catalogues.readers.mpc import from_mpc
 from flybystab.catalogues.readers.parameters import check_parameters, looks_like_parameter
 from flybystab.errors import InvalidInput
 from flybystab.files import parse_json
+from flybystab.typing import Document
 
 if TYPE_CHECKING:
     from flybystab.catalogues.readers import Entry
@@ -93,7 +94,7 @@ def read_service(text: str, file: str) -> list[Entry]:
     return [_service(row, file) for row in _rows(text, file)]
 
 
-def _rows(text: str, file: str) -> list[Mapping[str, Any]]:
+def _rows(text: str, file: str) -> list[Document]:
     rows = parse_json(text, "catalogue file", file)
     rows = [rows] if isinstance(rows, Mapping) else rows
     if not all(isinstance(row, dict) for row in rows):
@@ -101,7 +102,7 @@ def _rows(text: str, file: str) -> list[Mapping[str, Any]]:
     return list(rows)
 
 
-def _renamed(row: Mapping[str, Any], names: Mapping[str, str], file: str) -> dict[str, str]:
+def _renamed(row: Document, names: Mapping[str, str], file: str) -> dict[str, str]:
     out = {mine: str(row[theirs]) for theirs, mine in names.items() if row.get(theirs) is not None}
     missing = [t for t, m in names.items() if m.endswith(("_deg", "_tt")) and m not in out]
     if missing or "e" not in out or not ("a_au" in out or "n_deg_d" in out):
@@ -111,7 +112,7 @@ def _renamed(row: Mapping[str, Any], names: Mapping[str, str], file: str) -> dic
     return out
 
 
-def _extended(row: Mapping[str, Any], file: str) -> Entry:
+def _extended(row: Document, file: str) -> Entry:
     check_parameters("table", [k for k in row if looks_like_parameter(k) and k not in _OTHER], file)
     out = _renamed(row, _EXTENDED, file)
     out["number"] = str(row.get("Number") or "").strip("() ")
@@ -123,7 +124,7 @@ def _extended(row: Mapping[str, Any], file: str) -> Entry:
     return from_mpc(out, file), None
 
 
-def _service(row: Mapping[str, Any], file: str) -> Entry:
+def _service(row: Document, file: str) -> Entry:
     given = [k for k in row if k.startswith("non_grav_a") and row[k] not in (None, "", "0", 0)]
     given += [k for k in row if looks_like_parameter(k) and k not in _OTHER]
     check_parameters("MPC service", [k.removeprefix("non_grav_").upper() for k in given], file)
@@ -135,7 +136,7 @@ def _service(row: Mapping[str, Any], file: str) -> Entry:
     return from_mpc(out, file), None
 
 
-def _by_perihelion(row: Mapping[str, Any], file: str) -> Entry:
+def _by_perihelion(row: Document, file: str) -> Entry:
     """A comet: perihelion distance and date in place of a and M."""
     label = f"{row.get('designation') or row.get('number')} ({row.get('name') or ''})".replace(" ()", "")
     jd = number(row.get("epoch_jd"), "epoch_jd", file)

@@ -10,7 +10,7 @@ of OrbFit, which makes the orbits), A1, A2, A3 in au/d2, DT in days; ``non_grav_
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -30,7 +30,7 @@ from flybystab.files import parse_json
 
 if TYPE_CHECKING:
     from flybystab.catalogues.readers import Entry
-    from flybystab.typing import Array
+    from flybystab.typing import Array, Document
 
 _COM = {"q": "q", "e": "e", "i": "i", "node": "node", "argperi": "peri", "peri_time": "tp"}
 _CAR = {c: c for c in CARTESIAN}
@@ -70,15 +70,15 @@ def read_mpc_orbit(text: str, file: str) -> list[Entry]:
     return [_entry(document, file) for document in found]
 
 
-def _documents(value: Any) -> list[Mapping[str, Any]]:
-    if isinstance(value, Mapping):
+def _documents(value: object) -> list[Document]:
+    if isinstance(value, dict):
         if "epoch_data" in value and ("CAR" in value or "COM" in value):
             return [value]
         return [d for v in value.values() for d in _documents(v)]
     return [d for v in value for d in _documents(v)] if isinstance(value, list) else []
 
 
-def _entry(document: Mapping[str, Any], file: str) -> Entry:
+def _entry(document: Document, file: str) -> Entry:
     try:
         epoch, system = document["epoch_data"], document.get("system_data", {})
         scale, form = str(epoch["timesystem"]), str(epoch["timeform"])
@@ -111,7 +111,7 @@ def _entry(document: Mapping[str, Any], file: str) -> Entry:
     return row, covariance_of(jd, names, values, matrix, source, file)
 
 
-def _identity(document: Mapping[str, Any]) -> dict[str, str]:
+def _identity(document: Document) -> dict[str, str]:
     data = document.get("designation_data") or {}
     permanent = str(data.get("permid") or "").strip("() ")
     provisional = str(data.get("unpacked_primary_provisional_designation") or "").strip()
@@ -124,7 +124,7 @@ def _identity(document: Mapping[str, Any]) -> dict[str, str]:
     return row
 
 
-def _law(document: Mapping[str, Any], file: str) -> str:
+def _law(document: Document, file: str) -> str:
     """Law of A1, A2, A3 by the model of the solution; empty without such a model.
 
     Raises
@@ -147,7 +147,7 @@ def _law(document: Mapping[str, Any], file: str) -> str:
 
 
 def _solution(
-    part: Mapping[str, Any], known: Mapping[str, str], law: str, file: str
+    part: Document, known: Mapping[str, str], law: str, file: str
 ) -> tuple[list[str], list[float], Array | None]:
     """Names, values and covariance of a part of the document; A1, A2, A3 in au/d2, DT in d, AMRAT in m2/kg.
 

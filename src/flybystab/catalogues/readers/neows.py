@@ -6,8 +6,7 @@ all their digits, without errors. Estimated diameters are not read, since they f
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from flybystab.catalogues.designations import is_comet, name_columns
 from flybystab.catalogues.readers import Contents, reader
@@ -22,6 +21,7 @@ from flybystab.catalogues.readers.conversion import (
 from flybystab.catalogues.readers.parameters import check_parameters, looks_like_parameter
 from flybystab.errors import InvalidInput
 from flybystab.files import parse_json
+from flybystab.typing import Document
 
 if TYPE_CHECKING:
     from flybystab.catalogues.readers import Entry
@@ -59,16 +59,16 @@ def read_neows(text: str, file: str) -> list[Entry]:
     return [_entry(thing, file) for thing in _objects(parse_json(text, "orbit file", file))]
 
 
-def _objects(value: Any) -> list[Mapping[str, Any]]:
+def _objects(value: object) -> list[Document]:
     """Everything with ``orbital_data``: an answer is one object, a list, or a mapping of lists by date."""
-    if isinstance(value, Mapping):
+    if isinstance(value, dict):
         if "orbital_data" in value:
             return [value]
         return [x for v in value.values() for x in _objects(v)]
     return [x for v in value for x in _objects(v)] if isinstance(value, list) else []
 
 
-def _entry(thing: Mapping[str, Any], file: str) -> Entry:
+def _entry(thing: Document, file: str) -> Entry:
     data = thing["orbital_data"] or {}
     check_parameters("table", [k for k in data if looks_like_parameter(k)], file)
     label = str(thing.get("name") or thing.get("designation") or thing.get("id") or "unnamed")

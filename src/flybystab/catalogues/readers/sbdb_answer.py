@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -33,6 +33,7 @@ from flybystab.catalogues.readers.sigmas import sigmas_of
 from flybystab.constants import G
 from flybystab.errors import InvalidInput
 from flybystab.files import parse_json
+from flybystab.typing import Document
 
 if TYPE_CHECKING:
     from flybystab.catalogues.readers import Entry
@@ -61,7 +62,7 @@ def from_sbdb_answer(text: str, file: str) -> tuple[dict[str, str], Covariance |
     InvalidInput
     """
     try:
-        record: dict[str, Any] = parse_json(text, "orbit file", file)
+        record: Document = parse_json(text, "orbit file", file)
         orbit, thing = record["orbit"], record["object"]
         elements = {item["name"]: item for item in orbit["elements"]}
         model = {p["name"]: p for p in orbit.get("model_pars") or [] if p["value"] is not None}
@@ -113,7 +114,7 @@ def _names(full: str, key: str) -> dict[str, str]:
     return out
 
 
-def _elements(orbit: Mapping[str, Any], elements: Mapping[str, Any], file: str) -> dict[str, str]:
+def _elements(orbit: Document, elements: Document, file: str) -> dict[str, str]:
     """Columns of the elements: a and M, or q and tp where these are lacking (parabolas)."""
     epoch = str(orbit["epoch"])
     if all((elements.get(c) or {}).get("value") not in (None, "") for c in ("a", "ma")):
@@ -131,7 +132,7 @@ def _elements(orbit: Mapping[str, Any], elements: Mapping[str, Any], file: str) 
     return perihelion_row(jd, values, jd - number(elements["tp"]["value"], "tp", file))
 
 
-def physical(items: Sequence[Mapping[str, Any]], file: str) -> dict[str, str]:
+def physical(items: Sequence[Document], file: str) -> dict[str, str]:
     """Physical columns of a list of physical parameters, each with its source.
 
     Raises
@@ -186,9 +187,7 @@ def physical(items: Sequence[Mapping[str, Any]], file: str) -> dict[str, str]:
     return out
 
 
-def _covariance(
-    orbit: Mapping[str, Any], pushes: Mapping[str, Any], source: str, file: str
-) -> Covariance | None:
+def _covariance(orbit: Document, pushes: Document, source: str, file: str) -> Covariance | None:
     found = orbit.get("covariance")
     if not found:
         return _uncorrelated(orbit, pushes, source, file)
@@ -216,9 +215,7 @@ def _covariance(
         ) from None
 
 
-def _uncorrelated(
-    orbit: Mapping[str, Any], pushes: Mapping[str, Any], source: str, file: str
-) -> Covariance | None:
+def _uncorrelated(orbit: Document, pushes: Document, source: str, file: str) -> Covariance | None:
     """Covariance from 1-sigmas of elements and accelerations; None if none is given or all have columns in the row."""
     elements = {item["name"]: item for item in orbit["elements"]}
     with_errors = [n for n, p in pushes.items() if p.get("sigma")]
