@@ -196,12 +196,12 @@ def test_energy_and_angular_momentum_of_two_figures_are_kept():
         both = made.primary + np.einsum("nij,j,nkj->nik", own, made.companion, own)
         r = np.linalg.norm(x, axis=1)
         q = 3 * np.einsum("ni,nij,nj->n", x, both, x) - r**2 * np.trace(both, axis1=1, axis2=2)
-        spin = 0.5 * np.sum(moments * z[:, 10:] ** 2, axis=1) / made.share  # m2/mu = 1/share
+        spin = 0.5 * np.sum(moments * z[:, 10:] ** 2, axis=1) / made.mass_fraction  # m2/mu = 1/mass_fraction
         return 0.5 * np.sum(v * v, axis=1) - 1 / r - q / (2 * r**5) + spin
 
     def momentum(z):
         own = figures.rotation_matrices(z[:, 6:10])
-        spin = np.einsum("nij,nj->ni", own, moments * z[:, 10:]) / made.share
+        spin = np.einsum("nij,nj->ni", own, moments * z[:, 10:]) / made.mass_fraction
         return np.cross(z[:, :3], z[:, 3:6]) + spin
 
     last = followed(y, made, 60.0)
