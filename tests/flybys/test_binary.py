@@ -234,7 +234,9 @@ def test_the_pericentre_of_an_oblate_primary_precesses():
 def test_a_synchronous_companion_librates_at_the_known_frequency():
     """``n sqrt(3 (B - A)/C)`` on a circular orbit (Murray & Dermott 1999, 5.60) for a light companion."""
     y, made, _ = start(eccentricity=0.0, n=1)
-    small = made._replace(companion=1e-6 * made.companion, primary=np.zeros_like(made.primary), share=1.0)
+    small = made._replace(
+        companion=1e-6 * made.companion, primary=np.zeros_like(made.primary), mass_fraction=1.0
+    )
     moments = small.companion.sum() - small.companion
     frequency = np.sqrt(3 * (moments[1] - moments[0]) / moments[2])
     y[:, 12] += 1e-4  # set in motion from its equilibrium
