@@ -5,16 +5,17 @@ the final semi-axes. The methods of SciPy and, if it is installed, LSODA of numb
 right-hand side from onset to arrest, without locating these events. The number of steps that implicit methods reject
 depends on the last digits of the initial state: each method starts from several of the first states of the flow, and
 medians are given, with the least and the most time. SciPy calls the right-hand side from Python; numbalsoda does not,
-so that its time is that of the method. The rigid row is a passage at 3 radii; its error is that of the spin.
+so that its time is that of the method. The rigid row is an encounter at 3 radii; its error is that of the spin.
 """
 
 from __future__ import annotations
 
 import importlib.util
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import astropy.units as u
 import numpy as np
@@ -22,14 +23,18 @@ import numpy as np
 from flybystab.body.body import Body, Material
 from flybystab.core.dynamics import rates as motion
 from flybystab.core.dynamics.moreau import follow_steps
-from flybystab.core.dynamics.run import LIMITS, body_state, integrate, parameters
-from flybystab.core.dynamics.state import FLOWING, empty_buffers
+from flybystab.core.dynamics.run import LIMITS, BodyState, Run, body_state, integrate, parameters
+from flybystab.core.dynamics.state import FLOWING, Parameters, empty_buffers
 from flybystab.core.dynamics.workspace import Limits
 from flybystab.core.ellipsoid.tide import TidePanels, tensor
 from flybystab.encounter.encounter import Encounter
 from flybystab.flybys.batch import MAX_STEPS, one_row, output_buffers, verdict_rows
 from flybystab.plots.style import new_figure, save, styled
+from flybystab.typing import Array, Document
 from flybystab.units import R_earth
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 PHI = np.deg2rad(35.0)
 
@@ -41,11 +46,14 @@ METHODS = {
     "DOP853": (1e-4, 1e-6, 1e-8),
     "LSODA": (1e-4, 1e-6, 1e-8, 1e-10),
 }
+#: Integrates a state (15,) of the flow between two times (units of the right-hand side) with a relative tolerance:
+#: start, end, state, tolerance -> state at the end.
+Solver = Callable[[float, float, Array, float], Array]
 
 
 def case() -> tuple[Body, Encounter]:
-    """The pile and its passage at 2.2 radii: reference flyby P1."""
-    cone = Material(yield_surface="drucker-prager")  # reference flyby P1
+    """Body and encounter of reference flyby P1: periapsis at 2.2 Earth radii."""
+    cone = Material(yield_surface="drucker-prager")
     body = Body(
         semi_axes=[1400, 850, 750] * u.m, density=2000 * u.kg / u.m**3, spin_period=6 * u.h, material=cone
     )
@@ -55,7 +63,7 @@ def case() -> tuple[Body, Encounter]:
     return body, encounter
 
 
-def _best(run: Any, repeat: int) -> float:
+def _best(run: Callable[[], object], repeat: int) -> float:
     """Least processor time of several runs on one core, s."""
     times = []
     for _ in range(repeat):
@@ -65,135 +73,81 @@ def _best(run: Any, repeat: int) -> float:
     return min(times)
 
 
-def rows(figure: str | Path | None = None, repeat: int = 5) -> list[dict[str, Any]]:
-    """Rows of method, setting, relative error, processor time (s) and time over that of the default at 1e-6."""
-    body, e = case()
-    t0 = body.dynamical_time
-    a0 = float(np.cbrt(np.prod(body.axes)))
-    tide = TidePanels(e.tide.tau / t0, e.tide.start, e.tide.width, e.tide.coefficients * t0**2)
+class Problem(NamedTuple):
+    """The reference flyby for the kernels.
 
-    start = body_state(body.axes, body.rho, body.omega, np.eye(3), PHI)
+    Attributes
+    ----------
+    body, encounter : Body, Encounter
+    start : BodyState
+        Initial state, SI.
+    t0, a0 : float
+        Units of the right-hand side: dynamical time, s, and geometric mean of the semi-axes, m.
+    parameters, tide : Parameters, TidePanels
+        Of the right-hand side, in these units.
+    """
 
-    def default(tolerance: float, keep: int = 0) -> Any:
+    body: Body
+    encounter: Encounter
+    start: BodyState
+    t0: float
+    a0: float
+    parameters: Parameters
+    tide: TidePanels
+
+    def run(self, tolerance: float, keep: int = 0, encounter: Encounter | None = None) -> Run:
+        """Run of the default integrator, with `keep` rows of history; by default through the reference encounter."""
+        through = encounter or self.encounter
         limits = LIMITS._replace(tolerance=tolerance)
-        return integrate(start, (e.t_start, e.t_stop), e.tide, limits=limits, keep=keep)
+        return integrate(
+            self.start, (through.t_start, through.t_stop), through.tide, limits=limits, keep=keep
+        )
 
-    def kernel(tolerance: float, encounter: Encounter) -> Callable[[], None]:
+    def kernel(self, tolerance: float, encounter: Encounter | None = None) -> Callable[[], object]:
         """The compiled run alone, as `flyby` and `flyby_many` call it for each row."""
-        arguments = one_row(body, encounter)
+        arguments = one_row(self.body, encounter or self.encounter)
         limits = Limits(tolerance, 6.0, MAX_STEPS)
         return lambda: verdict_rows(*arguments, limits, False, output_buffers(1, 0))
 
-    def axes(shape: Any) -> Any:
-        return np.sqrt(np.linalg.eigvalsh(shape)[::-1])
 
-    exact = default(1e-12, keep=200_000)
-    truth = axes(exact.shape)
-    out: list[dict[str, Any]] = []
-
-    def add(method: str, setting: str, shape: Any, cpu: float) -> None:
-        error = float(np.abs(axes(shape) / truth - 1.0).max())
-        out.append({"method": method, "setting": setting, "error_relative": error, "cpu_s": cpu})
-
-    for tolerance in (1e-3, 3e-4, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10):
-        run = default(tolerance)
-        add("default", f"tol {tolerance:.0e}", run.shape, _best(kernel(tolerance, e), repeat))
-
-    far = Encounter.hyperbolic(
-        "earth", periapsis=3.0 * R_earth, v_inf=5 * u.km / u.s, start_distance=10 * R_earth
+def _problem() -> Problem:
+    body, e = case()
+    t0 = body.dynamical_time
+    tide = TidePanels(e.tide.tau / t0, e.tide.start, e.tide.width, e.tide.coefficients * t0**2)
+    return Problem(
+        body,
+        e,
+        body_state(body.axes, body.rho, body.omega, np.eye(3), PHI),
+        t0,
+        float(np.cbrt(np.prod(body.axes))),
+        parameters(body.axes, body.rho, PHI, 0.0, 0.0, 0),
+        tide,
     )
 
-    def rigid(tolerance: float) -> Any:
-        limits = LIMITS._replace(tolerance=tolerance)
-        return integrate(start, (far.t_start, far.t_stop), far.tide, limits=limits)
 
-    gradients = [rigid(tolerance).velocity_gradient for tolerance in (1e-8, 1e-12)]
-    out.append(
-        {
-            "method": "default, rigid",
-            "setting": "no yield, tol 1e-08",
-            "error_relative": float(
-                np.linalg.norm(gradients[0] - gradients[1]) / np.linalg.norm(gradients[1])
-            ),
-            "cpu_s": _best(kernel(1e-8, far), 20),
-        }
-    )
-    par = parameters(body.axes, body.rho, PHI, 0.0, 0.0, 0)
+def _semi_axes(shape: Array) -> Array:
+    """Semi-axes, the longest first, of a shape tensor (3, 3)."""
+    return np.asarray(np.sqrt(np.linalg.eigvalsh(shape)[::-1]))
 
-    def stepping(n: int) -> Any:
-        y = np.zeros(15)
-        y[:3] = (body.axes / a0) ** 2
-        y[12:15] = body.omega * t0
-        follow_steps(e.t_start / t0, e.t_stop / t0, n, y, par.material, tide, False)
-        return tensor(y[:6]) * a0**2
 
-    for n in (2000, 8000, 32000):
-        coarse, fine = stepping(n), stepping(2 * n)
-        cpu = _best(lambda n=n: (stepping(n), stepping(2 * n)), 2)
-        add("stepping", f"{n} and {2 * n} steps", 2.0 * fine - coarse, cpu)
+def _error(shape: Array, exact: Array) -> float:
+    """Largest relative error of the semi-axes of a shape tensor (3, 3)."""
+    return float(np.abs(_semi_axes(shape) / _semi_axes(exact) - 1.0).max())
 
-    # SciPy: from just after onset, where the flow is started as the default starts it, to just before arrest.
-    history = exact.history
-    flowing = np.flatnonzero(history["regime"] == FLOWING)
-    last = flowing[-1]
-    work = empty_buffers()
 
-    def numbers(i: int) -> Any:
-        gradient = history["velocity_gradient"][i] * t0
-        d, w = 0.5 * (gradient + gradient.T), 0.5 * (gradient - gradient.T)
-        shape = history["shape"][i] / a0**2
-        pick = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
-        return np.array([shape[p] for p in pick] + [d[p] for p in pick] + [w[2, 1], w[0, 2], w[1, 0]])
+def _row(method: str, setting: str, error: float, cpu: float) -> Document:
+    return {"method": method, "setting": setting, "error_relative": error, "cpu_s": cpu}
 
-    def derivative(t: float, y: Any) -> Any:
-        dy = np.zeros(15)
-        motion.rate(FLOWING, t, y, dy, par, tide, work)
-        return dy
 
-    target = axes(history["shape"][last])
-    span = history["time"][last] / t0
-
-    def others(method: str, tolerance: float, solve: Callable[[float, Any], Any]) -> None:
-        """Row of a method that integrates a state from a time to `span`."""
-        found = []
-        for first in flowing[:STARTS]:
-            state = numbers(first)
-            clock = time.process_time()
-            y = solve(history["time"][first] / t0, state)
-            clock = time.process_time() - clock
-            found.append((clock, float(np.abs(axes(tensor(y[:6]) * a0**2) / target - 1.0).max())))
-        cpu, error = np.median(found, axis=0)
-        out.append(
-            {
-                "method": method,
-                "setting": f"rtol {tolerance:.0e}",
-                "error_relative": float(error),
-                "cpu_s": float(cpu),
-                "cpu_least_s": min(c for c, _ in found),
-                "cpu_most_s": max(c for c, _ in found),
-            }
-        )
-
-    from scipy.integrate import solve_ivp
-
-    # |D| starts at 1e-10: its absolute tolerance must be below it
-    for method, tolerances in METHODS.items():
-        for tolerance in tolerances:
-
-            def by_scipy(t: float, y: Any, method: str = method, tolerance: float = tolerance) -> Any:
-                return solve_ivp(
-                    derivative, (t, span), y, method=method, rtol=tolerance, atol=tolerance * 1e-4
-                ).y[:, -1]
-
-            others(f"SciPy {method}", tolerance, by_scipy)
-    if compiled := compiled_lsoda(par, tide):
-        compiled(history["time"][flowing[0]] / t0, span, numbers(flowing[0]), 1e-4)  # compiles
-        for tolerance in METHODS["LSODA"]:
-
-            def by_lsoda(t: float, y: Any, tolerance: float = tolerance) -> Any:
-                return compiled(t, span, y, tolerance)
-
-            others("numbalsoda", tolerance, by_lsoda)
+def rows(figure: str | Path | None = None, repeat: int = 5) -> list[Document]:
+    """Rows of method, setting, relative error, processor time (s) and time over that of the default at 1e-6."""
+    problem = _problem()
+    exact = problem.run(1e-12, keep=200_000)
+    assert exact.history is not None  # rows are kept
+    out = _default_rows(problem, exact.shape, repeat)
+    out.append(_rigid_row(problem))
+    out += _stepping_rows(problem, exact.shape)
+    out += _library_rows(problem, exact.history)
     reached = [r["cpu_s"] for r in out if r["method"] == "default" and r["error_relative"] <= 1e-6]
     for row in out:
         row["cpu_over_default_at_1e-6"] = row["cpu_s"] / min(reached)
@@ -202,8 +156,106 @@ def rows(figure: str | Path | None = None, repeat: int = 5) -> list[dict[str, An
     return out
 
 
-def compiled_lsoda(par: Any, tide: TidePanels) -> Callable[[float, float, Any, float], Any] | None:
-    """LSODA of numbalsoda as a function of both times, state and tolerance; None if it is not installed."""
+def _default_rows(problem: Problem, exact: Array, repeat: int) -> list[Document]:
+    """Rows of the default integrator at several tolerances; `exact` is the reference shape tensor, m2."""
+    out = []
+    for tolerance in (1e-3, 3e-4, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10):
+        error = _error(problem.run(tolerance).shape, exact)
+        cpu = _best(problem.kernel(tolerance), repeat)
+        out.append(_row("default", f"tol {tolerance:.0e}", error, cpu))
+    return out
+
+
+def _rigid_row(problem: Problem) -> Document:
+    """Row of the default integrator in an encounter at 3 radii, in which the body does not yield."""
+    far = Encounter.hyperbolic(
+        "earth", periapsis=3.0 * R_earth, v_inf=5 * u.km / u.s, start_distance=10 * R_earth
+    )
+    found, exact = (problem.run(tolerance, encounter=far).velocity_gradient for tolerance in (1e-8, 1e-12))
+    error = float(np.linalg.norm(found - exact) / np.linalg.norm(exact))
+    return _row("default, rigid", "no yield, tol 1e-08", error, _best(problem.kernel(1e-8, far), 20))
+
+
+def _stepping_rows(problem: Problem, exact: Array) -> list[Document]:
+    """Rows of Moreau time stepping, extrapolated to vanishing steps from n and 2n of them."""
+    e, t0 = problem.encounter, problem.t0
+
+    def stepping(n: int) -> Array:
+        y = np.zeros(15)
+        y[:3] = (problem.body.axes / problem.a0) ** 2
+        y[12:15] = problem.body.omega * t0
+        follow_steps(e.t_start / t0, e.t_stop / t0, n, y, problem.parameters.material, problem.tide, False)
+        return np.asarray(tensor(y[:6]) * problem.a0**2)
+
+    out = []
+    for n in (2000, 8000, 32000):
+        coarse, fine = stepping(n), stepping(2 * n)
+        cpu = _best(partial(stepping, n), 2) + _best(partial(stepping, 2 * n), 2)
+        out.append(_row("stepping", f"{n} and {2 * n} steps", _error(2.0 * fine - coarse, exact), cpu))
+    return out
+
+
+def _library_rows(problem: Problem, history: Mapping[str, Array]) -> list[Document]:
+    """Rows of SciPy and numbalsoda, from just after the onset of flow in a history to just before arrest.
+
+    The flow starts as in the default integrator.
+    """
+    flowing = np.flatnonzero(history["regime"] == FLOWING)
+    last = flowing[-1]
+    span, target = history["time"][last] / problem.t0, history["shape"][last]
+    starts = [(history["time"][i] / problem.t0, _state(problem, history, i)) for i in flowing[:STARTS]]
+
+    def row(method: str, tolerance: float, solve: Solver) -> Document:
+        found = []
+        for t, state in starts:
+            clock = time.process_time()
+            y = solve(t, span, state, tolerance)
+            clock = time.process_time() - clock
+            found.append((clock, _error(tensor(y[:6]) * problem.a0**2, target)))
+        cpu, error = np.median(found, axis=0)
+        spread = {"cpu_least_s": min(c for c, _ in found), "cpu_most_s": max(c for c, _ in found)}
+        return _row(method, f"rtol {tolerance:.0e}", float(error), float(cpu)) | spread
+
+    out = []
+    for method, tolerances in METHODS.items():
+        solve = _scipy_solver(problem, method)
+        out += [row(f"SciPy {method}", tolerance, solve) for tolerance in tolerances]
+    if compiled := compiled_lsoda(problem.parameters, problem.tide):
+        compiled(starts[0][0], span, starts[0][1], 1e-4)  # compiles
+        out += [row("numbalsoda", tolerance, compiled) for tolerance in METHODS["LSODA"]]
+    return out
+
+
+def _state(problem: Problem, history: Mapping[str, Array], i: int) -> Array:
+    """State (15,) of a row of a history, in the units of the right-hand side: shape, stretching and spin."""
+    gradient = history["velocity_gradient"][i] * problem.t0
+    d, w = 0.5 * (gradient + gradient.T), 0.5 * (gradient - gradient.T)
+    shape = history["shape"][i] / problem.a0**2
+    pick = [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)]
+    return np.array([shape[p] for p in pick] + [d[p] for p in pick] + [w[2, 1], w[0, 2], w[1, 0]])
+
+
+def _scipy_solver(problem: Problem, method: str) -> Solver:
+    """A method of SciPy for the compiled right-hand side of the flow."""
+    from scipy.integrate import solve_ivp
+
+    work = empty_buffers()
+
+    def derivative(t: float, y: Array) -> Array:
+        dy = np.zeros(15)
+        motion.rate(FLOWING, t, y, dy, problem.parameters, problem.tide, work)
+        return dy
+
+    def solve(t: float, stop: float, y: Array, tolerance: float) -> Array:
+        # |D| starts at 1e-10: its absolute tolerance must be below it
+        found = solve_ivp(derivative, (t, stop), y, method=method, rtol=tolerance, atol=tolerance * 1e-4)
+        return np.asarray(found.y[:, -1])
+
+    return solve
+
+
+def compiled_lsoda(par: Parameters, tide: TidePanels) -> Solver | None:
+    """LSODA of numbalsoda; None if it is not installed."""
     if importlib.util.find_spec("numbalsoda") is None:
         return None
     import numba
@@ -213,21 +265,22 @@ def compiled_lsoda(par: Any, tide: TidePanels) -> Callable[[float, float, Any, f
 
     @numba.cfunc(lsoda_sig)
     def derivative(t: float, y: Any, dy: Any, data: Any) -> None:
+        # y, dy and data are pointers
         panels = TidePanels(tau, start, width, numba.carray(data, shape))
         state, out = numba.carray(y, (15,)), numba.carray(dy, (15,))
         motion.rate(FLOWING, t, state, out, par, panels, empty_buffers())
 
-    def solve(t: float, stop: float, y: Any, tolerance: float) -> Any:
+    def solve(t: float, stop: float, y: Array, tolerance: float) -> Array:
         found, good = lsoda(
             derivative.address, y, np.array([t, stop]), tide.coefficients, rtol=tolerance, atol=tolerance * 1e-4,
             mxstep=100_000,
         )  # fmt: skip
-        return found[-1] if good else np.full(15, np.nan)
+        return np.asarray(found[-1]) if good else np.full(15, np.nan)
 
     return solve
 
 
-def lines(rows: list[dict[str, Any]]) -> list[str]:
+def lines(rows: list[Document]) -> list[str]:
     """The table as text."""
     head = (
         f"{'method':14s} {'setting':24s} {'rel. error':>10s} {'cpu (ms)':>10s} {'least to most':>16s} "
@@ -246,10 +299,10 @@ def lines(rows: list[dict[str, Any]]) -> list[str]:
 
 
 @styled
-def _plot(rows: list[dict[str, Any]], path: str | Path) -> None:
+def _plot(rows: list[Document], path: str | Path) -> None:
     """Error against time; bars are the least and the most time over the initial states."""
     figure = new_figure(7.4, 4.2)
-    panel: Any = figure.subplots()
+    panel: Axes = figure.subplots()
     colours = [
         "#0072B2",
         "#E69F00",

@@ -5,7 +5,7 @@ Functions that take matplotlib axes and return them.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import astropy.units as u
 import numpy as np
@@ -23,14 +23,17 @@ from flybystab.flybys.spin_forecast import SpinForecast
 from flybystab.plots.flyby import BLACK, BLUE, ORANGE, RED
 from flybystab.typing import Array
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
-def slope_plot(axes: Any, slopes: SurfaceSlopes) -> Any:
+
+def slope_plot(axes: Axes, slopes: SurfaceSlopes) -> Axes:
     """Plot the share of the area that is steeper than each slope."""
     _area_above(axes, slopes.slope, slopes.area, BLUE, "-", None)
     return _slope_axes(axes)
 
 
-def slope_change_plot(axes: Any, change: SlopeChange) -> Any:
+def slope_change_plot(axes: Axes, change: SlopeChange) -> Axes:
     """Plot the share of the area that is steeper than each slope before an encounter, and at its greatest slope."""
     _area_above(axes, change.before, change.area, BLACK, "--", "before the encounter")
     _area_above(axes, change.greatest, change.area, RED, "-", "greatest during it")
@@ -39,7 +42,7 @@ def slope_change_plot(axes: Any, change: SlopeChange) -> Any:
 
 
 def _area_above(
-    axes: Any, slope: Quantity, area: Quantity, colour: str, line: str, label: str | None
+    axes: Axes, slope: Quantity, area: Quantity, colour: str, line: str, label: str | None
 ) -> None:
     order = np.argsort(slope.value)
     weight = area.value[order]
@@ -47,13 +50,13 @@ def _area_above(
     axes.step(slope.to_value(u.deg)[order], above, where="pre", color=colour, ls=line, label=label)
 
 
-def _slope_axes(axes: Any) -> Any:
+def _slope_axes(axes: Axes) -> Axes:
     axes.set(xlabel="slope (deg)", ylabel="share of the area that is steeper", ylim=(0.0, 1.02))
     axes.set_xlim(left=0.0)
     return axes
 
 
-def surface_history_plot(axes: Any, history: SurfaceHistory) -> Any:
+def surface_history_plot(axes: Axes, history: SurfaceHistory) -> Axes:
     """Plot the change of the slopes against time: median, the middle 90 % and the extremes over the facets."""
     t = history.time.to_value(u.h)
     change = history.change.to_value(u.deg)
@@ -67,7 +70,7 @@ def surface_history_plot(axes: Any, history: SurfaceHistory) -> Any:
     return axes
 
 
-def distribution_plot(axes: Any, distribution: EncounterDistribution) -> Any:
+def distribution_plot(axes: Axes, distribution: EncounterDistribution) -> Axes:
     """Plot clones on the target plane, with the 1-sigma ellipse of the linear map and the disc of impacts."""
     points = distribution.b[distribution.found].to_value(u.km)
     hit = distribution.impact[distribution.found]
@@ -93,7 +96,7 @@ def distribution_plot(axes: Any, distribution: EncounterDistribution) -> Any:
     return axes
 
 
-def linear_plane_plot(axes: Any, plane: LinearPlane) -> Any:
+def linear_plane_plot(axes: Axes, plane: LinearPlane) -> Axes:
     """Plot the target plane of a linear map: the 1-sigma and the 3-sigma ellipse about the nominal point."""
     for sigmas, line in ((1.0, "-"), (3.0, "--")):
         outline = _ellipse_points(plane, sigmas)
@@ -114,7 +117,7 @@ def _ellipse_points(plane: LinearPlane, sigmas: float) -> Array:
     return np.asarray(plane.centre.to_value(u.km)[:, None] + np.stack([c * x - s * y, s * x + c * y]))
 
 
-def push_plot(axes: Any, found: Push) -> Any:
+def push_plot(axes: Axes, found: Push) -> Axes:
     """Plot the kinetic energy that a perturbation has lost against its strain: two expansions and the whole path."""
     for values, name, colour, line in (
         (found.loss.second, "to second order", BLUE, ":"),
@@ -127,7 +130,7 @@ def push_plot(axes: Any, found: Push) -> Any:
     return axes
 
 
-def forecast_plot(axes: Any, forecast: SpinForecast) -> Any:
+def forecast_plot(axes: Axes, forecast: SpinForecast) -> Axes:
     """Plot the periods after an encounter, sorted, over the sampled rotation phases."""
     share = (np.arange(len(forecast)) + 0.5) / len(forecast)
     for values, name, colour, line in (
@@ -144,7 +147,7 @@ def forecast_plot(axes: Any, forecast: SpinForecast) -> Any:
     return axes
 
 
-def binary_plot(axes: Any, sample: BinarySample) -> Any:
+def binary_plot(axes: Axes, sample: BinarySample) -> Axes:
     """Plot eccentricity against semi-major axis of the mutual orbits that stay bound; the rest is in the legend."""
     bound = sample.fate == "bound"
     axes.plot(
@@ -159,7 +162,7 @@ def binary_plot(axes: Any, sample: BinarySample) -> Any:
     return axes
 
 
-def grains_outcome_plot(axes: Any, outcome: GrainsOutcome) -> Any:
+def grains_outcome_plot(axes: Axes, outcome: GrainsOutcome) -> Axes:
     """Plot the mass of the largest clump, and of all that is bound to it, of every pile."""
     largest = np.array([run.largest_fraction for run in outcome.runs])
     bound = np.array([run.bound_fraction for run in outcome.runs])
@@ -173,7 +176,7 @@ def grains_outcome_plot(axes: Any, outcome: GrainsOutcome) -> Any:
     return axes
 
 
-def grains_course_plot(axes: Any, course: GrainsCourse) -> Any:
+def grains_course_plot(axes: Axes, course: GrainsCourse) -> Axes:
     """Plot the mass of the largest clump, and of all that is bound to it, against time."""
     t = course.time.to_value(u.h)
     axes.plot(t, course.bound_fraction, color=ORANGE, ls="--", label="bound to it")
@@ -183,7 +186,7 @@ def grains_course_plot(axes: Any, course: GrainsCourse) -> Any:
     return axes
 
 
-def requirements_plot(axes: Any, found: Requirements) -> Any:
+def requirements_plot(axes: Axes, found: Requirements) -> Axes:
     """Plot the share of the samples that stand at each friction angle."""
     phi = np.sort(found.friction_angle.to_value(u.deg))
     share: Array = (np.arange(len(phi)) + 1.0) / len(phi)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import astropy.units as u
 import numpy as np
@@ -18,6 +18,10 @@ from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
 from flybystab.flybys.result import FlybyResult, History
 from flybystab.plots.style import new_figure, save, styled
+from flybystab.typing import Array, Document
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 BLACK, ORANGE, SKY, GREEN, BLUE, RED = "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00"
 STYLES = ("-", "--", ":")
@@ -27,17 +31,18 @@ STYLES = ("-", "--", ":")
 TIME = "time from closest approach (h)"
 
 
-def _hours(history: History) -> Any:
-    return history.time_from_periapsis.to_value(u.h)
+def _hours(history: History) -> Array:
+    return np.asarray(history.time_from_periapsis.to_value(u.h))
 
 
-def _shade(axes: Any, history: History, labels: bool = False) -> None:
+def _shade(axes: Axes, history: History, labels: bool = False) -> None:
     """Shade plastic flow (grey) and dispersal (hatched), with entries for the legend if requested."""
     t = _hours(history)
-    for regime, name, style in (
+    regimes: tuple[tuple[str, str, Document], ...] = (
         ("flowing", "plastic flow", {"facecolor": "0.85"}),
         ("dispersed", "dispersed", {"facecolor": "0.85", "edgecolor": "0.45", "hatch": "//"}),
-    ):
+    )
+    for regime, name, style in regimes:
         inside = history.regime == regime
         edges = np.flatnonzero(np.diff(np.concatenate([[0], inside.astype(int), [0]])))
         for a, b in zip(edges[::2], edges[1::2], strict=True):
@@ -53,7 +58,7 @@ def described(body: Body) -> str:
     return f"{size} m, {body.rho:.4g} kg/m$^3$, {spin}, {body.material.friction_angle.to_value(u.deg):g} deg"
 
 
-def distance_plot(axes: Any, history: History, encounter: Encounter) -> Any:
+def distance_plot(axes: Axes, history: History, encounter: Encounter) -> Axes:
     """Plot distance from the planet's centre against time, with the planet's radius and a legend of the shading."""
     axes.semilogy(_hours(history), history.distance.to_value(u.km), color=BLACK)
     radius = encounter.planet.radius / 1e3
@@ -64,7 +69,7 @@ def distance_plot(axes: Any, history: History, encounter: Encounter) -> Any:
     return axes
 
 
-def friction_plot(axes: Any, history: History, limit: u.Quantity, *, regimes: bool = True) -> Any:
+def friction_plot(axes: Axes, history: History, limit: u.Quantity, *, regimes: bool = True) -> Axes:
     """Plot the mobilised friction angle against time, with the friction angle of the material.
 
     Without `regimes` the shading of plastic flow is not in the legend; so in the two functions below.
@@ -79,7 +84,7 @@ def friction_plot(axes: Any, history: History, limit: u.Quantity, *, regimes: bo
     return axes
 
 
-def spin_plot(axes: Any, history: History, *, regimes: bool = True) -> Any:
+def spin_plot(axes: Axes, history: History, *, regimes: bool = True) -> Axes:
     """Plot the spin rate against time."""
     rate = np.linalg.norm(history.spin.to_value(u.rad / u.s), axis=1)
     axes.plot(_hours(history), rate * 86400.0 / (2.0 * np.pi), color=GREEN)
@@ -91,7 +96,7 @@ def spin_plot(axes: Any, history: History, *, regimes: bool = True) -> Any:
     return axes
 
 
-def axes_plot(axes: Any, history: History, *, regimes: bool = True) -> Any:
+def axes_plot(axes: Axes, history: History, *, regimes: bool = True) -> Axes:
     """Plot the semi-axes against time."""
     a = history.semi_axes.to_value(u.m)
     for i, (colour, style) in enumerate(zip((BLUE, ORANGE, BLACK), STYLES, strict=True)):
@@ -103,7 +108,7 @@ def axes_plot(axes: Any, history: History, *, regimes: bool = True) -> Any:
     return axes
 
 
-def flyby_panels(panels: Sequence[Any], result: FlybyResult) -> Sequence[Any]:
+def flyby_panels(panels: Sequence[Axes], result: FlybyResult) -> Sequence[Axes]:
     """Plot distance, mobilised friction angle, spin rate and semi-axes into four axes with a common time axis."""
     history = result.history
     if history is None:
@@ -121,7 +126,7 @@ def flyby_panels(panels: Sequence[Any], result: FlybyResult) -> Sequence[Any]:
 def flyby_figure(result: FlybyResult, title: str, path: str | Path) -> Path:
     """Write a figure with the four panels of a flyby; returns its path."""
     figure = new_figure(7.2, 8.4)
-    panels: Any = figure.subplots(4, 1, sharex=True)
+    panels: Sequence[Axes] = figure.subplots(4, 1, sharex=True)
     flyby_panels(panels, result)
     panels[0].set_title(title)
     return save(figure, path)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from textwrap import fill
-from typing import Any
+from typing import TYPE_CHECKING, cast
 
 import astropy.units as u
 import numpy as np
@@ -22,7 +22,12 @@ from flybystab.flybys.result import FlybyResult
 from flybystab.plots.flyby import BLACK
 from flybystab.plots.style import NARROW, new_figure, save, styled
 from flybystab.progress import Progressing, progress_bar
-from flybystab.typing import Array
+from flybystab.typing import Array, Document
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 #: Colours of clumps, the most massive first; then they repeat.
 COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#f0e442", "#7f3c8d")
@@ -30,8 +35,8 @@ LOOSE = "0.7"
 
 
 def grains_plot(
-    axes: Any, run: GrainsRun, row: int, turn: Array | None = None, reach: float | None = None
-) -> Any:
+    axes: Axes, run: GrainsRun, row: int, turn: Array | None = None, reach: float | None = None
+) -> Axes:
     """Grains of a run at one row of its course, km.
 
     Parameters
@@ -68,8 +73,8 @@ def grains_plot(
 
 
 def grains_scene_plot(
-    axes: Any, result: FlybyResult, magnification: float | None = None, places: int = 7
-) -> Any:
+    axes: Axes, result: FlybyResult, magnification: float | None = None, places: int = 7
+) -> Axes:
     """Planet, path and the pile with the median outcome at several times, in the plane of the orbit, 1000 km.
 
     The direction of motion at periapsis points to the right, periapsis lies above the planet.
@@ -122,14 +127,16 @@ def grains_scene_plot(
     axes.set(aspect="equal", xlabel="y (1000 km)", ylabel="x (1000 km)")
     axes.margins(0.08)
     text = f"{encounter.planet.name.capitalize()} to scale, pile enlarged {magnification:,.0f} times; "
-    axes.set_title(fill(f"{text}colours: clumps at the end", int(13.0 * axes.figure.get_figwidth())))
+    axes.set_title(
+        fill(f"{text}colours: clumps at the end", int(13.0 * cast("Figure", axes.figure).get_figwidth()))
+    )
     return axes
 
 
 @styled
 def grains_figure(
-    result: FlybyResult, title: str = "", path: str | Path | None = None, *, figure: Any = None
-) -> Any:
+    result: FlybyResult, title: str = "", path: str | Path | None = None, *, figure: Figure | None = None
+) -> Figure:
     """The pile with the median outcome at four times, and the largest clump of all piles against time.
 
     Parameters
@@ -168,7 +175,7 @@ def grains_figure(
             axes.set_ylabel("y (km)")
     for one in outcome.runs:
         t = one.course.time.to_value(u.h)
-        own: dict[str, Any] = {"color": COLOURS[0] if one is run else "0.7", "lw": 1.5 if one is run else 0.8}
+        own: Document = {"color": COLOURS[0] if one is run else "0.7", "lw": 1.5 if one is run else 0.8}
         share.plot(t, one.course.largest_fraction, zorder=3 if one is run else 2, **own)
         spin.plot(t, one.course.semi_axes[:, 0].to_value(u.m), zorder=3 if one is run else 2, **own)
     share.set(xlabel="time from closest approach (h)", ylabel="largest clump / mass", ylim=(0.0, 1.05))
@@ -200,9 +207,9 @@ def grains_animation(
     target = Path(path)
     run, turn = _outcome(result).median, periapsis_axes(result.encounter)
     figure = new_figure(5.0, 5.2, dpi=80, layout=None)
-    axes: Any = figure.add_axes((0.16, 0.1, 0.8, 0.8))
+    axes: Axes = figure.add_axes((0.16, 0.1, 0.8, 0.8))
 
-    def draw(k: int) -> list[Any]:
+    def draw(k: int) -> list[Artist]:
         axes.clear()
         grains_plot(axes, run, k, turn)
         axes.set_title(f"{run.course.time[k].to_value(u.h):+.2f} h")

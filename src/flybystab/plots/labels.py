@@ -7,12 +7,17 @@ line to the point. A label without a free position is omitted.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 from matplotlib.patheffects import withStroke
+from numpy.typing import ArrayLike
 
 from flybystab.typing import Array
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
 
 #: Directions of a label from its point, in order of preference, and the distances that are tried, in points.
 _SIDES = ((1, 0.3), (1, -0.3), (-1, 0.3), (-1, -0.3), (0.5, 1), (0.5, -1), (-0.5, 1), (-0.5, -1))
@@ -30,8 +35,8 @@ def literal(name: str) -> str:
 
 
 def label_points(
-    axes: Any, points: Sequence[tuple[float, float, str]], others: Any = None, **text: Any
-) -> Any:
+    axes: Axes, points: Sequence[tuple[float, float, str]], others: ArrayLike | None = None, **text: Any
+) -> Axes:
     """Write labels beside points; the axes must have their final limits.
 
     Parameters
@@ -50,10 +55,10 @@ def label_points(
     """
     # A white outline keeps a label legible on a line.
     text = {"path_effects": [withStroke(linewidth=2.0, foreground="w")], **text}
-    figure = axes.figure
+    figure = cast("Figure", axes.figure)
     figure.draw_without_rendering()
-    if figure.get_layout_engine() is not None:
-        figure.get_layout_engine().execute(figure)
+    if (layout := figure.get_layout_engine()) is not None:
+        layout.execute(figure)
     renderer = figure.canvas.get_renderer() if hasattr(figure.canvas, "get_renderer") else None
     inside = axes.get_window_extent(renderer)
     pixels = figure.dpi / 72.0
@@ -69,7 +74,7 @@ def label_points(
         note = axes.annotate(name, (x, y), xytext=(0, 0), textcoords="offset points", zorder=6, **text)
         box = note.get_window_extent(renderer)
         size = np.array([box.width, box.height])
-        place = _free(at, size, inside.extents, taken, crowd, pixels)
+        place = _free(at, size, np.asarray(inside.extents), taken, crowd, pixels)
         note.remove()
         if place is None:
             continue
@@ -94,7 +99,12 @@ def label_points(
 
 
 def _free(
-    at: Array, size: Array, inside: Any, taken: Sequence[Any], crowd: Array, pixels: float
+    at: Array,
+    size: Array,
+    inside: Array,
+    taken: Sequence[Sequence[float] | Array],
+    crowd: Array,
+    pixels: float,
 ) -> tuple[Array, float] | None:
     """Lower left corner of the best free box near a point, in pixels, and its distance in points."""
     best = None

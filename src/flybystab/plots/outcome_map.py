@@ -7,7 +7,7 @@ greyscale and by colour-blind readers.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 import astropy.units as u
 import numpy as np
@@ -17,7 +17,10 @@ from numpy.typing import NDArray
 from flybystab.flybys.outcome_map import OutcomeMap, TargetMap, outcome_map, target_map
 from flybystab.flybys.verdict import Verdict
 from flybystab.plots.flyby import described
-from flybystab.typing import Array
+from flybystab.typing import Array, Document
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 __all__ = ["MARKERS", "SCALE", "outcome_map", "outcome_plot", "target_map", "target_plot", "verdict_points"]
 
@@ -38,7 +41,7 @@ _ORDER = list(SCALE)
 MARKERS = "osDPXv^*"
 
 
-def outcome_plot(axes: Any, outcomes: OutcomeMap) -> Any:
+def outcome_plot(axes: Axes, outcomes: OutcomeMap) -> Axes:
     """Plot the most severe verdict over periapsis and v_inf, with contours of 10 % and 90 % of the phases yielding."""
     q = outcomes.periapsis.to_value(u.m) / outcomes.planet.radius
     v = outcomes.v_inf.to_value(u.km / u.s)
@@ -62,7 +65,7 @@ def outcome_plot(axes: Any, outcomes: OutcomeMap) -> Any:
     return axes
 
 
-def target_plot(axes: Any, target: TargetMap) -> Any:
+def target_plot(axes: Axes, target: TargetMap) -> Axes:
     """Plot the verdicts over the target plane, with the disc of impacts."""
     x, y = target.b_t.to_value(u.km), target.b_r.to_value(u.km)
     m = x.shape[1]
@@ -96,7 +99,7 @@ def target_plot(axes: Any, target: TargetMap) -> Any:
     return axes
 
 
-def verdict_points(axes: Any, b: Quantity, verdict: Sequence[str], radius: Quantity | None = None) -> Any:
+def verdict_points(axes: Axes, b: Quantity, verdict: Sequence[str], radius: Quantity | None = None) -> Axes:
     """Points (n, 2) of a target plane, shaded by verdict; the impact disc of that radius, if given."""
     points = b.to_value(u.km)
     names = np.asarray(verdict, dtype=str)
@@ -119,7 +122,7 @@ def _ranks(names: NDArray[np.str_]) -> NDArray[np.int64]:
     return np.vectorize(_ORDER.index, otypes=[np.int64])(names)
 
 
-def _shades() -> dict[str, Any]:
+def _shades() -> Document:
     from matplotlib.colors import ListedColormap
 
     return {
@@ -129,7 +132,7 @@ def _shades() -> dict[str, Any]:
     }
 
 
-def _letters(axes: Any, places: Sequence[Array], names: NDArray[np.str_]) -> None:
+def _letters(axes: Axes, places: Sequence[Array], names: NDArray[np.str_]) -> None:
     for x, y, name in zip(places[0].ravel(), places[1].ravel(), names.ravel(), strict=True):
         letter = SCALE[name][0]
         dark = letter in "DXH"
@@ -145,7 +148,7 @@ def _letters(axes: Any, places: Sequence[Array], names: NDArray[np.str_]) -> Non
             )
 
 
-def _legend(axes: Any, names: NDArray[np.str_]) -> None:
+def _legend(axes: Axes, names: NDArray[np.str_]) -> None:
     from matplotlib.patches import Patch
 
     found = [n for n in _ORDER if n in set(names.ravel().tolist())]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 import astropy.units as u
 import numpy as np
@@ -18,8 +18,13 @@ from flybystab.plots.style import new_figure, styled
 from flybystab.population.rates import EncounterRates
 from flybystab.population.verdict_rates import CHANGED, DisruptionRates
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+#: Line style of matplotlib: a name, or offset and lengths of dashes.
+Line = str | tuple[int, tuple[int, ...]]
 #: Colours (Okabe & Ito) and line styles of the planets, distinguishable in greyscale.
-PLANETS = {
+PLANETS: dict[str, tuple[str, Line]] = {
     "mercury": ("#000000", ":"),
     "venus": ("#E69F00", "--"),
     "earth": ("#0072B2", "-"),
@@ -38,11 +43,11 @@ _SIZES = (
 )
 
 
-def _line(name: str) -> tuple[str, Any]:
+def _line(name: str) -> tuple[str, Line]:
     return PLANETS.get(name, ("0.4", "-"))
 
 
-def rate_plot(axes: Any, rates: Sequence[EncounterRates]) -> Any:
+def rate_plot(axes: Axes, rates: Sequence[EncounterRates]) -> Axes:
     """Plot the rate of encounters within a periapsis distance (planetary radii), one line per planet."""
     for one in rates:
         q = np.geomspace(1.0, 30.0, 40)
@@ -59,11 +64,12 @@ def rate_plot(axes: Any, rates: Sequence[EncounterRates]) -> Any:
     return axes
 
 
-def verdict_plot(axes: Any, result: DisruptionRates) -> Any:
+def verdict_plot(axes: Axes, result: DisruptionRates) -> Axes:
     """Plot the rate of each change by planet as bars with sampling errors; verdicts without samples are left out."""
     planets = list(dict.fromkeys(str(p) for p in result.table["planet"]))
     shown = [v for v in CHANGED if result.rate(v).value > 0.0]
     width = 0.8 / max(1, len(shown))
+    least = np.inf
     hatches = ("", "////", "....", "xxxx")
     for k, verdict in enumerate(shown):
         rows = [
@@ -83,19 +89,19 @@ def verdict_plot(axes: Any, result: DisruptionRates) -> Any:
             linewidth=0.6,
             error_kw={"lw": 0.8},
         )
+        least = min(least, rate[rate > 0.0].min())
         for bar in bars:
             bar.set_hatch(hatches[k % 4])
     axes.set_xticks(np.arange(len(planets)), [p.capitalize() for p in planets])
     axes.set(xlabel="planet", ylabel="rate in the population (1/Myr)", yscale="log" if shown else "linear")
     axes.set_title("Verdicts by planet")
     if shown:
-        least = min(bar.get_height() for bar in axes.patches if bar.get_height() > 0.0)
         axes.set_ylim(bottom=0.3 * least)
         axes.legend()
     return axes
 
 
-def probability_plot(axes: Any, result: DisruptionRates, planet_name: str = "earth") -> Any:
+def probability_plot(axes: Axes, result: DisruptionRates, planet_name: str = "earth") -> Axes:
     """Plot the probability of a change (reshaped or worse) over periapsis and hyperbolic excess speed at one planet."""
     here = result.samples["planet"] == planet_name
     if not np.any(here):
@@ -116,7 +122,7 @@ def probability_plot(axes: Any, result: DisruptionRates, planet_name: str = "ear
     return axes
 
 
-def size_plot(axes: Any, result: DisruptionRates) -> Any:
+def size_plot(axes: Axes, result: DisruptionRates) -> Axes:
     """Plot the cumulative rate of changes against diameter; for bodies of one size the rate is the same below it."""
     sizes = result.samples["diameter"].to_value(u.km)
     if len(sizes) == 0:
@@ -136,7 +142,7 @@ def size_plot(axes: Any, result: DisruptionRates) -> Any:
     return axes
 
 
-def contributor_plot(axes: Any, result: DisruptionRates, names: Sequence[str] | None = None) -> Any:
+def contributor_plot(axes: Axes, result: DisruptionRates, names: Sequence[str] | None = None) -> Axes:
     """Plot the rates of the orbits that contribute most to the changes, with 1-sigma sampling errors.
 
     Parameters

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from functools import singledispatch
 from typing import Any
 
 import astropy.units as u
 import numpy as np
+from matplotlib.axes import Axes  # evaluated with the annotations by singledispatch
+from numpy.typing import ArrayLike
 
 from flybystab.body.bounds import Requirements
 from flybystab.body.stability import Push, Stability
@@ -38,7 +40,9 @@ from flybystab.population.verdict_rates import DisruptionRates
 from flybystab.result_table import ResultTable
 
 
-def plot_result(result: Any, axes: Any = None, **options: Any) -> Any:
+def plot_result(
+    result: object, axes: Axes | Sequence[Axes] | None = None, **options: object
+) -> Axes | Sequence[Axes]:
     """Plot a result into axes, new ones by default.
 
     Parameters
@@ -67,18 +71,18 @@ def plot_result(result: Any, axes: Any = None, **options: Any) -> Any:
 
 
 @styled
-def _plot_alone(result: Any, **options: Any) -> Any:
+def _plot_alone(result: object, **options: object) -> Axes | Sequence[Axes]:
     return _plot(result, new_axes(4 if isinstance(result, FlybyResult) else 1), **options)
 
 
 @singledispatch
-def _plot(result: Any, axes: Any) -> Any:
+def _plot(result: object, axes: Axes | Sequence[Axes], **options: object) -> Axes | Sequence[Axes]:
     known = ", ".join(kind.__name__ for kind in _plot.registry if kind is not object)
     raise InvalidInput("result", result, f"a result that has a figure: {known}")
 
 
 @_plot.register
-def _(result: FlybyResult, axes: Any) -> Any:
+def _(result: FlybyResult, axes: Sequence[Axes]) -> Sequence[Axes]:
     flyby_panels(axes, result)
     planet = result.encounter.planet.name.capitalize()
     axes[0].set_title(f"{planet}; {described(result.inputs.body)}: {result.verdict}")
@@ -86,7 +90,7 @@ def _(result: FlybyResult, axes: Any) -> Any:
 
 
 @_plot.register
-def _(result: History, axes: Any, what: str = "semi-axes", limit: u.Quantity | None = None) -> Any:
+def _(result: History, axes: Axes, what: str = "semi-axes", limit: u.Quantity | None = None) -> Axes:
     if what == "friction angle":
         if limit is None:
             raise InvalidInput("limit", limit, "the friction angle of the material")
@@ -103,17 +107,17 @@ _HISTORY = {"semi-axes": axes_plot, "spin": spin_plot}
 
 
 @_plot.register
-def _(result: OutcomeMap, axes: Any) -> Any:
+def _(result: OutcomeMap, axes: Axes) -> Axes:
     return outcome_plot(axes, result)
 
 
 @_plot.register
-def _(result: TargetMap, axes: Any) -> Any:
+def _(result: TargetMap, axes: Axes) -> Axes:
     return target_plot(axes, result)
 
 
 @_plot.register
-def _(result: SpinSample, axes: Any) -> Any:
+def _(result: SpinSample, axes: Axes) -> Axes:
     axes.scatter(result.pole_change.to_value(u.deg), result.spin_ratio, s=14, color=BLUE)
     axes.set(xlabel="rotation of the spin axis (deg)", ylabel="spin rate after / before")
     axes.set_title(f"{len(result)} attitudes, pole {'known' if result.pole_known else 'unknown'}")
@@ -121,7 +125,7 @@ def _(result: SpinSample, axes: Any) -> Any:
 
 
 @_plot.register
-def _(result: CriticalValues, axes: Any) -> Any:
+def _(result: CriticalValues, axes: Axes) -> Axes:
     unit = "radii of the planet" if result.quantity == "periapsis" else str(result.value.unit)
     axes.plot(result.phase.to_value(u.deg), result.value.value, "o-", color=BLUE)
     axes.set_xlabel("spin phase at closest approach (deg)")
@@ -130,22 +134,22 @@ def _(result: CriticalValues, axes: Any) -> Any:
 
 
 @_plot.register
-def _(result: Stability, axes: Any) -> Any:
+def _(result: Stability, axes: Axes) -> Axes:
     return barrier_plot(axes, result.body, dilatancy=result.dilatancy)
 
 
 @_plot.register
-def _(result: EncounterRates, axes: Any) -> Any:
+def _(result: EncounterRates, axes: Axes) -> Axes:
     return rate_plot(axes, [result])
 
 
 @_plot.register
-def _(result: DisruptionRates, axes: Any) -> Any:
+def _(result: DisruptionRates, axes: Axes) -> Axes:
     return verdict_plot(axes, result)
 
 
 #: Results whose figure needs nothing but the result.
-_DISTRIBUTIONS: dict[type, Callable[[Any, Any], Any]] = {
+_DISTRIBUTIONS: Mapping[type, Callable[[Axes, Any], Axes]] = {
     SurfaceSlopes: distributions.slope_plot,
     SlopeChange: distributions.slope_change_plot,
     SurfaceHistory: distributions.surface_history_plot,
@@ -160,9 +164,9 @@ _DISTRIBUTIONS: dict[type, Callable[[Any, Any], Any]] = {
 }
 
 
-def _register(kind: type, function: Callable[[Any, Any], Any]) -> None:
+def _register(kind: type, function: Callable[[Axes, Any], Axes]) -> None:
     @_plot.register(kind)
-    def _(result: Any, axes: Any) -> Any:
+    def _(result: object, axes: Axes) -> Axes:
         return function(axes, result)
 
 
@@ -171,7 +175,7 @@ for _kind, _function in _DISTRIBUTIONS.items():
 
 
 @_plot.register
-def _(result: GrainsRun, axes: Any) -> Any:
+def _(result: GrainsRun, axes: Axes) -> Axes:
     grains_plot(axes, result, len(result.course) - 1)
     axes.set_ylabel("y (km)")
     axes.set_title(f"{result.largest_fraction:.0%} of the mass in the largest clump, colours by clump")
@@ -179,17 +183,17 @@ def _(result: GrainsRun, axes: Any) -> Any:
 
 
 @_plot.register
-def _(result: FlybyTable, axes: Any) -> Any:
+def _(result: FlybyTable, axes: Axes) -> Axes:
     return _counts(axes, result.verdict)
 
 
 @_plot.register
-def _(result: Survival, axes: Any) -> Any:
+def _(result: Survival, axes: Axes) -> Axes:
     return _counts(axes, result.verdict)
 
 
 @_plot.register
-def _(result: ResultTable, axes: Any, **options: Any) -> Any:
+def _(result: ResultTable, axes: Axes, **options: object) -> Axes:
     figure = _TABLES.get(result.kind())
     if figure is None:
         names = ", ".join(result.colnames)
@@ -198,7 +202,7 @@ def _(result: ResultTable, axes: Any, **options: Any) -> Any:
 
 
 #: Figures of tables, by their kind.
-_TABLES: dict[str, Callable[..., Any]] = {
+_TABLES: Mapping[str, Callable[..., Axes]] = {
     "encounters with verdicts": screening.rise_plot,
     "encounters": screening.encounters_plot,
     "possible impacts": screening.impacts_plot,
@@ -206,7 +210,7 @@ _TABLES: dict[str, Callable[..., Any]] = {
 }
 
 
-def _counts(axes: Any, verdict: Any) -> Any:
+def _counts(axes: Axes, verdict: ArrayLike) -> Axes:
     """Bars with the number of rows of each verdict."""
     names, counts = np.unique(np.asarray(verdict, dtype=str), return_counts=True)
     bars = axes.barh(names, counts, color=BLUE)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from pathlib import Path
 from textwrap import fill
-from typing import Any
+from typing import TYPE_CHECKING
 
 import astropy.units as u
 import numpy as np
@@ -20,11 +20,15 @@ from flybystab.flybys.result import FlybyResult, History
 from flybystab.plots.flyby import BLACK, BLUE, ORANGE, RED
 from flybystab.plots.style import new_figure, styled
 from flybystab.progress import Progressing, progress_bar
-from flybystab.typing import Array
+from flybystab.typing import Array, Document
+
+if TYPE_CHECKING:
+    from matplotlib.artist import Artist
+    from mpl_toolkits.mplot3d import Axes3D
 
 #: Colour of the body by regime; light comes from the planet's side, so that shape shows in greyscale.
 REGIMES = {"rigid": "0.75", "flowing": ORANGE, "dispersed": RED}
-_SOLID: dict[str, Any] = {"linewidth": 0, "antialiased": False, "rstride": 1, "cstride": 1}
+_SOLID: Document = {"linewidth": 0, "antialiased": False, "rstride": 1, "cstride": 1}
 
 
 def surface(shape: Array, n: int = 25) -> Array:
@@ -37,8 +41,8 @@ def surface(shape: Array, n: int = 25) -> Array:
 
 
 def scene_plot(
-    axes: Any, result: FlybyResult, times: Quantity | None = None, magnification: float | None = None
-) -> Any:
+    axes: Axes3D, result: FlybyResult, times: Quantity | None = None, magnification: float | None = None
+) -> Axes3D:
     """Plot planet, path and body at several times, in the periapsis frame.
 
     Parameters
@@ -102,8 +106,8 @@ def scene_plot(
 
 
 def body_plot(
-    axes: Any, history: History, row: int, turn: Array | None = None, reach: float | None = None
-) -> Any:
+    axes: Axes3D, history: History, row: int, turn: Array | None = None, reach: float | None = None
+) -> Axes3D:
     """Plot the body at one time of its history, to scale, in km.
 
     Parameters
@@ -179,8 +183,8 @@ def animation(
     reach = float(history.semi_axes[:, 0].to_value(u.km).max())
 
     figure = new_figure(8.0, 4.2, dpi=80)
-    left: Any = figure.add_subplot(1, 2, 1)
-    right: Any = figure.add_subplot(1, 2, 2, projection="3d")
+    left = figure.add_subplot(1, 2, 1)
+    right: Axes3D = figure.add_subplot(1, 2, 2, projection="3d")
     left.add_patch(Circle((0, 0), encounter.planet.radius / 1e6, color=BLUE))
     left.plot(places[:, 0], places[:, 1], color="0.6", lw=0.8)
     (dot,) = left.plot([], [], "o", color=BLACK, ms=5)
@@ -191,7 +195,7 @@ def animation(
     left.set_ylim(1.1 * places[near, 1].min(), 1.1 * places[near, 1].max())
     left.locator_params(axis="x", nbins=3)
 
-    def draw(k: int) -> list[Any]:
+    def draw(k: int) -> list[Artist]:
         dot.set_data([places[k, 0]], [places[k, 1]])
         right.clear()
         body_plot(right, history, int(rows[k]), turn, reach)

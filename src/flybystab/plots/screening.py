@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import astropy.units as u
 import numpy as np
 from astropy.table import QTable
+from numpy.typing import NDArray
 
 from flybystab.errors import InvalidInput, UnknownName
 from flybystab.flybys.verdict import Verdict
@@ -19,6 +21,15 @@ from flybystab.screening.columns import VERDICTS
 from flybystab.screening.inference import strongest_passage
 from flybystab.screening.results import read_results
 from flybystab.screening.summary import summary
+from flybystab.typing import Array, Document
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.contour import QuadContourSet
+    from matplotlib.figure import Figure, SubFigure
+
+    #: Filled contours and lines.
+    Contours = tuple[QuadContourSet, QuadContourSet]
 
 PANELS = {
     "friction_equilibrium": "shape and spin",
@@ -33,7 +44,7 @@ PLANETS = (BLUE, ORANGE, GREEN, RED, SKY, BLACK)
 _LEVELS = (0, 5, 10, 15, 20, 25, 30, 35, 40, 45, 60)
 
 
-def bounds_plot(axes: Any, table: QTable, column: str | None = None) -> Any:
+def bounds_plot(axes: Axes, table: QTable, column: str | None = None) -> Axes:
     """Plot the minimum friction angle over density and cohesion, of a table by :func:`flybystab.infer`.
 
     Hatched: no friction angle suffices. The white line and band are the density of the catalogue and its 1-sigma.
@@ -61,7 +72,7 @@ def bounds_plot(axes: Any, table: QTable, column: str | None = None) -> Any:
     return axes
 
 
-def _bounds_panel(panel: Any, table: QTable, name: str) -> tuple[Any, Any] | None:
+def _bounds_panel(panel: Axes, table: QTable, name: str) -> Contours | None:
     """Draw one map of a table of bounds; returns the filled contours and the lines."""
     import matplotlib
 
@@ -92,7 +103,7 @@ def _bounds_panel(panel: Any, table: QTable, name: str) -> tuple[Any, Any] | Non
     return drawn
 
 
-def _bounds_scale(figure: Any, drawn: tuple[Any, Any], panels: Any) -> None:
+def _bounds_scale(figure: Figure | SubFigure, drawn: Contours, panels: Axes | Sequence[Axes]) -> None:
     bar = figure.colorbar(drawn[0], ax=panels, label="minimum friction angle (deg);\nhatched: none suffices")
     bar.add_lines(drawn[1])
 
@@ -110,7 +121,7 @@ def inference_figure(table: QTable, path: str | Path) -> Path:
     """
     names = list(PANELS) if table.meta.get("passages") else list(PANELS)[:1]
     figure = new_figure(1.2 + 3.6 * len(names), 3.8)
-    panels: Any = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
+    panels: Sequence[Axes] = figure.subplots(1, len(names), sharey=True, squeeze=False)[0]
     drawn = [_bounds_panel(panel, table, name) for panel, name in zip(panels, names, strict=True)]
     panels[0].set_ylabel("cohesion (Pa)")
     if drawn[0] is not None:
@@ -132,7 +143,7 @@ _QUANTITIES = {
 }
 
 
-def rise_plot(axes: Any, table: QTable, names: int = 4) -> Any:
+def rise_plot(axes: Axes, table: QTable, names: int = 4) -> Axes:
     """Plot the effect of each encounter on the mobilised friction angle against its distance.
 
     The `names` encounters with the largest increase are labelled. Bodies that are not in equilibrium are not shown.
@@ -146,7 +157,7 @@ def rise_plot(axes: Any, table: QTable, names: int = 4) -> Any:
     return _labelled(axes, table, "distance", "rise", rows[:names])
 
 
-def margin_plot(axes: Any, table: QTable, names: int = 4) -> Any:
+def margin_plot(axes: Axes, table: QTable, names: int = 4) -> Axes:
     """Plot the margin of each encounter against its effect; the `names` encounters nearest to failure are labelled."""
     values, stands, _ = _screened(table)
     _verdict_marks(axes, table, "rise", "margin")
@@ -155,7 +166,7 @@ def margin_plot(axes: Any, table: QTable, names: int = 4) -> Any:
     return _labelled(axes, table, "rise", "margin", rows[:names])
 
 
-def _screened(table: QTable) -> tuple[dict[str, Any], Any, Any]:
+def _screened(table: QTable) -> tuple[dict[str, Array], NDArray[np.bool_], NDArray[np.bool_]]:
     """The quantities of the figures, the rows that they show, and those whose margin is a bound."""
     values = {
         "distance": table["distance"].to_value(u.au),
@@ -169,13 +180,13 @@ def _screened(table: QTable) -> tuple[dict[str, Any], Any, Any]:
     return values, stands, np.asarray(table["decided_by"], dtype=str) == "bound"
 
 
-def _verdict_marks(axes: Any, table: QTable, x: str, y: str) -> None:
+def _verdict_marks(axes: Axes, table: QTable, x: str, y: str) -> None:
     """Points with a marker and shade for each verdict; open triangles are upper limits of the increase."""
     values, stands, bound = _screened(table)
     verdict = np.asarray(table["verdict"], dtype=str)
     for v in VERDICTS:
-        known = {"mfc": SCALE[v][1], "marker": MARKERS[list(SCALE).index(v)], "ms": 5}
-        limit = {"mfc": "none", "mec": "0.5", "marker": "v", "ms": 4}
+        known: Document = {"mfc": SCALE[v][1], "marker": MARKERS[list(SCALE).index(v)], "ms": 5}
+        limit: Document = {"mfc": "none", "mec": "0.5", "marker": "v", "ms": 4}
         for chosen, how, style in (
             (stands & (verdict == v) & bound, "upper limit", limit),
             (stands & (verdict == v) & ~bound, "integrated", {"mec": "black", **known}),
@@ -189,7 +200,7 @@ def _verdict_marks(axes: Any, table: QTable, x: str, y: str) -> None:
     axes.set(xlabel=_QUANTITIES[x][0], ylabel=_QUANTITIES[y][0])
 
 
-def _labelled(axes: Any, table: QTable, x: str, y: str, rows: Any) -> Any:
+def _labelled(axes: Axes, table: QTable, x: str, y: str, rows: NDArray[np.int64]) -> Axes:
     values, stands, _ = _screened(table)
     named = [
         (values[x][k], values[y][k], f"{table['asteroid'][k]} {str(table['time_tdb'][k])[:4]}") for k in rows
@@ -230,7 +241,7 @@ def results_figure(results: QTable | str | Path, path: str | Path, names: int = 
     return save(figure, path)
 
 
-def encounters_plot(axes: Any, table: QTable, names: int = 6) -> Any:
+def encounters_plot(axes: Axes, table: QTable, names: int = 6) -> Axes:
     """Plot the distances of close approaches against time, by planet; the `names` closest are labelled.
 
     Bars are the 99.73 % interval of the distance where clones have been computed; crosses are impacts.
@@ -243,7 +254,13 @@ def encounters_plot(axes: Any, table: QTable, names: int = 6) -> Any:
     for k, name in enumerate(sorted(set(planet))):
         chosen = (planet == name) & ~hits
         label = f"{name.capitalize()} ({(planet == name).sum()})"
-        style = {"ls": "", "marker": "osD^vP"[k % 6], "ms": 4, "color": PLANETS[k % 6], "label": label}
+        style: Document = {
+            "ls": "",
+            "marker": "osD^vP"[k % 6],
+            "ms": 4,
+            "color": PLANETS[k % 6],
+            "label": label,
+        }
         axes.plot(day[chosen], distance[chosen], **style)
         if "distance_low" in table.colnames:
             low, high = (table[f"distance_{end}"].to_value(u.km)[chosen] for end in ("low", "high"))
@@ -259,7 +276,7 @@ def encounters_plot(axes: Any, table: QTable, names: int = 6) -> Any:
     return label_points(axes, points, np.column_stack([day, distance]), fontsize="x-small")
 
 
-def _date_axis(axes: Any) -> None:
+def _date_axis(axes: Axes) -> None:
     from matplotlib.dates import AutoDateLocator, ConciseDateFormatter
 
     locator = AutoDateLocator(minticks=3, maxticks=10)
@@ -267,7 +284,7 @@ def _date_axis(axes: Any) -> None:
     axes.xaxis.set_major_formatter(ConciseDateFormatter(locator))
 
 
-def impacts_plot(axes: Any, table: QTable) -> Any:
+def impacts_plot(axes: Axes, table: QTable) -> Axes:
     """Plot the probability of each possible impact against time, of a table by :func:`flybystab.virtual_impactors`."""
     from matplotlib.dates import date2num
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import TYPE_CHECKING
 
 import astropy.units as u
 import numpy as np
@@ -16,20 +16,25 @@ from flybystab.body.surface_slope import SlopeChange
 from flybystab.errors import InvalidInput
 from flybystab.plots.style import NARROW, new_figure, styled
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.collections import PolyCollection
+    from matplotlib.figure import Figure
+
 #: Directions of view, with the image's right and up: from +x, +y and +z of the principal frame.
 VIEWS = (("+x", 0, (1, 2)), ("+y", 1, (0, 2)), ("+z", 2, (0, 1)))
 
 
 @check_arguments
 def shape_map(
-    axes: Any,
+    axes: Axes,
     shape: Shape,
     values: NDArray[np.float64],
     view: str = "+z",
     *,
     limits: tuple[float, float] | None = None,
     cmap: str = "viridis",
-) -> Any:
+) -> PolyCollection:
     """A quantity on the facets that face the viewer, in orthographic projection.
 
     Parameters
@@ -86,7 +91,7 @@ def shape_map(
 
 @styled
 @check_arguments
-def slope_change_figure(shape: Shape, change: SlopeChange, repose: Quantity = 35 * u.deg) -> Any:
+def slope_change_figure(shape: Shape, change: SlopeChange, repose: Quantity = 35 * u.deg) -> Figure:
     """Slopes before an encounter, the greatest during it, and the largest change, in three views each.
 
     Parameters
@@ -122,8 +127,8 @@ def slope_change_figure(shape: Shape, change: SlopeChange, repose: Quantity = 35
 
 @styled
 def surface_history_figure(
-    history: SurfaceHistory, repose: Quantity = 35 * u.deg, *, figure: Any = None
-) -> Any:
+    history: SurfaceHistory, repose: Quantity = 35 * u.deg, *, figure: Figure | None = None
+) -> Figure:
     """Slopes before closest approach, at it and after it in three views each, and as a function of time.
 
     Parameters

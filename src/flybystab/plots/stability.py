@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from typing import TYPE_CHECKING
 
 import astropy.units as u
 import numpy as np
@@ -16,13 +16,18 @@ from flybystab.body.stability import push, stability
 from flybystab.body.stability_regions import stability_map
 from flybystab.constants import G
 from flybystab.plots.labels import label_points
+from flybystab.typing import Document
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.patches import Patch
 
 BLACK, ORANGE, SKY, GREEN, BLUE, RED = "#000000", "#E69F00", "#56B4E9", "#009E73", "#0072B2", "#D55E00"
 STYLES = ("-", "--", ":", "-.")
 ANGLES = (1, 5, 10, 20, 30, 40)
 
 
-def _mark(axes: Any, points: Mapping[str, tuple[float, float]], named: Sequence[str] | None) -> None:
+def _mark(axes: Axes, points: Mapping[str, tuple[float, float]], named: Sequence[str] | None) -> None:
     """Mark points, with labels at those of `named` (all by default). Call it last: labels avoid what is drawn."""
     shown = [name for name in points if named is None or name in named]
     for name, (x, y) in points.items():
@@ -37,7 +42,7 @@ def axis_ratios(bodies: Mapping[str, Body]) -> dict[str, tuple[float, float]]:
 
 
 def regions_plot(
-    axes: Any,
+    axes: Axes,
     w2: float = 0.0,
     angles: Sequence[float] = ANGLES,
     *,
@@ -46,7 +51,7 @@ def regions_plot(
     named: Sequence[str] | None = None,
     cells: int = 200,
     legend: bool = True,
-) -> Any:
+) -> Axes:
     """Plot the required friction angle at one spin ``w2 = omega^2/(pi G rho)`` over the plane of axis ratios.
 
     One contour per angle (deg); shapes between the contours of an angle are in equilibrium with it. Grey: no friction
@@ -90,7 +95,7 @@ def regions_plot(
     return axes
 
 
-def regions_legend() -> list[Any]:
+def regions_legend() -> list[Patch]:
     """Entries of the legend for the areas of :func:`regions_plot`."""
     from matplotlib.patches import Patch
 
@@ -102,8 +107,8 @@ def regions_legend() -> list[Any]:
 
 
 def critical_energy_plot(
-    axes: Any, w2: float, friction_angle: Quantity, *, dilatancy: float = 1.0, cells: int = 100
-) -> Any:
+    axes: Axes, w2: float, friction_angle: Quantity, *, dilatancy: float = 1.0, cells: int = 100
+) -> Axes:
     """Plot the minimum critical energy at second order over the plane of axis ratios, over the binding energy."""
     ratio = np.linspace(0.1, 1.0, cells)
     t = stability_map(ratio[None, :], ratio[:, None], w2, friction_angle, dilatancy=dilatancy, depth="second")
@@ -117,14 +122,14 @@ def critical_energy_plot(
 
 
 def spin_plot(
-    axes: Any,
+    axes: Axes,
     angles: Sequence[float] = ANGLES,
     *,
     prolate: bool = False,
     yield_surface: str = DEFAULT_SURFACE,
     bodies: Mapping[str, Body] | None = None,
     named: Sequence[str] | None = None,
-) -> Any:
+) -> Axes:
     """Plot the lower and upper spin limit ``omega^2/(pi G rho)`` against ``a3/a1``, one line per friction angle (deg).
 
     Oblate bodies ``a1 = a2`` with the Maclaurin and, dashed, the Jacobi fluids; or prolate ones ``a2 = a3``.
@@ -138,7 +143,7 @@ def spin_plot(
             body = _unit_body((1.0, r, r) if prolate else (1.0, 1.0, r), rho, yield_surface)
             limits[j] = spin_limits(body, angle * u.deg).to_value(u.rad / u.s) ** 2 / (np.pi * G * rho)
         # colour and line style both distinguish the angles
-        style = {"color": shades[i % len(shades)], "ls": STYLES[i % len(STYLES)], "lw": 1.2}
+        style: Document = {"color": shades[i % len(shades)], "ls": STYLES[i % len(STYLES)], "lw": 1.2}
         axes.plot(ratio, limits[:, 1], label=f"{angle:g}°", **style)
         axes.plot(ratio, np.where(limits[:, 0] > 0, limits[:, 0], np.nan), **style)
     if not prolate:
@@ -160,7 +165,7 @@ def spin_plot(
     return axes
 
 
-def barrier_plot(axes: Any, body: Body, *, dilatancy: float = 1.0, longest: float | None = None) -> Any:
+def barrier_plot(axes: Axes, body: Body, *, dilatancy: float = 1.0, longest: float | None = None) -> Axes:
     """Plot the energy lost by a perturbation against its strain: second order, third order, whole path.
 
     The direction is that of the lowest barrier, up to 1.3 times its strain. The point marks the barrier: a maximum, or
@@ -196,13 +201,13 @@ def barrier_plot(axes: Any, body: Body, *, dilatancy: float = 1.0, longest: floa
 
 
 def failure_distance_plot(
-    axes: Any,
+    axes: Axes,
     bodies: Mapping[str, Body],
     mass_parameter: Quantity,
     radius: Quantity,
     *,
     synchronous: bool = False,
-) -> Any:
+) -> Axes:
     """Plot the static failure distance, in planetary radii, against the friction angle, one line per body."""
     angles = np.linspace(1.0, 60.0, 119) * u.deg
     for i, (name, body) in enumerate(bodies.items()):

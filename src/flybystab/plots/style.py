@@ -6,18 +6,23 @@ and text is sized relative to ``font.size``, so that a style changes all of it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from contextvars import ContextVar
 from functools import wraps
 from importlib import resources
 from pathlib import Path
-from typing import Any, ParamSpec, TypeVar
+from typing import TYPE_CHECKING, Literal, ParamSpec, TypeVar
 
 from flybystab.errors import UnknownName
 
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
 P = ParamSpec("P")
 R = TypeVar("R")
+Layout = Literal["constrained", "compressed", "tight"]
 
 #: Style file for ``matplotlib.style.context``.
 STYLE = resources.files("flybystab.plots").joinpath("style.mplstyle")
@@ -50,7 +55,7 @@ def figure_style(name: str = "default") -> Iterator[None]:
         raise UnknownName("style", str(name), [], f"(known: {', '.join(SCALES)})")
     import matplotlib
 
-    settings: Any = {}
+    settings = matplotlib.RcParams()
     for part in ("style",) if name == "default" else ("style", name):
         with resources.as_file(resources.files("flybystab.plots").joinpath(f"{part}.mplstyle")) as file:
             settings.update(matplotlib.rc_params_from_file(file, use_default_template=False))
@@ -79,19 +84,21 @@ def styled(function: Callable[P, R]) -> Callable[P, R]:
 NARROW = 6.0
 
 
-def new_figure(width: float, height: float, **options: Any) -> Any:
+def new_figure(
+    width: float, height: float, dpi: float | None = None, layout: Layout | None = "constrained"
+) -> Figure:
     """A figure of a size in inches, scaled by the style, that is drawn without a window."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     scale = SCALES[_style.get() or "default"]
-    figure = Figure(figsize=(scale * width, scale * height), **{"layout": "constrained", **options})
+    figure = Figure(figsize=(scale * width, scale * height), dpi=dpi, layout=layout)
     FigureCanvasAgg(figure)
     return figure
 
 
 @styled
-def new_axes(rows: int = 1) -> Any:
+def new_axes(rows: int = 1) -> Axes | Sequence[Axes]:
     """Axes of a new pyplot figure, which notebooks show: one, or a column with a common horizontal axis.
 
     Without a window system or notebook pyplot draws into memory.
@@ -102,11 +109,12 @@ def new_axes(rows: int = 1) -> Any:
     width, height = (5.5, 4.0) if rows == 1 else (7.2, 2.1 * rows)
     size = (scale * width, scale * height)
     _, axes = plt.subplots(rows, 1, sharex=True, figsize=size, layout="constrained")
-    return axes
+    found: Axes | Sequence[Axes] = axes
+    return found
 
 
 @styled
-def save(figure: Any, path: str | Path) -> Path:
+def save(figure: Figure, path: str | Path) -> Path:
     """Write a figure with the settings of the style; returns the path.
 
     Parameters
