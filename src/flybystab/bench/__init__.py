@@ -13,6 +13,6 @@ BENCHES = {
     "many": "rate of many encounters by threads",
     "screen": "bound and dynamics of a screening",
     "grains": "piles of grains: cost, numerical error, reference data",
-    "start": "first answer on a fresh machine, by kernel",
+    "start": "first command on a fresh machine: compilation by kernel",
     "sky": "close approaches against JPL, search against ASSIST",
 }

@@ -12,6 +12,7 @@ from __future__ import annotations
 import csv
 import os
 import time
+from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -31,11 +32,14 @@ from flybystab.flybys.flyby import flyby
 from flybystab.flybys.grains_flyby import grains_flyby
 from flybystab.flybys.grains_outcome import GrainsRun
 from flybystab.flybys.grains_run import one_pile
+from flybystab.typing import Document
 from flybystab.units import R_earth
 
 #: Flybys of an independent soft-sphere code (Earth; piles of about 570 grains with a friction angle of 35 deg).
 REFERENCE = SHARED / "grains_reference.csv"
 
+#: Selects flybys by periapsis (Earth radii), v_inf (km/s), period (h) and phase (deg).
+Filter = Callable[[float, float, float, float], bool]
 GRAINS = 541
 #: Numerical choices: name, options of the simulation.
 VARIANTS: tuple[tuple[str, dict[str, float]], ...] = (
@@ -61,14 +65,14 @@ def body(period: float = 6.0) -> Body:
 
 
 def earth(q: float, v_inf: float = 5.0) -> Encounter:
-    """Earth passage: periapsis in Earth radii, v_inf in km/s."""
+    """Encounter with the Earth: periapsis in Earth radii, v_inf in km/s."""
     return Encounter.hyperbolic(
         "earth", periapsis=q * R_earth, v_inf=v_inf * u.km / u.s, start_distance=10 * R_earth
     )
 
 
 def _run(q: float, seed: int, grains: int = GRAINS, **options: Any) -> tuple[GrainsRun, float]:
-    """One pile through a passage of the Earth, and processor time of the thread, s."""
+    """Run of one pile through an encounter with the Earth, and processor time of the thread, s."""
     pile = make_pile(body(), grains, seed, **options)
     begun = time.thread_time()
     run = one_pile(pile, body(), earth(q), np.eye(3), seed)
@@ -89,8 +93,8 @@ def _shape(run: GrainsRun) -> dict[str, float]:
     }
 
 
-def cost(seeds: int = 2) -> list[dict[str, Any]]:
-    """The reference flyby on one core."""
+def cost(seeds: int = 2) -> list[Document]:
+    """Processor time of the reference flyby on one core, for several piles."""
     _run(3.0, 0, 100)  # compiled
     out = []
     for q in (2.0, 5.96):
@@ -111,8 +115,8 @@ def cost(seeds: int = 2) -> list[dict[str, Any]]:
     return out
 
 
-def numerics(q: float = 2.2, seeds: int = 4, grains: int = 300) -> list[dict[str, Any]]:
-    """The same piles with other numerical choices, and different piles."""
+def numerics(q: float = 2.2, seeds: int = 4, grains: int = 300) -> list[Document]:
+    """Change of stretch and spin of the same piles with other numerical choices, and scatter between piles."""
     out = []
     jobs = [(name, options, seed) for name, options in VARIANTS for seed in range(seeds)]
     found = list(
@@ -139,7 +143,7 @@ def numerics(q: float = 2.2, seeds: int = 4, grains: int = 300) -> list[dict[str
 
 def resolution(
     q: float = 2.2, counts: tuple[int, ...] = (150, 300, 600, 1200), seeds: int = 4
-) -> list[dict[str, Any]]:
+) -> list[Document]:
     """Outcome against the number of grains; the change is that of the mean of ln(stretch) from the second number."""
     out = []
     jobs = [list(in_order(partial(_run_of, q, n), range(seeds), os.cpu_count() or 1)) for n in counts]
@@ -169,11 +173,11 @@ def resolution(
 
 def gravity_cost(
     counts: tuple[int, ...] = (500, 1000, 2000, 5000, 20000), errors: tuple[float, ...] = (1e-2, 1e-3, 1e-4)
-) -> list[dict[str, Any]]:
-    """Time and error of gravity by the direct sum and by the tree, for grains at random in an ellipsoid."""
+) -> list[Document]:
+    """Processor time of gravity by direct sum and by tree, and error of the tree, for random grains in an ellipsoid."""
     generator = np.random.default_rng(0)
 
-    def best(call: Any) -> float:
+    def best(call: Callable[[], object]) -> float:
         times = []
         for _ in range(4):
             begun = time.thread_time()
@@ -187,10 +191,10 @@ def gravity_cost(
         x *= generator.uniform(size=n) ** (1 / 3) / np.linalg.norm(x, axis=0)
         place, mass = np.ascontiguousarray(x * [[1.5], [0.9], [0.75]]), generator.uniform(0.2, 2.7, n) / n
         true, found = np.empty((3, n)), np.empty((3, n))
-        direct = best(lambda p=place, m=mass, a=true: direct_sum(p, m, a))
+        direct = best(partial(direct_sum, place, mass, true))
         for asked in errors:
             theta = opening(asked)
-            cpu = best(lambda p=place, m=mass, t=theta, a=found: tree_sum(p, m, t, a))
+            cpu = best(partial(tree_sum, place, mass, theta, found))
             error = np.sqrt(((true - found) ** 2).sum() / (true**2).sum())
             out.append(
                 {
@@ -201,8 +205,13 @@ def gravity_cost(
     return out
 
 
-def against_reference(seeds: int = 4, path: Path = REFERENCE, *, only: Any = None) -> list[dict[str, Any]]:
-    """Flybys of the reference data as distributions; empty where the file is not there."""
+def against_reference(
+    seeds: int = 4,
+    path: Path = REFERENCE,
+    *,
+    only: Filter | None = None,
+) -> list[Document]:
+    """Flybys of the reference data as distributions over piles; no rows if the file does not exist."""
     if not path.is_file():
         return []
     cases: dict[tuple[float, ...], list[tuple[float, float, float]]] = {}
@@ -223,7 +232,7 @@ def against_reference(seeds: int = 4, path: Path = REFERENCE, *, only: Any = Non
         turn = Rotation.from_euler("Z", phase, degrees=True).as_matrix()
         outcome = grains_flyby(asteroid, encounter, turn, grains=GRAINS, seeds=seeds)
         found = np.array([[r.largest_fraction, r.bound_fraction, r.stretch] for r in outcome.runs])
-        row: dict[str, Any] = {
+        row: Document = {
             "table": "reference",
             "periapsis_R_E": q,
             "v_inf_km_s": v,
@@ -247,7 +256,7 @@ def against_reference(seeds: int = 4, path: Path = REFERENCE, *, only: Any = Non
     return out
 
 
-def rows(figure: str | Path | None = None, seeds: int = 4) -> list[dict[str, Any]]:
+def rows(figure: str | Path | None = None, seeds: int = 4) -> list[Document]:
     """All tables; the figure shows the largest clump and the stretch against periapsis."""
 
     def prograde(q: float, v_inf: float, period: float, phase: float) -> bool:
@@ -260,7 +269,7 @@ def rows(figure: str | Path | None = None, seeds: int = 4) -> list[dict[str, Any
     return found
 
 
-def draw(reference: list[dict[str, Any]], target: str | Path) -> None:
+def draw(reference: list[Document], target: str | Path) -> None:
     """Largest clump and stretch against periapsis, at 5 km/s and 6 h, with those of the reference data."""
     from matplotlib.figure import Figure
 
@@ -280,73 +289,94 @@ def draw(reference: list[dict[str, Any]], target: str | Path) -> None:
     figure.savefig(target)
 
 
-def lines(rows: list[dict[str, Any]]) -> list[str]:
+def lines(rows: list[Document]) -> list[str]:
     """The tables as text."""
     out = []
-    tables = {
-        t: [r for r in rows if r["table"] == t]
-        for t in ("cost", "gravity", "numerics", "grains", "reference")
-    }
-    if tables["cost"]:
-        out += [
-            f"{GRAINS} grains, one core",
-            "q (R_E)  seed  cpu (s)     h   steps  ns/grain/step  largest  bound  stretch",
-        ]
-        out += [
-            f"{r['periapsis_R_E']:7.2f} {r['seed']:5d} {r['cpu_s']:8.2f} {r['hours']:5.1f} {r['steps']:7d} "
-            f"{r['grain_step_ns']:14.0f} {r['largest']:8.3f} {r['bound']:6.3f} {r['stretch']:8.3f}"
-            for r in tables["cost"]
-        ]
-    if tables["gravity"]:
-        out += [
-            "",
-            "gravity: processor time (ms) of the direct sum and of the tree, rms error",
-            "grains   direct",
-        ]
-        for n in dict.fromkeys(r["grains"] for r in tables["gravity"]):
-            some = [r for r in tables["gravity"] if r["grains"] == n]
-            out.append(
-                f"{n:6d} {some[0]['direct_ms']:8.2f}   "
-                + "   ".join(f"{r['error_asked']:.0e}: {r['tree_ms']:.2f} ({r['error']:.1e})" for r in some)
-            )
-    if tables["numerics"]:
-        out += [
-            "",
-            "change of stretch and spin rate (rms of ln) for the same piles of 300 grains, and scatter between piles",
-        ]
-        out += ["variant                  stretch  change  scatter  spin: change  scatter  cpu (s)"]
-        out += [
-            f"{r['variant']:24s} {r['stretch_median']:7.3f} {r['stretch_change_rms']:7.3f} "
-            f"{r['stretch_scatter_of_piles']:8.3f} {r['spin_change_rms']:13.3f} {r['spin_scatter_of_piles']:8.3f} "
-            f"{r['cpu_s']:8.2f}"
-            for r in tables["numerics"]
-        ]
-    if tables["grains"]:
-        out += ["", "grains  stretch (range)           change of ln stretch  largest  cpu (s)  ns/grain/step"]
-        out += [
-            f"{r['grains']:6d} {r['stretch_median']:8.3f} ({r['stretch_low']:.3f} to {r['stretch_high']:.3f}) "
-            f"{r['stretch_change']:+9.3f} +- {r['stretch_change_error']:.3f} {r['largest_median']:12.3f} "
-            f"{r['cpu_s']:8.2f} {r['grain_step_ns']:14.0f}"
-            for r in tables["grains"]
-        ]
-    if tables["reference"]:
-        out += [
-            "",
-            "median (range) over piles: this package | reference data; ellipsoid with two yield surfaces",
-        ]
-        out += ["q (R_E) v_inf  P (h) phase   largest clump                         stretch"]
-        for r in tables["reference"]:
-            cells = [
-                f"{r[f'{s}{k}_median']:.3g} ({r[f'{s}{k}_low']:.3g}-{r[f'{s}{k}_high']:.3g})"
-                for k in ("largest", "stretch")
-                for s in ("", "reference_")
-            ]
-            out.append(
-                f"{r['periapsis_R_E']:7.2f} {r['v_inf_km_s']:5g} {r['period_h']:6g} {r['phase_deg']:5g}   "
-                f"{cells[0]:18s} | {cells[1]:18s} {cells[2]:18s} | {cells[3]:18s} {r['verdict']}; "
-                f"DP {r['drucker-prager']} {r['drucker-prager_stretch']:.2f}, "
-                f"MC {r['mohr-coulomb']} {r['mohr-coulomb_stretch']:.2f}"
-            )
-    else:
+    for name, text in _TEXTS.items():
+        if table := [r for r in rows if r["table"] == name]:
+            out += text(table)
+    if not any(r["table"] == "reference" for r in rows):
         out += ["", f"no reference data at {REFERENCE}: not compared"]
     return out
+
+
+def _cost_text(table: list[Document]) -> list[str]:
+    out = [
+        f"{GRAINS} grains, one core",
+        "q (R_E)  seed  cpu (s)     h   steps  ns/grain/step  largest  bound  stretch",
+    ]
+    return out + [
+        f"{r['periapsis_R_E']:7.2f} {r['seed']:5d} {r['cpu_s']:8.2f} {r['hours']:5.1f} {r['steps']:7d} "
+        f"{r['grain_step_ns']:14.0f} {r['largest']:8.3f} {r['bound']:6.3f} {r['stretch']:8.3f}"
+        for r in table
+    ]
+
+
+def _gravity_text(table: list[Document]) -> list[str]:
+    out = [
+        "",
+        "gravity: processor time (ms) of the direct sum and of the tree, rms error",
+        "grains   direct",
+    ]
+    for n in dict.fromkeys(r["grains"] for r in table):
+        some = [r for r in table if r["grains"] == n]
+        out.append(
+            f"{n:6d} {some[0]['direct_ms']:8.2f}   "
+            + "   ".join(f"{r['error_asked']:.0e}: {r['tree_ms']:.2f} ({r['error']:.1e})" for r in some)
+        )
+    return out
+
+
+def _numerics_text(table: list[Document]) -> list[str]:
+    out = [
+        "",
+        "change of stretch and spin rate (rms of ln) for the same piles of 300 grains, and scatter between piles",
+        "variant                  stretch  change  scatter  spin: change  scatter  cpu (s)",
+    ]
+    return out + [
+        f"{r['variant']:24s} {r['stretch_median']:7.3f} {r['stretch_change_rms']:7.3f} "
+        f"{r['stretch_scatter_of_piles']:8.3f} {r['spin_change_rms']:13.3f} {r['spin_scatter_of_piles']:8.3f} "
+        f"{r['cpu_s']:8.2f}"
+        for r in table
+    ]
+
+
+def _resolution_text(table: list[Document]) -> list[str]:
+    out = ["", "grains  stretch (range)           change of ln stretch  largest  cpu (s)  ns/grain/step"]
+    return out + [
+        f"{r['grains']:6d} {r['stretch_median']:8.3f} ({r['stretch_low']:.3f} to {r['stretch_high']:.3f}) "
+        f"{r['stretch_change']:+9.3f} +- {r['stretch_change_error']:.3f} {r['largest_median']:12.3f} "
+        f"{r['cpu_s']:8.2f} {r['grain_step_ns']:14.0f}"
+        for r in table
+    ]
+
+
+def _reference_text(table: list[Document]) -> list[str]:
+    out = [
+        "",
+        "median (range) over piles: this package | reference data; ellipsoid with two yield surfaces",
+        "q (R_E) v_inf  P (h) phase   largest clump                         stretch",
+    ]
+    for r in table:
+        cells = [
+            f"{r[f'{s}{k}_median']:.3g} ({r[f'{s}{k}_low']:.3g}-{r[f'{s}{k}_high']:.3g})"
+            for k in ("largest", "stretch")
+            for s in ("", "reference_")
+        ]
+        out.append(
+            f"{r['periapsis_R_E']:7.2f} {r['v_inf_km_s']:5g} {r['period_h']:6g} {r['phase_deg']:5g}   "
+            f"{cells[0]:18s} | {cells[1]:18s} {cells[2]:18s} | {cells[3]:18s} {r['verdict']}; "
+            f"DP {r['drucker-prager']} {r['drucker-prager_stretch']:.2f}, "
+            f"MC {r['mohr-coulomb']} {r['mohr-coulomb_stretch']:.2f}"
+        )
+    return out
+
+
+#: Texts of the tables, in the order in which they are printed.
+_TEXTS: Mapping[str, Callable[[list[Document]], list[str]]] = {
+    "cost": _cost_text,
+    "gravity": _gravity_text,
+    "numerics": _numerics_text,
+    "grains": _resolution_text,
+    "reference": _reference_text,
+}

@@ -6,7 +6,6 @@ import os
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import astropy.units as u
 from scipy.spatial.transform import Rotation
@@ -16,10 +15,11 @@ from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
 from flybystab.flybys.flyby import flyby
 from flybystab.flybys.flyby_many import flyby_many
+from flybystab.typing import Document
 from flybystab.units import R_earth
 
 
-def rows(figure: str | Path | None = None, n: int = 400, repeat: int = 9) -> list[dict[str, Any]]:
+def rows(figure: str | Path | None = None, n: int = 400, repeat: int = 9) -> list[Document]:
     """Rows of case, threads, wall and processor time per encounter (s), and their ratios to those of one thread.
 
     Random attitudes of the pile of the flyby benchmark, at 3 radii (rigid) and at 2.2 radii (most of them flow).
@@ -30,7 +30,7 @@ def rows(figure: str | Path | None = None, n: int = 400, repeat: int = 9) -> lis
     body, _ = case()
     turns = list(Rotation.random(n, random_state=1).as_matrix())
     cores = os.cpu_count() or 1
-    out: list[dict[str, Any]] = []
+    out: list[Document] = []
     for q in (3.0, 2.2):
         e = Encounter.hyperbolic(
             "earth", periapsis=q * R_earth, v_inf=5 * u.km / u.s, start_distance=10 * R_earth
@@ -72,7 +72,7 @@ def rows(figure: str | Path | None = None, n: int = 400, repeat: int = 9) -> lis
     return out
 
 
-def lines(rows: list[dict[str, Any]]) -> list[str]:
+def lines(rows: list[Document]) -> list[str]:
     """The table as text."""
     head = (
         f"{'what':18s} {'q (R_E)':>8s} {'threads':>8s} {'wall (ms)':>10s} {'cpu (ms)':>9s} "

@@ -107,7 +107,7 @@ class Oracle:
             if not search:
                 sim.integrate(end)
                 continue
-            # passages before the span are ignored
+            # encounters before the span are ignored
             begin = far if (far - sim.t) * sign > 0.0 else sim.t
             fa = self._approach(sim, sim.t)[1]
             while (end - sim.t) * sign > 0.0:

@@ -1,15 +1,15 @@
 """Error against time of a screening: the bound, and the dynamics by tolerance, at several distances.
 
-The same samples of the uncertain inputs pass the Earth on hyperbolas at 6 km/s. The reference is the integration of
-every sample at a step tolerance of 1e-11; errors are those of the margin, where both values are finite and neither is
-a bound.
+The same samples of the uncertain inputs encounter the Earth on hyperbolas at 6 km/s. The reference is the integration
+of every sample at a step tolerance of 1e-11; errors are those of the margin, where both values are finite and neither
+is a bound.
 """
 
 from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 import astropy.units as u
 import numpy as np
@@ -22,7 +22,11 @@ from flybystab.plots.style import save
 from flybystab.screening.draws import Attitudes, draws
 from flybystab.screening.encounters import Passage
 from flybystab.screening.sample_verdicts import SampleVerdicts, sample_verdicts
+from flybystab.typing import Document
 from flybystab.units import R_earth
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 #: Periapsis distances, Earth radii.
 DISTANCES = (20.0, 6.0, 3.0, 2.0)
@@ -30,12 +34,12 @@ DISTANCES = (20.0, 6.0, 3.0, 2.0)
 TOLERANCES = (1e-3, 1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 
 
-def rows(figure: str | Path | None = None, samples: int = 200) -> list[dict[str, Any]]:
+def rows(figure: str | Path | None = None, samples: int = 200) -> list[Document]:
     """Rows of distance, setting, fraction decided by the bound, errors, differing verdicts, and time per sample."""
     asteroid = Asteroid.from_catalogue("Anteros")
     draw = draws(asteroid, samples, 1)
     attitudes = Attitudes.at(asteroid, draw, 1, "bench")
-    out: list[dict[str, Any]] = []
+    out: list[Document] = []
     for distance in DISTANCES:
         e = Encounter.hyperbolic("earth", periapsis=distance * R_earth, v_inf=6 * u.km / u.s)
         q = e.distance.to_value(u.m)
@@ -72,7 +76,7 @@ def rows(figure: str | Path | None = None, samples: int = 200) -> list[dict[str,
     return out
 
 
-def lines(rows: list[dict[str, Any]]) -> list[str]:
+def lines(rows: list[Document]) -> list[str]:
     """The table as text."""
     head = (
         f"{'q (R_E)':>7s}  {'setting':24s} {'by bound':>8s} {'median (deg)':>12s} {'largest (deg)':>13s} "
@@ -86,13 +90,13 @@ def lines(rows: list[dict[str, Any]]) -> list[str]:
     ]
 
 
-def _plot(rows: list[dict[str, Any]], path: str | Path) -> None:
+def _plot(rows: list[Document], path: str | Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.0, 4.2), layout="constrained")
     FigureCanvasAgg(figure)
-    panel: Any = figure.subplots()
+    panel: Axes = figure.subplots()
     for distance, marker in zip(DISTANCES, "oxs^", strict=True):
         points = [
             (1e3 * r["wall_s_per_sample"], max(r["margin_error_largest_deg"], 1e-12))

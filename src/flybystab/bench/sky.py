@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import astropy.units as u
 import numpy as np
@@ -28,7 +28,10 @@ from flybystab.orbit.forces import FORCES
 from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.search.encounter_finder import find_encounters
 from flybystab.plots.style import save
-from flybystab.typing import Array
+from flybystab.typing import Array, Document
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
 
 WITHIN = 0.5
 #: Target errors of the search, km (default 0.1), and tolerances of ASSIST.
@@ -38,10 +41,10 @@ TIGHT = 1e-9
 YEARS = (0.6, 10.0)
 
 
-def rows(figure: str | Path | None = None, asteroids: int = 500) -> list[dict[str, Any]]:
+def rows(figure: str | Path | None = None, asteroids: int = 500) -> list[Document]:
     """Rows of three tables, named in the column ``table``: ``accuracy``, ``outlier``, ``speed``."""
     known = orbits()
-    out: list[dict[str, Any]] = []
+    out: list[Document] = []
     for name in ("de421", "de440"):
         try:
             ephemeris(name)
@@ -57,13 +60,13 @@ def rows(figure: str | Path | None = None, asteroids: int = 500) -> list[dict[st
     return out
 
 
-def _accuracy(known: dict[str, tuple[Orbit, str]], name: str) -> list[dict[str, Any]]:
+def _accuracy(known: dict[str, tuple[Orbit, str]], name: str) -> list[Document]:
     found = approaches(known, name, growth=True)
     au = np.array([float(e["dist"]) for e in found.events])
     lost = np.isnan(found.distance)
     size = np.abs(found.distance[~lost])
     median, p90, p99 = np.percentile(size, [50, 90, 99])
-    out: list[dict[str, Any]] = [
+    out: list[Document] = [
         {
             "table": "accuracy",
             "ephemeris": name,
@@ -119,11 +122,11 @@ def _without_earth_j2(orbit: Orbit, event: dict[str, str], name: str) -> float:
     return float((nearest["distance"] - float(event["dist"]) * u.au).to_value(u.km))
 
 
-def _speed(chosen: list[Orbit], years: float) -> list[dict[str, Any]]:
+def _speed(chosen: list[Orbit], years: float) -> list[Document]:
     start = SPAN[0]
     stop = Time(start.jd + 365.25 * years, format="jd", scale="tdb")
     span = len(chosen) * years
-    out: list[dict[str, Any]] = []
+    out: list[Document] = []
 
     def ours(**how: Any) -> tuple[list[Array], float]:
         begin = time.process_time()
@@ -157,7 +160,9 @@ def _speed(chosen: list[Orbit], years: float) -> list[dict[str, Any]]:
     else:
         everything, usual = (oracle.Oracle(start, n) for n in (oracle.ALL_SOURCES, oracle.SUN_ALONE))
 
-        def assist(epsilon: float, there: Any = usual, search: bool = True) -> tuple[list[Array], float]:
+        def assist(
+            epsilon: float, there: oracle.Oracle = usual, search: bool = True
+        ) -> tuple[list[Array], float]:
             begin = time.process_time()
             found = [there.encounters(o, start, stop, WITHIN * AU, epsilon, search) for o in chosen]
             return found, time.process_time() - begin
@@ -175,9 +180,9 @@ def _speed(chosen: list[Orbit], years: float) -> list[dict[str, Any]]:
 
 
 def differences(found: list[Array], truth: list[Array]) -> tuple[Array, int]:
-    """Differences of distance (m) of passages less than a day apart, and how many of `truth` have no such passage.
+    """Differences of distance (m) of encounters less than a day apart, and the number of `truth` that are missed.
 
-    Passages within 1e-3 of the largest distance of a search may be on either side of it, and count in neither.
+    Encounters within 1e-3 of the largest distance of a search may be on either side of it: they never count as missed.
     """
     gaps, missed = [], 0
     for mine, theirs in zip(found, truth, strict=True):
@@ -190,7 +195,7 @@ def differences(found: list[Array], truth: list[Array]) -> tuple[Array, int]:
     return np.array(gaps), missed
 
 
-def lines(rows: list[dict[str, Any]]) -> list[str]:
+def lines(rows: list[Document]) -> list[str]:
     """The tables as text."""
     out = [
         "JPL close approaches of 2020 January to June, from the orbits of the same solutions",
@@ -240,14 +245,14 @@ def lines(rows: list[dict[str, Any]]) -> list[str]:
     return out
 
 
-def _plot(rows: list[dict[str, Any]], path: str | Path) -> None:
+def _plot(rows: list[Document], path: str | Path) -> None:
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
     from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
     figure = Figure(figsize=(6.0, 4.2), layout="constrained")
     FigureCanvasAgg(figure)
-    panel: Any = figure.subplots()
+    panel: Axes = figure.subplots()
     speed = [r for r in rows if r["table"] == "speed" and r["distance_error_median_km"]]
     for (code, years), marker in zip(
         dict.fromkeys((r["code"], r["years"]) for r in speed), "oxs^", strict=False
@@ -261,7 +266,7 @@ def _plot(rows: list[dict[str, Any]], path: str | Path) -> None:
     panel.set(
         xlabel="object-years per second, one thread",
         ylabel="median distance error (km)",
-        title="Search for passages",
+        title="Search for encounters",
     )
     panel.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     panel.xaxis.set_major_formatter(FuncFormatter(lambda x, _: f"{x:g}"))

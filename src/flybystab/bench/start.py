@@ -1,4 +1,4 @@
-"""First answer on a fresh machine: processor time of the compilation, by kernel, and of the same command afterwards.
+"""Time of the first command on a fresh machine: processor time of compilation by kernel, and of the command afterwards.
 
 Each case runs in a process of its own with an empty folder for kernels. The times of a kernel leave out the kernels
 that it calls; what a second process compiles meanwhile (:mod:`flybystab.flybys.precompile`) is not included.
@@ -13,11 +13,11 @@ import sys
 import tempfile
 import time
 from pathlib import Path
-from typing import Any
 
 from numba.core import event
 
 from flybystab.errors import InvalidInput
+from flybystab.typing import Document
 
 #: Cases: statements that are run in Python.
 CASES = {
@@ -38,11 +38,11 @@ class _Compilations(event.Listener):
         self._open: list[tuple[float, float]] = []
 
     def on_start(self, event: event.Event) -> None:
-        """A compilation begins, inside that of its caller."""
+        """Note the start of a compilation, which may be inside that of its caller."""
         self._open.append((time.process_time(), 0.0))
 
     def on_end(self, event: event.Event) -> None:
-        """It ends."""
+        """Add the time of a compilation, without those inside it."""
         start, inner = self._open.pop()
         took = time.process_time() - start
         function = event.data["dispatcher"].py_func
@@ -54,7 +54,7 @@ class _Compilations(event.Listener):
             self._open[-1] = outer[0], outer[1] + took
 
 
-def measure(code: str) -> dict[str, Any]:
+def measure(code: str) -> Document:
     """Run Python code in this process: processor time, and own times and numbers of the compilations."""
     found = _Compilations()
     event.register("numba:compile", found)
@@ -66,7 +66,7 @@ def measure(code: str) -> dict[str, Any]:
     return {"cpu_s": time.process_time(), "times": found.times, "counts": found.counts}
 
 
-def _run(code: str, folder: str) -> dict[str, Any]:
+def _run(code: str, folder: str) -> Document:
     """`measure` in a new process that keeps its kernels in a folder."""
     environment = os.environ | {"NUMBA_CACHE_DIR": folder}
     environment.pop("FLYBYSTAB_KERNELS", None)
@@ -74,15 +74,15 @@ def _run(code: str, folder: str) -> dict[str, Any]:
     done = subprocess.run(
         [sys.executable, "-c", program], capture_output=True, text=True, env=environment, check=True
     )
-    found: dict[str, Any] = json.loads(done.stdout.splitlines()[-1])
+    found: Document = json.loads(done.stdout.splitlines()[-1])
     return found
 
 
-def rows(figure: str | Path | None = None) -> list[dict[str, Any]]:
+def rows(figure: str | Path | None = None) -> list[Document]:
     """Rows of case, kernel ("all" for the process), compilations, processor time, and that of a second run (s)."""
     if figure is not None:
         raise InvalidInput("--output", str(figure), "no figure for this benchmark")
-    out: list[dict[str, Any]] = []
+    out: list[Document] = []
     for case, code in CASES.items():
         with tempfile.TemporaryDirectory() as folder:
             first, second = _run(code, folder), _run(code, folder)
@@ -103,7 +103,7 @@ def rows(figure: str | Path | None = None) -> list[dict[str, Any]]:
     return out
 
 
-def lines(rows: list[dict[str, Any]]) -> list[str]:
+def lines(rows: list[Document]) -> list[str]:
     """The table as text: of each case the process and the kernels that take longest."""
     out = []
     for case in dict.fromkeys(r["case"] for r in rows):
