@@ -16,11 +16,17 @@ from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from importlib import import_module
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from astropy.time import Time
 from astropy.units import Quantity, Unit
+
+from flybystab.typing import Document
+
+if TYPE_CHECKING:
+    from astropy.table import Table
+    from scipy.interpolate import CubicHermiteSpline
 
 #: Dataclasses that are stored by their name alone, with their modules.
 KNOWN = {
@@ -83,7 +89,7 @@ def encoded(value: Any) -> Any:
     return _object(value)
 
 
-def _object(value: Any) -> dict[str, Any]:
+def _object(value: Any) -> Document:
     kind = type(value)
     if "astropy.table" in sys.modules and isinstance(value, sys.modules["astropy.table"].Table):
         columns = [encoded(value[name]) for name in value.colnames]
@@ -135,23 +141,23 @@ def decoded(value: Any) -> Any:
     raise KeyError(", ".join(map(str, value)))
 
 
-def _restored_object(value: dict[str, Any]) -> Any:
+def _restored_object(value: Document) -> Any:
     kind = _class(value["class"])
     content = {k: decoded(v) for k, v in value.items() if k != "class"}
     if not getattr(kind, "_verbatim", False):
         return kind(**content)
-    made = object.__new__(kind)  # the constructor would change the values
+    made: object = object.__new__(kind)  # the constructor would change the values
     for name, part in content.items():
         object.__setattr__(made, name, part)
     return made
 
 
-def _restored_quantity(value: dict[str, Any]) -> Quantity:
+def _restored_quantity(value: Document) -> Quantity:
     number = decoded(value["value"])
     return (np.array(number) if isinstance(number, list) else number) * Unit(value["unit"])
 
 
-def _restored_table(value: dict[str, Any]) -> Any:
+def _restored_table(value: Document) -> Table:
     from astropy import table
 
     if value["table"] == "ResultTable":
@@ -161,21 +167,22 @@ def _restored_table(value: dict[str, Any]) -> Any:
     return kind([decoded(c) for c in value["columns"]], names=value["names"])
 
 
-def _restored_spline(value: dict[str, Any]) -> Any:
+def _restored_spline(value: Document) -> CubicHermiteSpline:
     from scipy.interpolate import CubicHermiteSpline
 
     return CubicHermiteSpline.construct_fast(decoded(value["spline"]), decoded(value["knots"]))
 
 
-def _restored_array(text: str) -> Any:
+def _restored_array(text: str) -> np.ndarray:
     unpacker = zlib.decompressobj()
     data = unpacker.decompress(base64.b64decode(text), LARGEST)
     if unpacker.unconsumed_tail:
         raise ValueError(f"an array of more than {LARGEST} bytes")
-    return np.load(io.BytesIO(data), allow_pickle=False)
+    array: np.ndarray = np.load(io.BytesIO(data), allow_pickle=False)
+    return array
 
 
-def _masked(value: dict[str, Any]) -> Any:
+def _masked(value: Document) -> np.ma.MaskedArray:
     data, mask = map(decoded, value["masked"])
     return np.ma.MaskedArray(data, mask)
 
@@ -201,13 +208,13 @@ _RESTORE = {
 }
 
 
-def _short(array: Any) -> bool:
+def _short(array: np.ndarray) -> bool:
     """Whether an array is stored as a list: short, and of a type that the list determines."""
     usual = array.dtype.kind == "U" or array.dtype in (np.dtype(float), np.dtype(int), np.dtype(bool))
     return 0 < array.size <= LISTED and usual
 
 
-def _array(array: Any) -> dict[str, str]:
+def _array(array: np.ndarray) -> dict[str, str]:
     stream = io.BytesIO()
     np.save(stream, np.ascontiguousarray(array) if array.ndim else array, allow_pickle=False)
     return {"npy": base64.b64encode(zlib.compress(stream.getvalue(), 6)).decode()}
@@ -217,7 +224,7 @@ def _address(kind: type) -> str:
     return f"{kind.__module__}:{kind.__name__}"
 
 
-def _class(address: str) -> Any:
+def _class(address: str) -> type:
     """Class of an address ``module:Name``: a dataclass, named tuple or enumeration that is defined in that module."""
     module, _, name = address.rpartition(":")
     module = module or KNOWN[name]

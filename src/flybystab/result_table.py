@@ -11,7 +11,7 @@ import json
 from collections.abc import Callable
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Self
 
 import numpy as np
 from astropy.table import MaskedColumn, QTable
@@ -25,6 +25,12 @@ from flybystab.encoding import decoded, encoded
 from flybystab.errors import FlybystabError, InvalidInput, UnknownName
 from flybystab.files import read_bytes
 from flybystab.tabular import table_html
+from flybystab.typing import Document
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from pandas import DataFrame
+    from pyarrow import Schema
 
 __all__ = ["ResultTable", "read_table"]
 
@@ -71,12 +77,12 @@ class ResultTable(QTable):
         """The same columns as a plain QTable."""
         return QTable(self)
 
-    def to_dict(self) -> dict[str, list[Any]]:
+    def to_dict(self) -> dict[str, list[object]]:
         """Lists by column, with the unit in the name; infinite and undefined numbers are None, times are text (TDB)."""
         return saving.listed(_scalars(self, 3)[0])
 
     @check_arguments
-    def to_pandas(self, index: str | None = None, **options: Any) -> Any:
+    def to_pandas(self, index: str | None = None, **options: object) -> DataFrame:
         """DataFrame with the unit in the name of each column; vectors become columns ``_x``, ``_y``, ``_z``.
 
         Parameters
@@ -118,7 +124,7 @@ class ResultTable(QTable):
 
     @classmethod
     @check_arguments
-    def read(cls, path: str | Path, *args: Any, **kwargs: Any) -> Any:
+    def read(cls, path: str | Path, *args: object, **kwargs: object) -> Self:
         """The table in a file that :meth:`save` or a command wrote; with further arguments as ``QTable.read``.
 
         Raises
@@ -130,7 +136,7 @@ class ResultTable(QTable):
             return super().read(path, *args, **kwargs)
         return cls(read_table(path), copy=False)
 
-    def plot(self, axes: Any = None, **options: Any) -> Any:
+    def plot(self, axes: Axes | None = None, **options: object) -> Axes:
         """Plot into matplotlib axes, new ones by default; returns the axes.
 
         Parameters
@@ -154,12 +160,12 @@ class ResultTable(QTable):
         return table_html(self, shown, title, "columns of the table")
 
 
-def _scalars(table: QTable, digits: int) -> tuple[dict[str, Any], dict[str, Any]]:
+def _scalars(table: QTable, digits: int) -> tuple[saving.Columns, Document]:
     """Columns of scalars, in the units of documents, and what :func:`_joined` needs to restore the table.
 
     Times become text (ISO, TDB) with `digits` decimals of the second, vectors three columns.
     """
-    columns: dict[str, Any] = {}
+    columns: saving.Columns = {}
     times, vectors, texts = [], {}, {}
     for name in table.colnames:
         column = table[name]
@@ -187,7 +193,7 @@ def _scalars(table: QTable, digits: int) -> tuple[dict[str, Any], dict[str, Any]
     return columns, {"times": times, "vectors": vectors, "descriptions": texts}
 
 
-def _document(table: QTable) -> tuple[dict[str, Any], dict[str, Any]]:
+def _document(table: QTable) -> tuple[saving.Columns, Document]:
     """Columns and metadata of a file in plain types."""
     columns, about = _scalars(table, 9)
     units = {
@@ -200,7 +206,7 @@ def _document(table: QTable) -> tuple[dict[str, Any], dict[str, Any]]:
     return columns, {**head, "about": meta}
 
 
-def _joined(columns: dict[str, Any], meta: dict[str, Any]) -> ResultTable:
+def _joined(columns: saving.Columns, meta: Document) -> ResultTable:
     """The table of the columns and metadata of :func:`_document`."""
     how = meta["columns_of"]
     first = {parts[0]: name for name, parts in how["vectors"].items()}
@@ -215,7 +221,7 @@ def _joined(columns: dict[str, Any], meta: dict[str, Any]) -> ResultTable:
         elif name in first:
             out[first[name]] = np.stack([columns[part] for part in how["vectors"][first[name]]], axis=1)
         else:
-            out[name] = column.to(Unit(how["units"][name])) if name in how["units"] else column
+            out[name] = Quantity(column).to(Unit(how["units"][name])) if name in how["units"] else column
     for name, text in how["descriptions"].items():
         out[name].info.description = text
     out.meta = {name: decoded(value) for name, value in meta["about"].items()}
@@ -305,7 +311,7 @@ def _check_complete(table: QTable, content: bytes, path: str | Path, name: str) 
         )
 
 
-def _parquet_about(schema: Any) -> dict[str, Any]:
+def _parquet_about(schema: Schema) -> Document:
     """The entry of this package in the metadata of a Parquet file."""
     return dict(json.loads((schema.metadata or {}).get(b"flybystab", b"{}")))
 
@@ -319,7 +325,7 @@ def _read_parquet(path: Path) -> ResultTable:
     data = saving.pyarrow().parquet.read_table(path)
     table = ResultTable()
     for name in data.column_names:
-        values: Any = data[name].to_numpy(zero_copy_only=False)
+        values = data[name].to_numpy(zero_copy_only=False)
         if values.dtype == object:
             values = values.astype(str)
         about = data.schema.field(name).metadata or {}

@@ -12,7 +12,8 @@ import json
 import tempfile
 from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
-from typing import Any
+from types import ModuleType
+from typing import TYPE_CHECKING
 
 import numpy as np
 from astropy.units import Quantity, Unit, UnitBase, km
@@ -20,11 +21,15 @@ from astropy.units import Quantity, Unit, UnitBase, km
 from flybystab.encoding import KNOWN, decoded, encoded
 from flybystab.errors import FlybystabError, InvalidInput, MissingExtra
 from flybystab.files import parse_json, read_bytes, read_text, replace_file
+from flybystab.typing import Document
+
+if TYPE_CHECKING:
+    from xarray import Dataset
 
 __all__ = ["KNOWN", "decoded", "encoded", "read_columns", "save_columns", "with_unit"]
 
-#: Columns by name.
-Columns = dict[str, Any]
+#: Columns by name; a quantity is an array, too.
+Columns = dict[str, np.ndarray]
 #: Units of quantities in documents and CSV files, where tables differ: one key for one quantity.
 DOCUMENT_UNITS = {"distance": km}
 #: Text that starts with one of these is quoted: spreadsheets read it as a formula, ECSV readers as a comment (#).
@@ -41,7 +46,7 @@ def with_unit(name: str, unit: UnitBase) -> str:
     return f"{name}_{text}" if text else name
 
 
-def pyarrow() -> Any:
+def pyarrow() -> ModuleType:
     """The package pyarrow with its Parquet part.
 
     Raises
@@ -56,7 +61,7 @@ def pyarrow() -> Any:
     return pyarrow
 
 
-def xarray() -> Any:
+def xarray() -> ModuleType:
     """The package xarray.
 
     Raises
@@ -71,7 +76,7 @@ def xarray() -> Any:
     return xarray
 
 
-def flat(columns: Mapping[str, Any]) -> Columns:
+def flat(columns: Mapping[str, np.ndarray]) -> Columns:
     """Columns of scalars without units, by a name with the unit; a component is a column, such as ``semi_axes_1_m``."""
     out: Columns = {}
     for name, column in columns.items():
@@ -85,19 +90,21 @@ def flat(columns: Mapping[str, Any]) -> Columns:
     return out
 
 
-def listed(columns: Mapping[str, Any]) -> dict[str, list[Any]]:
+def listed(columns: Mapping[str, np.ndarray]) -> dict[str, list[object]]:
     """Lists by column, with the unit in the name; infinite and undefined numbers are None."""
     out = {}
     for name, column in columns.items():
-        bare = column.value if isinstance(column, Quantity) else column
+        bare: np.ndarray = column.value if isinstance(column, Quantity) else column
         label = with_unit(name, column.unit) if isinstance(column, Quantity) else name
         if bare.dtype.kind == "f":
-            bare = np.where(np.isfinite(bare), bare.astype(object), None)
+            finite = np.isfinite(bare)
+            bare = bare.astype(object)
+            bare[~finite] = None
         out[label] = bare.tolist()
     return out
 
 
-def csv_cell(value: Any) -> str:
+def csv_cell(value: object) -> str:
     """A cell of a CSV or ECSV file; text that a spreadsheet would take for a formula is quoted."""
     if not isinstance(value, str):
         return str(value)
@@ -106,13 +113,13 @@ def csv_cell(value: Any) -> str:
     return value
 
 
-def csv_text(names: Iterable[str], rows: Iterable[Iterable[Any]]) -> str:
+def csv_text(names: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
     """A CSV file: the names of the columns, then the rows."""
     return "".join(",".join(map(csv_cell, row)) + "\n" for row in (names, *rows))
 
 
 def save_columns(
-    path: str | Path, columns: Mapping[str, Any], meta: Mapping[str, Any], overwrite: bool
+    path: str | Path, columns: Mapping[str, np.ndarray], meta: Mapping[str, object], overwrite: bool
 ) -> Path:
     """Write columns and metadata in the format of the suffix; returns the path.
 
@@ -127,7 +134,7 @@ def save_columns(
 
 
 def written(
-    path: str | Path, writers: Mapping[str, Callable[..., bytes]], overwrite: bool, *content: Any
+    path: str | Path, writers: Mapping[str, Callable[..., bytes]], overwrite: bool, *content: object
 ) -> Path:
     """Write the bytes of the writer of the suffix through a temporary file."""
     out = Path(path)
@@ -143,12 +150,12 @@ def written(
     return out
 
 
-def content_of(suffix: str, columns: Mapping[str, Any], meta: Mapping[str, Any]) -> bytes:
+def content_of(suffix: str, columns: Mapping[str, np.ndarray], meta: Mapping[str, object]) -> bytes:
     """The bytes of a file in the format of a suffix."""
     return _WRITERS[suffix](columns, meta)
 
 
-def read_columns(path: str | Path) -> tuple[Columns, dict[str, Any]]:
+def read_columns(path: str | Path) -> tuple[Columns, Document]:
     """Columns and metadata of a file that :func:`save_columns` wrote.
 
     Raises
@@ -168,7 +175,7 @@ def read_columns(path: str | Path) -> tuple[Columns, dict[str, Any]]:
         raise InvalidInput("path", str(path), f"a file written by save() ({reason})") from None
 
 
-def _ecsv(columns: Mapping[str, Any], meta: Mapping[str, Any]) -> bytes:
+def _ecsv(columns: Mapping[str, np.ndarray], meta: Mapping[str, object]) -> bytes:
     from astropy.table import Table
 
     text = io.StringIO()
@@ -180,7 +187,7 @@ def _ecsv(columns: Mapping[str, Any], meta: Mapping[str, Any]) -> bytes:
     return text.getvalue().encode()
 
 
-def _read_ecsv(path: Path) -> tuple[Columns, dict[str, Any]]:
+def _read_ecsv(path: Path) -> tuple[Columns, Document]:
     from astropy.table import MaskedColumn, QTable
 
     table = QTable.read(read_bytes(path, "path", SAVED_LIMIT).decode(), format="ascii.ecsv")
@@ -200,7 +207,7 @@ def _read_ecsv(path: Path) -> tuple[Columns, dict[str, Any]]:
     return out, meta
 
 
-def _parquet(columns: Mapping[str, Any], meta: Mapping[str, Any]) -> bytes:
+def _parquet(columns: Mapping[str, np.ndarray], meta: Mapping[str, object]) -> bytes:
     pa = pyarrow()
     about = json.dumps({"columns": _described(columns), "meta": dict(meta)}, allow_nan=False)
     units = [
@@ -223,7 +230,7 @@ def _parquet(columns: Mapping[str, Any], meta: Mapping[str, Any]) -> bytes:
     return stream.getvalue()
 
 
-def _read_parquet(path: Path) -> tuple[Columns, dict[str, Any]]:
+def _read_parquet(path: Path) -> tuple[Columns, Document]:
     data = pyarrow().parquet.read_table(path)
     about = json.loads(data.schema.metadata[b"flybystab"])
     names = iter(data.column_names)
@@ -238,7 +245,7 @@ def _read_parquet(path: Path) -> tuple[Columns, dict[str, Any]]:
     return out, dict(about["meta"])
 
 
-def _json(columns: Mapping[str, Any], meta: Mapping[str, Any]) -> bytes:
+def _json(columns: Mapping[str, np.ndarray], meta: Mapping[str, object]) -> bytes:
     infinite: dict[str, dict[str, list[int]]] = {}
     for name, column in columns.items():
         bare = np.asarray(column)
@@ -255,7 +262,7 @@ def _json(columns: Mapping[str, Any], meta: Mapping[str, Any]) -> bytes:
     return (json.dumps(document, allow_nan=False, indent=1) + "\n").encode()
 
 
-def _read_json(path: Path) -> tuple[Columns, dict[str, Any]]:
+def _read_json(path: Path) -> tuple[Columns, Document]:
     document = parse_json(read_text(path, "path"), "path", path)
     if document["schema"] != "result/1":
         raise ValueError(f"schema {document['schema']}")
@@ -271,12 +278,12 @@ def _read_json(path: Path) -> tuple[Columns, dict[str, Any]]:
     return out, dict(document["meta"])
 
 
-def _csv(columns: Mapping[str, Any], meta: Mapping[str, Any]) -> bytes:
+def _csv(columns: Mapping[str, np.ndarray], meta: Mapping[str, object]) -> bytes:
     parts = flat(columns)
     return csv_text(parts, zip(*(v.tolist() for v in parts.values()), strict=True)).encode()
 
 
-def _netcdf(columns: Mapping[str, Any], meta: Mapping[str, Any]) -> bytes:
+def _netcdf(columns: Mapping[str, np.ndarray], meta: Mapping[str, object]) -> bytes:
     about = {k: v for k, v in meta.items() if k != "object"}
     data = dataset(
         {k: (["row", *(f"{k}_{i}" for i in range(1, v.ndim))], v) for k, v in columns.items()}, about
@@ -289,7 +296,7 @@ def _netcdf(columns: Mapping[str, Any], meta: Mapping[str, Any]) -> bytes:
         return file.read_bytes()
 
 
-def _read_netcdf(path: Path) -> tuple[Columns, dict[str, Any]]:
+def _read_netcdf(path: Path) -> tuple[Columns, Document]:
     with xarray().open_dataset(path, engine="h5netcdf", decode_times=False, decode_timedelta=False) as data:
         out: Columns = {}
         about = json.loads(data.attrs["flybystab"])
@@ -302,7 +309,7 @@ def _read_netcdf(path: Path) -> tuple[Columns, dict[str, Any]]:
     return out, dict(about["meta"])
 
 
-def dataset(variables: Mapping[str, tuple[list[str], Any]], meta: Mapping[str, Any]) -> Any:
+def dataset(variables: Mapping[str, tuple[list[str], np.ndarray]], meta: Mapping[str, object]) -> Dataset:
     """An xarray data set of named arrays with their dimensions; units and metadata are attributes."""
     xr = xarray()
     data = xr.Dataset()
@@ -316,11 +323,11 @@ def dataset(variables: Mapping[str, tuple[list[str], Any]], meta: Mapping[str, A
     return data
 
 
-def _length(columns: Mapping[str, Any]) -> int:
+def _length(columns: Mapping[str, np.ndarray]) -> int:
     return len(next(iter(columns.values())))
 
 
-def _described(columns: Mapping[str, Any]) -> list[list[Any]]:
+def _described(columns: Mapping[str, np.ndarray]) -> list[list[object]]:
     """Name, shape of a row and unit of each column."""
     return [
         [name, list(c.shape[1:]), c.unit.to_string() if isinstance(c, Quantity) else None]
@@ -328,14 +335,14 @@ def _described(columns: Mapping[str, Any]) -> list[list[Any]]:
     ]
 
 
-_WRITERS: dict[str, Callable[[Mapping[str, Any], Mapping[str, Any]], bytes]] = {
+_WRITERS: dict[str, Callable[[Mapping[str, np.ndarray], Mapping[str, object]], bytes]] = {
     ".ecsv": _ecsv,
     ".parquet": _parquet,
     ".json": _json,
     ".nc": _netcdf,
     ".csv": _csv,
 }
-_READERS: dict[str, Callable[[Path], tuple[Columns, dict[str, Any]]]] = {
+_READERS: dict[str, Callable[[Path], tuple[Columns, Document]]] = {
     ".ecsv": _read_ecsv,
     ".parquet": _read_parquet,
     ".json": _read_json,

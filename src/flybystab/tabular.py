@@ -22,11 +22,15 @@ from flybystab._version import __version__
 from flybystab.arguments import check_arguments
 from flybystab.encoding import decoded, encoded
 from flybystab.errors import InvalidInput
-from flybystab.saving import with_unit
+from flybystab.saving import Columns, with_unit
+from flybystab.typing import Document
 from flybystab.units import brief
 
 if TYPE_CHECKING:
-    from astropy.table import QTable
+    from astropy.table import QTable, Table
+    from matplotlib.axes import Axes
+    from pandas import DataFrame
+    from xarray import Dataset
 
 __all__ = ["Record", "Tabular", "with_unit"]
 
@@ -48,14 +52,14 @@ class Results:
     def _hidden(cls, name: str) -> bool:
         return name.startswith("_") or name in cls._left_out
 
-    def _columns(self) -> tuple[dict[str, Any], dict[str, Any]]:
+    def _columns(self) -> tuple[Columns, Document]:
         """Columns of the same length, and metadata of plain types (:func:`flybystab.saving.encoded`)."""
         raise NotImplementedError
 
-    def _about(self) -> dict[str, Any]:
+    def _about(self) -> Document:
         return {"result": type(self).__name__, "flybystab": __version__}
 
-    def __astropy_table__(self, cls: type, copy: bool, **kwargs: Any) -> Any:
+    def __astropy_table__(self, cls: type[Table], copy: bool, **kwargs: object) -> Table:
         """Table of the class `cls`: called by ``QTable(result)`` and ``Table(result)``."""
         columns, meta = self._columns()
         return cls(columns, copy=copy, meta=meta, **kwargs)
@@ -66,17 +70,17 @@ class Results:
 
         return QTable(self)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Document:
         """Lists by column, with the unit in the name; infinite and undefined numbers are None."""
         return saving.listed(self._columns()[0])
 
-    def to_pandas(self) -> Any:
+    def to_pandas(self) -> DataFrame:
         """DataFrame with the unit in the name of each column; components are columns, such as ``semi_axes_1_m``."""
         import pandas
 
         return pandas.DataFrame(saving.flat(self._columns()[0]))
 
-    def _row_iterator(self) -> Iterator[dict[str, Any]]:
+    def _row_iterator(self) -> Iterator[Document]:
         """The rows of :meth:`to_pandas` as dictionaries: ``pandas.DataFrame(result)`` is made of them."""
         columns = saving.flat(self._columns()[0])
         return (dict(zip(columns, row, strict=True)) for row in zip(*columns.values(), strict=True))
@@ -96,7 +100,7 @@ class Results:
         columns, meta = self._columns()
         return saving.save_columns(path, columns, {**meta, **self._stored_with()}, overwrite)
 
-    def _stored_with(self) -> dict[str, Any]:
+    def _stored_with(self) -> Document:
         """Metadata of files only: what :meth:`read` needs beyond the table."""
         raise NotImplementedError
 
@@ -119,10 +123,10 @@ class Results:
             raise InvalidInput("path", str(path), f"a complete file (it has no {missing})") from None
 
     @classmethod
-    def _restored(cls, columns: dict[str, Any], meta: dict[str, Any]) -> Self:
+    def _restored(cls, columns: Columns, meta: Document) -> Self:
         raise NotImplementedError
 
-    def plot(self, axes: Any = None, **options: Any) -> Any:
+    def plot(self, axes: Axes | Sequence[Axes] | None = None, **options: object) -> Any:
         """Plot into matplotlib axes, new ones by default; returns the axes.
 
         The figures are functions of :mod:`flybystab.plots`; `options` are passed to them.
@@ -180,7 +184,7 @@ class Tabular(Results):
     #: Names of the leading dimensions, and for each field along one of them that dimension.
     _dimensions: ClassVar[tuple[str, ...]] = ("row",)
 
-    def __iter__(self) -> Iterator[dict[str, Any]]:
+    def __iter__(self) -> Iterator[Document]:
         """Rows as dictionaries, with the unit in each name."""
         return self._row_iterator()
 
@@ -192,7 +196,7 @@ class Tabular(Results):
         """Leading dimensions of the arrays."""
         return (len(self),)
 
-    def _parts(self) -> tuple[dict[str, Any], dict[str, Any], dict[str, Any]]:
+    def _parts(self) -> tuple[Columns, Columns, Document]:
         """Arrays over the grid, coordinates along one dimension of it, and the other fields."""
         grid, arrays, along, rest = self._grid(), {}, {}, {}
         for f in fields(self):  # type: ignore[arg-type]
@@ -207,7 +211,7 @@ class Tabular(Results):
                 rest[f.name] = value
         return arrays, along, rest
 
-    def _columns(self) -> tuple[dict[str, Any], dict[str, Any]]:
+    def _columns(self) -> tuple[Columns, Document]:
         grid = self._grid()
         arrays, along, rest = self._parts()
         columns = {}
@@ -222,12 +226,12 @@ class Tabular(Results):
             meta["grid"] = list(grid)
         return columns, meta
 
-    def _stored_with(self) -> dict[str, Any]:
+    def _stored_with(self) -> Document:
         hidden = [f.name for f in fields(self) if self._hidden(f.name)]  # type: ignore[arg-type]
         return {"object": {name: encoded(getattr(self, name)) for name in hidden}} if hidden else {}
 
     @classmethod
-    def _restored(cls, columns: dict[str, Any], meta: dict[str, Any]) -> Self:
+    def _restored(cls, columns: Columns, meta: Document) -> Self:
         grid = tuple(meta.get("grid", ()))
         values = {name: decoded(value) for name, value in meta.get("object", {}).items()}
         for f in fields(cls):  # type: ignore[arg-type]
@@ -245,7 +249,7 @@ class Tabular(Results):
             values[f.name] = column
         return cls(**values)
 
-    def to_xarray(self) -> Any:
+    def to_xarray(self) -> Dataset:
         """The same as an xarray data set with named dimensions (extra ``xarray``); units are attributes."""
         grid = self._grid()
         arrays, along, rest = self._parts()
@@ -259,22 +263,22 @@ class Tabular(Results):
 class Record(Results):
     """Mixin of a single result, a dataclass: a table of one row; nested results are columns with a prefix."""
 
-    def _columns(self) -> tuple[dict[str, Any], dict[str, Any]]:
-        columns: dict[str, Any] = {}
+    def _columns(self) -> tuple[Columns, Document]:
+        columns: Columns = {}
         for f in fields(self):  # type: ignore[arg-type]
             if not self._hidden(f.name):
                 _put(columns, f.name, getattr(self, f.name))
         return columns, self._about()
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Document:
         """Values by name, with the unit in the name; infinite and undefined numbers are None."""
         return {name: values[0] for name, values in super().to_dict().items()}
 
-    def _stored_with(self) -> dict[str, Any]:
+    def _stored_with(self) -> Document:
         return {"object": encoded(self)}
 
     @classmethod
-    def _restored(cls, columns: dict[str, Any], meta: dict[str, Any]) -> Self:
+    def _restored(cls, columns: Columns, meta: Document) -> Self:
         found: Self = decoded(meta["object"])
         return found
 
@@ -286,26 +290,26 @@ class Collection(Record):
         """Columns of the table."""
         raise NotImplementedError
 
-    def _columns(self) -> tuple[dict[str, Any], dict[str, Any]]:
+    def _columns(self) -> tuple[Columns, Document]:
         columns = {
             name: column if isinstance(column, Quantity) else np.asarray(column)
             for name, column in self._rows().items()
         }
         return columns, self._about()
 
-    def __iter__(self) -> Iterator[dict[str, Any]]:
+    def __iter__(self) -> Iterator[Document]:
         """Rows as dictionaries, with the unit in each name."""
         return self._row_iterator()
 
     def __len__(self) -> int:
         return len(next(iter(self._rows().values())))
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self) -> Document:
         """Lists by column, with the unit in the name; infinite and undefined numbers are None."""
         return Results.to_dict(self)
 
 
-def _put(columns: dict[str, Any], name: str, value: Any) -> None:
+def _put(columns: Columns, name: str, value: object) -> None:
     """Append a value as columns of length 1, times as text (TDB); None and bodies are left out."""
     if isinstance(value, Time):
         columns[f"{name}_tdb"] = np.asarray([value.tdb.isot])
@@ -328,6 +332,6 @@ def _put(columns: dict[str, Any], name: str, value: Any) -> None:
         _put_parts(columns, name, {key: getattr(value, key) for key in names})
 
 
-def _put_parts(columns: dict[str, Any], name: str, parts: Mapping[str, Any]) -> None:
+def _put_parts(columns: Columns, name: str, parts: Mapping[str, object]) -> None:
     for key, part in parts.items():
         _put(columns, f"{name}_{key}", part)

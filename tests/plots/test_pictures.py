@@ -134,7 +134,8 @@ def test_target_map_agrees_with_single_flybys():
 def test_points_on_the_target_plane():
     a = axes()
     maps.verdict_points(a, [[1, 2], [3, 4], [5, 6]] * u.km, ["INTACT", "RESHAPED", "INTACT"], 7 * u.km)
-    assert [t.get_text() for t in a.get_legend().get_texts()] == ["INTACT (2)", "RESHAPED (1)"]
+    shown = [t.get_text() for t in a.get_legend().get_texts()]
+    assert shown == ["INTACT (2)", "RESHAPED (1)", "disc of impacts"]
 
 
 def test_verdicts_can_be_told_apart_in_greyscale():

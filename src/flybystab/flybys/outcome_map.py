@@ -20,8 +20,9 @@ from flybystab.flybys.verdict import SEVERITY, Verdict
 from flybystab.orbit.planets import Planet, planet
 from flybystab.orbit.target_plane import capture_radius
 from flybystab.progress import Progressing
+from flybystab.saving import Columns
 from flybystab.tabular import Tabular
-from flybystab.typing import Array
+from flybystab.typing import Array, Document
 from flybystab.units import counted, to_si
 
 
@@ -56,7 +57,7 @@ class OutcomeMap(Tabular):
     def _grid(self) -> tuple[int, ...]:
         return self.verdict.shape
 
-    def _columns(self) -> tuple[dict[str, object], dict[str, object]]:
+    def _columns(self) -> tuple[Columns, Document]:
         columns, meta = super()._columns()
         n, m, k = self._grid()
         phase = np.tile(180.0 * np.arange(k) / k, n * m) * u.deg
