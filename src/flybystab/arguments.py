@@ -1,7 +1,7 @@
-"""Check of the kinds of arguments against the annotations of a function.
+"""Checks of the types of arguments against the annotations of a function.
 
-``@check_arguments`` refuses an argument of another kind by name before the function runs: a number where
-a name belongs, a list for a body. Domains (signs, ranges, units) are checked by the function itself.
+``@check_arguments`` raises an error that names an argument of the wrong type, such as a number for a name or a list for
+a body, before the function runs. Domains (signs, ranges, units) are checked by the function itself.
 """
 
 from __future__ import annotations
@@ -16,6 +16,7 @@ from typing import Any, ParamSpec, TypeVar
 import numpy as np
 
 from flybystab.errors import InvalidInput
+from flybystab.typing import Array
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -34,7 +35,7 @@ def _whole(value: Any) -> bool:
     return plain and abs(int(value)) < 2**63
 
 
-def _numbers(value: Any) -> bool:
+def _numbers(value: object) -> bool:
     try:
         array = np.asarray(value)
         return array.dtype.kind in "fiu" and array.size > 0
@@ -42,14 +43,14 @@ def _numbers(value: Any) -> bool:
         return False
 
 
-def _names(value: Any) -> bool:
+def _names(value: object) -> bool:
     return isinstance(value, str) or (
         isinstance(value, Iterable) and all(isinstance(one, str) for one in value)
     )
 
 
-#: Kinds by their annotation: what is expected, and the check.
-KINDS: Mapping[str, tuple[str, Callable[[Any], bool]]] = {
+#: Kinds of values by annotation: description for messages, and check.
+KINDS: Mapping[str, tuple[str, Callable[[object], bool]]] = {
     "int": ("a whole number", _whole),
     "float": ("a real number", _number),
     "str": ("text", lambda value: isinstance(value, str)),
@@ -72,7 +73,7 @@ CLASSES = (
 )  # fmt: skip
 
 
-def _is(value: Any, kind: str) -> bool:
+def _is(value: object, kind: str) -> bool:
     if kind == "None":
         return value is None
     if kind in KINDS:
@@ -82,26 +83,24 @@ def _is(value: Any, kind: str) -> bool:
 
 
 def _kind(annotation: str) -> str:
-    """Kind of an annotation: parameters of mappings and callables are not looked at."""
+    """Kind of an annotation, without the parameters of mappings and callables, which are not checked."""
     plain = annotation.partition("[")[0]
     return plain if plain in ("Callable", "Mapping") else annotation
 
 
-def _check(name: str, value: Any, kinds: tuple[str, ...]) -> None:
+def _check(name: str, value: object, kinds: tuple[str, ...]) -> None:
     if kinds and not any(_is(value, kind) for kind in kinds):
         wanted = [KINDS[k][0] if k in KINDS else k for k in kinds if k != "None"]
         raise InvalidInput(name, value, " or ".join(wanted))
 
 
 @cache
-def _parameters(function: Callable[..., Any]) -> tuple[inspect.Signature, dict[str, tuple[str, ...]]]:
+def _parameters(function: Callable[..., object]) -> tuple[inspect.Signature, dict[str, tuple[str, ...]]]:
     """Signature, and the kinds of the parameters of which every kind is known."""
     signature = inspect.signature(function)
     kinds = {}
     for name, parameter in signature.parameters.items():
         found = tuple(_kind(k) for k in str(parameter.annotation).strip("'\"").split(" | "))
-        if name == "axes" and found == ("Any",):
-            found = "Axes", "None"
         if all(k in KINDS or k in CLASSES or k == "None" for k in found):
             kinds[name] = found
     return signature, kinds
@@ -133,7 +132,7 @@ def check_arguments(function: Callable[P, R]) -> Callable[P, R]:
 
 
 def finite(value: float, name: str, low: float = -math.inf, high: float = math.inf) -> float:
-    """A real number in a closed interval.
+    """The value as a float; it must be a real number in a closed interval.
 
     Raises
     ------
@@ -144,8 +143,8 @@ def finite(value: float, name: str, low: float = -math.inf, high: float = math.i
     return float(value)
 
 
-def vector(value: Any, name: str) -> Any:
-    """Three finite numbers, not all zero, as an array.
+def vector(value: object, name: str) -> Any:
+    """The value as an array of three finite numbers, not all zero.
 
     Raises
     ------
@@ -157,8 +156,8 @@ def vector(value: Any, name: str) -> Any:
     return found
 
 
-def levels(value: Any, name: str) -> np.ndarray:
-    """Probabilities from 0 to 1 as an array.
+def levels(value: object, name: str) -> Array:
+    """The value as an array of probabilities from 0 to 1.
 
     Raises
     ------
@@ -170,14 +169,14 @@ def levels(value: Any, name: str) -> np.ndarray:
     return found
 
 
-def check_kinds(instance: Any, *names: str) -> None:
+def check_kinds(instance: object, *names: str) -> None:
     """Raise `InvalidInput` for attributes of a dataclass whose type does not match the annotation of its constructor.
 
     Raises
     ------
     InvalidInput
     """
-    constructor: Any = type(instance)
+    constructor: Callable[..., object] = type(instance)
     _, kinds = _parameters(constructor)
     for name in names:
         _check(name, getattr(instance, name), kinds.get(name, ()))

@@ -1,7 +1,8 @@
 """Objects of the package in plain types, for the metadata of saved files: numbers, text, lists and dictionaries.
 
-What JSON has no type for is a dictionary that carries its type. Dataclasses and named tuples of this package are stored
-by their fields, so that :func:`decoded` gives the object back exactly; no other class is ever restored.
+A value without a JSON type is a dictionary with an entry that gives its type. Dataclasses and named
+tuples of this package are stored by their fields, so that :func:`decoded` restores the object exactly; no other class
+is restored.
 """
 
 from __future__ import annotations
@@ -209,7 +210,7 @@ _RESTORE = {
 
 
 def _short(array: np.ndarray) -> bool:
-    """Whether an array is stored as a list: short, and of a type that the list determines."""
+    """True for an array that is stored as a list: short, and of a type that the list determines."""
     usual = array.dtype.kind == "U" or array.dtype in (np.dtype(float), np.dtype(int), np.dtype(bool))
     return 0 < array.size <= LISTED and usual
 

@@ -6,11 +6,9 @@ Every error derives from :class:`FlybystabError`; those caused by an argument ar
 
 from __future__ import annotations
 
-from typing import Any
-
 
 class FlybystabError(Exception):
-    """Base of every error that the package raises on purpose."""
+    """Base class of the errors of the package."""
 
 
 class FlybystabWarning(UserWarning):
@@ -30,7 +28,7 @@ class InvalidInput(FlybystabError, ValueError):
         Description of the values expected.
     """
 
-    def __init__(self, name: str, value: Any, expected: str) -> None:
+    def __init__(self, name: str, value: object, expected: str) -> None:
         self.name, self.value, self.expected = name, value, expected
         super().__init__(f"{name} = {value!s}: expected {expected}")
 
@@ -82,7 +80,7 @@ class OutOfSpan(FlybystabError, ValueError):
 
 
 class WrongUsage(FlybystabError, ValueError):
-    """A command line that is wrong on its own: exit status 2."""
+    """An invalid command line: exit status 2."""
 
 
 class NoEncounter(FlybystabError, LookupError):
@@ -98,7 +96,7 @@ class InaccurateOrbit(UserWarning):
 
 
 class NotConverged(FlybystabError, ArithmeticError):
-    """A numerical method gave up; the message says where and with what state."""
+    """A numerical method did not converge; the message gives the place and the state."""
 
 
 class MissingExtra(FlybystabError, ImportError):
@@ -110,12 +108,12 @@ class MissingExtra(FlybystabError, ImportError):
 
 
 class NothingComputed(FlybystabError, RuntimeError):
-    """Every row of a table failed; the message has the commonest reason, the table all of them."""
+    """Every row of a table failed; the message gives the most frequent reason, the table all of them."""
 
 
 class WorkersLost(FlybystabError, RuntimeError):
-    """Worker processes have died; finished results are kept."""
+    """Worker processes ended unexpectedly; finished results are kept."""
 
 
 class OutputFailed(FlybystabError, OSError):
-    """A result file could not be written in the middle of a run; the message says which results are kept, and where."""
+    """A result file could not be written during a run; the message names the results that are kept, and their files."""

@@ -1,7 +1,7 @@
 """Reading files that a user supplies: size and nesting are limited before anything is parsed.
 
-Every reader of a user's file goes through this module, so that one place decides what is too large and every refusal
-names the limit::
+Every reader of a user's file goes through this module, so that the limits are in one place and every
+error names them::
 
     text = read_text(path, "catalogue file")          # decompresses gzip, at most TEXT_LIMIT bytes
     record = parse_json(text, "orbit file", path)     # nesting, digits and syntax checked
@@ -9,7 +9,7 @@ names the limit::
     for row in csv_rows(text, "catalogue file", path):
         ...
 
-The module lies below every package that reads files and imports nothing but the errors. `replace_file` writes one.
+The module lies below every package that reads files and imports errors and types alone. `replace_file` writes a file.
 """
 
 from __future__ import annotations
@@ -26,9 +26,10 @@ import tomllib
 import zlib
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 from flybystab.errors import InvalidInput
+from flybystab.typing import Document
 
 #: Largest text of one file after decompression, bytes. The MPC table of all near-Earth objects has 8 MB.
 TEXT_LIMIT = 512 * 2**20
@@ -97,7 +98,7 @@ def read_bytes(path: str | Path, what: str, limit: int = TEXT_LIMIT, kind: str =
         with file.open("rb") as raw:
             packed = raw.read(2) == b"\x1f\x8b"
             raw.seek(0)
-            stream: Any = gzip.GzipFile(fileobj=raw) if packed else raw
+            stream: IO[bytes] | gzip.GzipFile = gzip.GzipFile(fileobj=raw) if packed else raw
             parts, size = [], 0
             while part := stream.read(_CHUNK):
                 parts.append(part)
@@ -136,7 +137,7 @@ def parse_json(text: str, what: str, path: str | Path) -> Any:
         raise InvalidInput(what, path, f"a JSON document ({error})") from None
 
 
-def parse_toml(text: str, what: str, path: str | Path) -> dict[str, Any]:
+def parse_toml(text: str, what: str, path: str | Path) -> Document:
     """Content of a TOML document (limits and errors of :func:`parse_json`; keys of at most `DEPTH_LIMIT` dots)."""
     bare = _check_document(text, what, path, _STRING)
     if _KEY.search(bare):

@@ -14,7 +14,7 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from typing import Any, TextIO
+from typing import TextIO
 
 from tqdm.std import tqdm
 
@@ -76,7 +76,7 @@ class Bar:
         self._note, self._done = "", float(initial)
 
     def __call__(self, done: float, note: str = "") -> None:
-        """Show that so many parts are finished, and a note behind the numbers."""
+        """Show the number of finished parts, and a note behind it."""
         with self._lock:
             self._done, self._note = done, note
             now = time.monotonic()
@@ -113,7 +113,7 @@ class Bar:
         self._bar.n = int(self._done) if float(self._done).is_integer() else round(self._done, 2)
         self._bar.ncols = _width()
         self._bar.set_postfix_str(self._note, refresh=False)
-        self._bar.last_print_t = self._bar._time()  # without it close() takes the bar for one never shown
+        self._bar.last_print_t = self._bar._time()  # otherwise close() treats the bar as never shown
 
     def text(self, done: float, note: str, seconds: float, width: int = 0) -> str:
         """One line: with a bar and as wide as `width` if it is positive."""
@@ -155,7 +155,9 @@ class Bar:
 
 
 @contextmanager
-def progress_bar(asked: Any, total: int, unit: str, title: str = "") -> Iterator[Callable[[float], None]]:
+def progress_bar(
+    asked: Progressing, total: int, unit: str, title: str = ""
+) -> Iterator[Callable[[float], None]]:
     """A function that takes the number of finished parts, for the argument ``progress`` of a calculation.
 
     Parameters
@@ -188,8 +190,8 @@ def progress_bar(asked: Any, total: int, unit: str, title: str = "") -> Iterator
         bar.close()
 
 
-def check_progress(asked: Any) -> None:
-    """Refuse anything but the values of :data:`Progressing`.
+def check_progress(asked: object) -> None:
+    """Check that the argument ``progress`` is one of :data:`Progressing`.
 
     Raises
     ------
@@ -201,19 +203,19 @@ def check_progress(asked: Any) -> None:
         raise InvalidInput("progress", asked, "True, False, None or a function of (done, total)")
 
 
-def draws(stream: Any) -> bool:
-    """Whether a stream shows bars: a terminal, or the standard error of a notebook."""
+def draws(stream: object) -> bool:
+    """True if bars can be drawn on a stream: a terminal, or the standard error of a notebook."""
     terminal = bool(getattr(stream, "isatty", lambda: False)())
     return terminal or (stream is sys.stderr and in_notebook())
 
 
 def _width() -> int:
-    """Columns of the terminal less one; 79 where it does not say."""
+    """Columns of the terminal less one; 79 if the number is unknown."""
     return shutil.get_terminal_size().columns - 1
 
 
 def in_notebook() -> bool:
-    """Whether Python runs in the kernel of a notebook."""
+    """True if Python runs in the kernel of a notebook."""
     if "IPython" not in sys.modules:
         return False
     shell = sys.modules["IPython"].get_ipython()
@@ -221,5 +223,5 @@ def in_notebook() -> bool:
 
 
 def _outermost() -> bool:
-    """Whether this is the main thread of the first process: others would write into its bar."""
+    """True in the main thread of the main process: others would write into its bar."""
     return threading.current_thread() is threading.main_thread() and multiprocessing.parent_process() is None

@@ -317,7 +317,7 @@ def _parquet_about(schema: Schema) -> Document:
 
 
 def _saved(file: Path) -> bool:
-    """Whether a Parquet file was written by save(), not row by row by a command."""
+    """True for a Parquet file of save(); commands write theirs row by row."""
     return {"columns", "meta"} == set(_parquet_about(saving.pyarrow().parquet.read_schema(file)))
 
 

@@ -1,7 +1,7 @@
 """Results as data: tables with units, data frames, dictionaries, files, HTML and plots, by mixins.
 
 :class:`Tabular` is for results with one row per time, sample or point of a grid, :class:`Record` for single ones,
-:class:`Collection` for those that consist of several rows and of more.
+:class:`Collection` for those with several rows and further content.
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ DIGITS = 8
 
 
 class Results:
-    """What both mixins share: all that follows from columns and metadata."""
+    """Base of the mixins: methods that follow from columns and metadata."""
 
     #: Columns that a notebook shows; by default the first ten.
     _shown: ClassVar[tuple[str, ...]] = ()
@@ -101,7 +101,7 @@ class Results:
         return saving.save_columns(path, columns, {**meta, **self._stored_with()}, overwrite)
 
     def _stored_with(self) -> Document:
-        """Metadata of files only: what :meth:`read` needs beyond the table."""
+        """Metadata of files alone, which :meth:`read` needs beyond the table."""
         raise NotImplementedError
 
     @classmethod
@@ -250,7 +250,7 @@ class Tabular(Results):
         return cls(**values)
 
     def to_xarray(self) -> Dataset:
-        """The same as an xarray data set with named dimensions (extra ``xarray``); units are attributes."""
+        """The result as an xarray data set with named dimensions (extra ``xarray``); units are attributes."""
         grid = self._grid()
         arrays, along, rest = self._parts()
         variables = {name: ([name], value) for name, value in along.items()}
@@ -284,7 +284,7 @@ class Record(Results):
 
 
 class Collection(Record):
-    """Mixin of a result that consists of several rows and of more: its table has one row for each part."""
+    """Mixin of a result with several rows and further content: its table has one row for each part."""
 
     def _rows(self) -> Mapping[str, Any]:
         """Columns of the table."""

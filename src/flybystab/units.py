@@ -9,6 +9,7 @@ import astropy.units as u
 import numpy as np
 from astropy.time import Time
 from astropy.units import Quantity
+from numpy.typing import ArrayLike
 
 from flybystab.constants import R_EARTH
 from flybystab.errors import InvalidInput, UnitMismatch
@@ -82,8 +83,8 @@ def to_si(
     return float(array) if shape == () else array
 
 
-def whole(value: Any, name: str, least: int) -> int:
-    """A whole number of at least `least`.
+def whole(value: object, name: str, least: int) -> int:
+    """The value as an int; it must be a whole number of at least `least`.
 
     Raises
     ------
@@ -108,7 +109,7 @@ DATES = "a date such as 2029-04-13, 2029-Apr-13 21:46, 2029-04 or JD 2462240.4, 
 
 
 def parsed_time(text: str) -> Time:
-    """The time that a text gives, TDB if it does not end in another scale.
+    """The time of a text, in TDB if it does not end in another scale.
 
     Dates with months as numbers or names (2029-04-13, 2029-Apr-13), with decimals of the day or a time of day, a
     month or a year alone (its beginning), and Julian dates after "JD".
@@ -133,8 +134,10 @@ def parsed_time(text: str) -> Time:
     return time + float(found["part"]) * u.d if found["part"] else time
 
 
-def checked_time(value: Any, name: str) -> Time:
-    """One astropy Time that converts to TDB without tables of the Earth's rotation; text as in :func:`parsed_time`.
+def checked_time(value: object, name: str) -> Time:
+    """The time given, as an astropy Time that converts to TDB without tables of the Earth's rotation.
+
+    Text is read as in :func:`parsed_time`.
 
     Raises
     ------
@@ -155,14 +158,14 @@ def checked_time(value: Any, name: str) -> Time:
     return value
 
 
-def brief(value: Any, unit: u.UnitBase | None = None) -> str:
+def brief(value: Quantity, unit: u.UnitBase | None = None) -> str:
     """A quantity in few characters, for one-line descriptions of objects: ``14030 km``, ``1 x 2 m``."""
     quantity = value if unit is None else value.to(unit)
     numbers = " x ".join(f"{x:.0f}" if 1e4 <= abs(x) < 1e7 else f"{x:.4g}" for x in np.ravel(quantity.value))
     return f"{numbers} {quantity.unit.to_string()}".replace(" / ", "/").rstrip()
 
 
-def counted(names: Any) -> str:
+def counted(names: ArrayLike) -> str:
     """Number of occurrences of each name, most frequent first: ``12 INTACT, 3 RESHAPED``."""
     kinds, counts = np.unique(np.asarray(names), return_counts=True)
     return ", ".join(f"{counts[k]} {kinds[k]}" for k in np.argsort(-counts, kind="stable"))

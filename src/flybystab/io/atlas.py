@@ -13,7 +13,6 @@ import shutil
 import unicodedata
 from importlib import resources
 from pathlib import Path
-from typing import Any
 
 import astropy.units as u
 import jinja2
@@ -31,6 +30,7 @@ from flybystab.saving import csv_text
 from flybystab.screening.columns import VERDICTS, share_of
 from flybystab.screening.results import read_results
 from flybystab.screening.tables import write_table
+from flybystab.typing import Document
 
 #: Columns of the list, and whether they hold numbers.
 COLUMNS = (
@@ -79,14 +79,14 @@ def atlas(
     title : str, optional
         Heading of the list.
     overwrite : bool
-        Replace an atlas that is there.
+        Replace an existing atlas.
     progress : bool or function, optional
-        Whether to show a bar (:mod:`flybystab.progress`); after two seconds on a terminal by default.
+        Progress bar (:mod:`flybystab.progress`); by default after two seconds on a terminal.
 
     Raises
     ------
     InvalidInput
-        The folder holds something else, the file cannot be read, or the table has no encounters or is no table of
+        The folder holds other files, the file cannot be read, or the table has no encounters or is no table of
         encounters.
     """
     table = results if isinstance(results, QTable) else read_results(results)
@@ -104,7 +104,7 @@ def atlas(
     table = table[np.argsort(np.nan_to_num(table["jd_tdb"].to_value(u.d), nan=np.inf), kind="stable")]
     place = _empty_folder(Path(folder), overwrite)
     entries = [_entry(table[k], k) for k in range(len(table))]
-    by_name: dict[str, list[dict[str, Any]]] = {}
+    by_name: dict[str, list[Document]] = {}
     for entry in entries:
         by_name.setdefault(entry["label"], []).append(entry)
     document = table_document(table)
@@ -177,7 +177,7 @@ def _templates() -> jinja2.Environment:
     )
 
 
-def _index(pages: jinja2.Environment, table: QTable, entries: list[dict[str, Any]], title: str) -> str:
+def _index(pages: jinja2.Environment, table: QTable, entries: list[Document], title: str) -> str:
     dates = [e["date"] for e in entries if e["date"]]
     asteroids = len({e["label"] for e in entries})
     settings = table.meta.get("settings", {})
@@ -209,11 +209,11 @@ def _index(pages: jinja2.Environment, table: QTable, entries: list[dict[str, Any
     )
 
 
-def _plain_text(value: Any) -> str:
+def _plain_text(value: object) -> str:
     return value if isinstance(value, str) else json.dumps(plain(value), ensure_ascii=False)
 
 
-def _entry(row: Row, position: int) -> dict[str, Any]:
+def _entry(row: Row, position: int) -> Document:
     """All values of one encounter that the pages show."""
     name, verdict = str(row["asteroid"]), str(row["verdict"])
     when = str(row["time_tdb"])[:16].replace("T", " ")
@@ -227,7 +227,7 @@ def _entry(row: Row, position: int) -> dict[str, Any]:
     file = f"{position:05d}-{slug.strip('-')[:40] or 'asteroid'}-{when[:10] or 'undated'}"
     number = int(row["number"]) if "number" in row.colnames else -1
     shares = [(str(v), float(row[share_of(v)]), COLOURS[v]) for v in VERDICTS if _number(row[share_of(v)])]
-    entry: dict[str, Any] = {
+    entry: Document = {
         "label": name,
         "text": f"{name} {number if number >= 0 else ''} {planet} {verdict}".lower(),
         "planet": planet,
@@ -259,7 +259,7 @@ def _entry(row: Row, position: int) -> dict[str, Any]:
     return entry
 
 
-def _number(value: Any, unit: u.UnitBase | None = None) -> float | None:
+def _number(value: u.Quantity | float, unit: u.UnitBase | None = None) -> float | None:
     """A finite number in a unit; None otherwise."""
     number = (
         float(value.to_value(unit)) if unit is not None and isinstance(value, u.Quantity) else float(value)
@@ -270,7 +270,7 @@ def _number(value: Any, unit: u.UnitBase | None = None) -> float | None:
 def _margin_text(row: Row, margin: float | None, verdict: str) -> str:
     if margin is None:
         return "none suffices" if verdict and float(row["margin"].value) == -np.inf else ""
-    if verdict == Verdict.NOT_IN_EQUILIBRIUM:  # the body has none before the encounter
+    if verdict == Verdict.NOT_IN_EQUILIBRIUM:  # there is no margin before the encounter
         return ""
     return ("≥ " if str(row["decided_by"]) == "bound" else "") + f"{margin:.2f}"
 
@@ -344,7 +344,7 @@ def _forces(text: str) -> list[tuple[str, str]]:
     return [(labels.get(kind, kind), ", ".join(names)) for kind, names in groups.items()]
 
 
-def _csv(rows: list[dict[str, Any]]) -> str:
+def _csv(rows: list[Document]) -> str:
     """Rows as CSV; a missing value is empty."""
     names = list(dict.fromkeys(k for row in rows for k in row))
     cells = ([row.get(k) for k in names] for row in rows)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from importlib import resources
-from typing import Any
 
 from astropy.table import QTable
 
@@ -48,7 +47,7 @@ BY_KEY = {
 ORBIT = ("ReinLiu2012", "ReinSpiegel2015")
 
 
-def cite(result: FlybyResult | QTable | Mapping[str, Any] | None = None) -> str:
+def cite(result: FlybyResult | QTable | Mapping[str, object] | None = None) -> str:
     """BibTeX of the methods and data, as one text.
 
     Parameters
@@ -65,12 +64,12 @@ def cite(result: FlybyResult | QTable | Mapping[str, Any] | None = None) -> str:
     return "\n\n".join(BIBTEX[key] for key in cited(result))
 
 
-def cited(result: FlybyResult | QTable | Mapping[str, Any] | None = None) -> tuple[str, ...]:
+def cited(result: FlybyResult | QTable | Mapping[str, object] | None = None) -> tuple[str, ...]:
     """Keys of the entries of :func:`cite`, in the order of :data:`BIBTEX`."""
     if result is None:
         return tuple(BIBTEX)
     if isinstance(result, FlybyResult):
-        document: Mapping[str, Any] = flyby_document(result)
+        document: Mapping[str, object] = flyby_document(result)
     elif isinstance(result, QTable):
         document = table_document(result)
     elif isinstance(result, Mapping):
@@ -90,7 +89,7 @@ def cited(result: FlybyResult | QTable | Mapping[str, Any] | None = None) -> tup
     return tuple(key for key in BIBTEX if key in found)
 
 
-def _entries(value: Any, key: str = "") -> list[tuple[str, Any]]:
+def _entries(value: object, key: str = "") -> list[tuple[str, object]]:
     """Every key with its value, at any depth; the entries of a list have its key."""
     if isinstance(value, Mapping):
         return [e for k, v in value.items() for e in [(str(k), None), *_entries(v, str(k))]]

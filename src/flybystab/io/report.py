@@ -73,7 +73,7 @@ def report(
     ----------
     asteroid : Asteroid
     result : FlybyResult
-        Its flyby on its real orbit, with history.
+        Flyby of the asteroid on its real orbit, with history.
     sample : SpinSample
         The same encounter at other attitudes.
     path : str or Path

@@ -21,6 +21,7 @@ from flybystab.errors import InvalidInput, UnknownName
 from flybystab.files import DOCUMENT_LIMIT, parse_toml, read_text
 from flybystab.orbit.planets import planet
 from flybystab.plots.formats import FIGURES, FILMS
+from flybystab.typing import Document
 from flybystab.units import DATES, parsed_time, to_si
 
 #: Allowed keys of each table.
@@ -93,12 +94,12 @@ def scenario(path: str | Path) -> Scenario:
     return Scenario(title, body, encounter, attitude, figure, number, piles, shape)
 
 
-def quantity(value: Any, name: str) -> Quantity:
+def quantity(value: object, name: str) -> Quantity:
     """A quantity from text such as ``"6 h"``, ``"2.2 R_earth"`` or ``"1400, 850, 750 m"``."""
     if not isinstance(value, str):
         raise InvalidInput(name, value, 'text with a unit, for example "6 h"')
     text = value.strip()
-    scale: Any = 1.0
+    scale: Quantity | float = 1.0
     head, mark, where = text.rpartition("R_")
     if mark:  # in radii of a planet
         text, scale = head, planet(where).radius * u.m
@@ -115,7 +116,7 @@ def quantity(value: Any, name: str) -> Quantity:
         ) from None
 
 
-def _check(section: dict[str, Any], table: str) -> None:
+def _check(section: Document, table: str) -> None:
     for key in section:
         if key not in KEYS[table]:
             where = f"key in [{table}]" if table else "table"
@@ -123,13 +124,13 @@ def _check(section: dict[str, Any], table: str) -> None:
             raise UnknownName(where, key, near, f"(known: {', '.join(KEYS[table])})")
 
 
-def _need(section: dict[str, Any], table: str, key: str) -> Any:
+def _need(section: Document, table: str, key: str) -> Any:
     if key not in section:
         raise InvalidInput(f"{table}.{key}", "(missing)", f"a value for {key} in [{table}]")
     return section[key]
 
 
-def _typed(section: dict[str, Any], table: str, key: str, kind: type, default: Any) -> Any:
+def _typed(section: Document, table: str, key: str, kind: type, default: Any) -> Any:
     """A value that is not a quantity, with its TOML type checked: the text ``"no"`` is not false."""
     if key not in section:
         return default
@@ -147,7 +148,7 @@ def _typed(section: dict[str, Any], table: str, key: str, kind: type, default: A
     return value
 
 
-def _material(section: dict[str, Any]) -> Material:
+def _material(section: Document) -> Material:
     kinds = {"dilatancy": float, "yield_surface": str, "brittle": bool}
     plain = {k: _typed(section, "material", k, kinds[k], None) for k in section if k in kinds}
     units = {
@@ -156,7 +157,7 @@ def _material(section: dict[str, Any]) -> Material:
     return Material(**plain, **units)
 
 
-def _shape(section: dict[str, Any], folder: Path) -> Shape | None:
+def _shape(section: Document, folder: Path) -> Shape | None:
     """The polyhedral shape of a scenario; its file is relative to that of the scenario."""
     name = _typed(section, "body", "shape", str, None)
     unit = _typed(section, "body", "shape_unit", str, None)
@@ -165,7 +166,7 @@ def _shape(section: dict[str, Any], folder: Path) -> Shape | None:
     return None if name is None else Shape.read(folder / name, unit=length_unit(unit, "body.shape_unit"))
 
 
-def _body(section: dict[str, Any], material: Material, shape: Shape | None) -> tuple[Asteroid | None, Body]:
+def _body(section: Document, material: Material, shape: Shape | None) -> tuple[Asteroid | None, Body]:
     if "asteroid" in section:
         extra = sorted(set(section) - {"asteroid", "phase", "shape", "shape_unit"})
         if extra:
@@ -191,7 +192,7 @@ def _body(section: dict[str, Any], material: Material, shape: Shape | None) -> t
     )
 
 
-def _phase(section: dict[str, Any]) -> float:
+def _phase(section: Document) -> float:
     phase = _typed(section, "body", "phase", float, 0.0)
     if not np.isfinite(phase):
         raise InvalidInput("body.phase", phase, "a finite number")
@@ -203,7 +204,7 @@ _SCRIPTED = ("periapsis", "v_inf", "j2")
 _REAL = ("asteroid", "date", "ephemeris")
 
 
-def _encounter(section: dict[str, Any], asteroid: Asteroid | None) -> Encounter:
+def _encounter(section: Document, asteroid: Asteroid | None) -> Encounter:
     where = _typed(section, "encounter", "planet", str, "earth")
     options = {
         k: quantity(section[k], f"encounter.{k}") for k in ("start_distance", "settle") if k in section
@@ -236,7 +237,7 @@ def _encounter(section: dict[str, Any], asteroid: Asteroid | None) -> Encounter:
 
 
 def _attitude(
-    section: dict[str, Any], body: dict[str, Any], asteroid: Asteroid | None, encounter: Encounter
+    section: Document, body: Document, asteroid: Asteroid | None, encounter: Encounter
 ) -> np.ndarray:
     if "euler_zxz" in section:
         if "turn" in section:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import json
 from importlib import resources
-from typing import Any
 
 from flybystab.errors import UnknownName
+from flybystab.typing import Document
 
 #: Kinds of document.
 NAMES = (
@@ -14,7 +14,7 @@ NAMES = (
 )  # fmt: skip
 
 
-def schema(name: str) -> dict[str, Any]:
+def schema(name: str) -> Document:
     """JSON schema of a kind of document.
 
     Parameters
@@ -31,7 +31,7 @@ def schema(name: str) -> dict[str, Any]:
     if kind not in NAMES:
         raise UnknownName("schema", name, [], f"(known: {', '.join(NAMES)})")
     text = resources.files("flybystab.io").joinpath("schema", f"{kind}.json").read_text(encoding="utf-8")
-    found: dict[str, Any] = json.loads(text)
+    found: Document = json.loads(text)
     if version and found["properties"]["schema"]["const"] != name:
         raise UnknownName("schema", name, [found["properties"]["schema"]["const"]], "")
     return found

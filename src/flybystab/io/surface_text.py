@@ -2,22 +2,21 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import astropy.units as u
 import numpy as np
 
 from flybystab.body.surface_history import SurfaceHistory
 from flybystab.body.surface_slope import SurfaceSlopes
+from flybystab.typing import Document
 
-#: Angle of repose for which shares of the area are stated.
+#: Angle of repose for which fractions of the area are given.
 REPOSE = 35 * u.deg
 #: Rises of the slope for which shares of the area are stated, deg.
 RISES = (0.5, 1.0, 2.0)
 
 
 def surface_rows(surface: SurfaceHistory) -> list[tuple[str, str]]:
-    """Labels and texts of a surface through an encounter."""
+    """Labels and values of the slopes of a surface through an encounter."""
     before = surface.slope[0].to_value(u.deg)
     pressing = -surface.outward.value
     shape = surface.shape
@@ -54,8 +53,8 @@ def surface_lines(surface: SurfaceHistory) -> list[str]:
     ]
 
 
-def surface_document(surface: SurfaceHistory) -> dict[str, Any]:
-    """The same as part of a document."""
+def surface_document(surface: SurfaceHistory) -> Document:
+    """Part of a JSON document."""
     past = surface.share_past(REPOSE)
     return {
         "facets": len(surface.shape.facets),
@@ -72,8 +71,8 @@ def surface_document(surface: SurfaceHistory) -> dict[str, Any]:
     }
 
 
-def extra(surface: SurfaceHistory | None) -> dict[str, Any]:
-    """Further keys of the document of a flyby."""
+def extra(surface: SurfaceHistory | None) -> Document:
+    """Entries that a surface adds to the document of a flyby."""
     return {} if surface is None else {"surface": surface_document(surface)}
 
 
@@ -87,8 +86,8 @@ def slopes_text(slopes: SurfaceSlopes) -> str:
     )
 
 
-def slopes_document(slopes: SurfaceSlopes) -> dict[str, Any]:
-    """The same as part of a document."""
+def slopes_document(slopes: SurfaceSlopes) -> Document:
+    """Part of a JSON document."""
     return {
         "facets": len(slopes.slope),
         "slope_deg": _quantiles(slopes.slope.value, slopes.area.value),

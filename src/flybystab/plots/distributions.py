@@ -28,13 +28,13 @@ if TYPE_CHECKING:
 
 
 def slope_plot(axes: Axes, slopes: SurfaceSlopes) -> Axes:
-    """Plot the share of the area that is steeper than each slope."""
+    """Plot the fraction of the area that is steeper than each slope."""
     _area_above(axes, slopes.slope, slopes.area, BLUE, "-", None)
     return _slope_axes(axes)
 
 
 def slope_change_plot(axes: Axes, change: SlopeChange) -> Axes:
-    """Plot the share of the area that is steeper than each slope before an encounter, and at its greatest slope."""
+    """Plot the fraction of the area steeper than each slope, before an encounter and at most during it."""
     _area_above(axes, change.before, change.area, BLACK, "--", "before the encounter")
     _area_above(axes, change.greatest, change.area, RED, "-", "greatest during it")
     axes.legend()
@@ -118,7 +118,7 @@ def _ellipse_points(plane: LinearPlane, sigmas: float) -> Array:
 
 
 def push_plot(axes: Axes, found: Push) -> Axes:
-    """Plot the kinetic energy that a perturbation has lost against its strain: two expansions and the whole path."""
+    """Plot the kinetic energy lost by a perturbation against its strain: two expansions and the whole path."""
     for values, name, colour, line in (
         (found.loss.second, "to second order", BLUE, ":"),
         (found.loss.third, "to third order", ORANGE, "--"),
@@ -148,7 +148,7 @@ def forecast_plot(axes: Axes, forecast: SpinForecast) -> Axes:
 
 
 def binary_plot(axes: Axes, sample: BinarySample) -> Axes:
-    """Plot eccentricity against semi-major axis of the mutual orbits that stay bound; the rest is in the legend."""
+    """Plot eccentricity against semi-major axis of the mutual orbits that stay bound; the legend counts the others."""
     bound = sample.fate == "bound"
     axes.plot(
         sample.semi_major_axis[bound].to_value(u.km), sample.eccentricity[bound], "o", color=BLUE, ms=3,
@@ -163,7 +163,7 @@ def binary_plot(axes: Axes, sample: BinarySample) -> Axes:
 
 
 def grains_outcome_plot(axes: Axes, outcome: GrainsOutcome) -> Axes:
-    """Plot the mass of the largest clump, and of all that is bound to it, of every pile."""
+    """Plot the mass fractions of the largest clump, and of all grains bound to it, of each pile."""
     largest = np.array([run.largest_fraction for run in outcome.runs])
     bound = np.array([run.bound_fraction for run in outcome.runs])
     order = np.argsort(largest)
@@ -177,7 +177,7 @@ def grains_outcome_plot(axes: Axes, outcome: GrainsOutcome) -> Axes:
 
 
 def grains_course_plot(axes: Axes, course: GrainsCourse) -> Axes:
-    """Plot the mass of the largest clump, and of all that is bound to it, against time."""
+    """Plot the mass fractions of the largest clump, and of all grains bound to it, against time."""
     t = course.time.to_value(u.h)
     axes.plot(t, course.bound_fraction, color=ORANGE, ls="--", label="bound to it")
     axes.plot(t, course.largest_fraction, color=BLUE, label="largest clump")
@@ -187,7 +187,7 @@ def grains_course_plot(axes: Axes, course: GrainsCourse) -> Axes:
 
 
 def requirements_plot(axes: Axes, found: Requirements) -> Axes:
-    """Plot the share of the samples that stand at each friction angle."""
+    """Plot the fraction of the samples that are in equilibrium at each friction angle."""
     phi = np.sort(found.friction_angle.to_value(u.deg))
     share: Array = (np.arange(len(phi)) + 1.0) / len(phi)
     finite = np.isfinite(phi)

@@ -72,7 +72,7 @@ def distance_plot(axes: Axes, history: History, encounter: Encounter) -> Axes:
 def friction_plot(axes: Axes, history: History, limit: u.Quantity, *, regimes: bool = True) -> Axes:
     """Plot the mobilised friction angle against time, with the friction angle of the material.
 
-    Without `regimes` the shading of plastic flow is not in the legend; so in the two functions below.
+    Without `regimes` the shading of plastic flow has no entry in the legend.
     """
     phi = history.required_friction_angle.to_value(u.deg)
     axes.plot(_hours(history), np.where(np.isfinite(phi), phi, np.nan), color=RED, label="mobilised")

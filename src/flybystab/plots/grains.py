@@ -1,7 +1,7 @@
 """Figures of a pile of grains in an encounter: grains at one time, the largest clump against time, an animation.
 
 Grains are drawn to scale in the plane of the orbit, seen from the direction of the orbital angular momentum. The colour
-is that of the clump to which a grain belongs at the end; grains that belong to none are grey.
+is that of the clump to which a grain belongs at the end; grains of no clump are grey.
 """
 
 from __future__ import annotations
@@ -37,17 +37,18 @@ LOOSE = "0.7"
 def grains_plot(
     axes: Axes, run: GrainsRun, row: int, turn: Array | None = None, reach: float | None = None
 ) -> Axes:
-    """Grains of a run at one row of its course, km.
+    """Plot the grains of a run at one time, km.
 
     Parameters
     ----------
     axes : matplotlib Axes
     run : GrainsRun
     row : int
+        Index of the time in its course.
     turn : ndarray (3, 3), optional
-        Frame of the encounter -> frame of the picture.
+        Rotation matrix, frame of the encounter -> frame of the figure.
     reach : float, optional
-        Half of the picture's width, km; by default all clumps are in it.
+        Half of the width of the axes, km; by default they hold all clumps.
     """
     x = run.course.positions[row].to_value(u.km) @ (np.eye(3) if turn is None else turn).T
     r = run.radius.to_value(u.km)
@@ -75,7 +76,7 @@ def grains_plot(
 def grains_scene_plot(
     axes: Axes, result: FlybyResult, magnification: float | None = None, places: int = 7
 ) -> Axes:
-    """Planet, path and the pile with the median outcome at several times, in the plane of the orbit, 1000 km.
+    """Plot planet, path and the pile with the median outcome at several times, in the plane of the orbit, 1000 km.
 
     The direction of motion at periapsis points to the right, periapsis lies above the planet.
 
@@ -83,9 +84,9 @@ def grains_scene_plot(
     ----------
     axes : matplotlib Axes
     result : FlybyResult
-        Of grains.
+        Computed with grains.
     magnification : float, optional
-        Of the pile; by default such that neighbours do not touch.
+        Scale factor of the pile; by default such that neighbours do not touch.
     places : int
         Number of times, evenly along the nearest part of the path.
     """
@@ -142,7 +143,7 @@ def grains_figure(
     Parameters
     ----------
     result : FlybyResult
-        Of grains.
+        Computed with grains.
     title : str
     path : str or Path, optional
         File to write.
@@ -201,7 +202,7 @@ def grains_animation(
     *,
     progress: Progressing = None,
 ) -> Path:
-    """An animation of the pile with the median outcome, as GIF or MP4; `progress` as in :func:`flybystab.flyby`."""
+    """Write an animation of the pile with the median outcome, GIF or MP4; `progress` as in :func:`flybystab.flyby`."""
     from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
 
     target = Path(path)

@@ -47,7 +47,7 @@ def label_points(
     others : array_like, shape (n, 2), optional
         Other points that labels should not cover if possible.
     **text
-        Of the text, e.g. ``fontsize``.
+        Text properties of matplotlib, e.g. ``fontsize``.
 
     Returns
     -------

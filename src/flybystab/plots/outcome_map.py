@@ -100,7 +100,7 @@ def target_plot(axes: Axes, target: TargetMap) -> Axes:
 
 
 def verdict_points(axes: Axes, b: Quantity, verdict: Sequence[str], radius: Quantity | None = None) -> Axes:
-    """Points (n, 2) of a target plane, shaded by verdict; the impact disc of that radius, if given."""
+    """Plot points (n, 2) of a target plane, shaded by verdict, and the disc of impacts if its radius is given."""
     points = b.to_value(u.km)
     names = np.asarray(verdict, dtype=str)
     for name in (n for n in _ORDER if n in names):

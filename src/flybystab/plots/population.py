@@ -150,7 +150,7 @@ def contributor_plot(axes: Axes, result: DisruptionRates, names: Sequence[str] |
     axes : matplotlib Axes
     result : DisruptionRates
     names : sequence of str, optional
-        Of the rows of the population; their numbers by default.
+        Names of the rows of the population; their numbers by default.
 
     Raises
     ------

@@ -48,10 +48,10 @@ def plot_result(
     Parameters
     ----------
     result
-        A result of an encounter, of many, or of a map.
+        Result of an encounter, of several, or of a map.
     axes : matplotlib Axes, or four of them for a :class:`FlybyResult`
     options
-        Of the figure: `what` for a history ("semi-axes", "spin" or "friction angle" with `limit`).
+        Options of the figure: `what` for a history ("semi-axes", "spin" or "friction angle" with `limit`).
 
     Returns
     -------
@@ -148,7 +148,7 @@ def _(result: DisruptionRates, axes: Axes) -> Axes:
     return verdict_plot(axes, result)
 
 
-#: Results whose figure needs nothing but the result.
+#: Figures without options, by class of result.
 _DISTRIBUTIONS: Mapping[type, Callable[[Axes, Any], Axes]] = {
     SurfaceSlopes: distributions.slope_plot,
     SlopeChange: distributions.slope_change_plot,

@@ -1,7 +1,7 @@
 """Path and body in three dimensions: figure and animation.
 
 The planet and the path have a common scale, and so do the bodies. A body of a kilometre would be a dot at the scale of
-the planet: it is magnified by a factor that is given in the picture.
+the planet: it is magnified by a factor that the title gives.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def scene_plot(
     times : Quantity (n,), optional
         From closest approach; by default seven, evenly along the nearest part of the path.
     magnification : float, optional
-        Of the body; by default such that neighbours do not touch.
+        Scale factor of the body; by default such that neighbours do not touch.
     """
     history = _history(result)
     encounter = result.encounter
@@ -115,11 +115,11 @@ def body_plot(
     axes : matplotlib Axes3D
     history : History
     row : int
-        Which time.
+        Index of the time.
     turn : ndarray (3, 3), optional
-        Frame of the encounter -> frame of the picture.
+        Rotation matrix, frame of the encounter -> frame of the figure.
     reach : float, optional
-        Half of the picture's width, km.
+        Half of the width of the axes, km.
     """
     turn = np.eye(3) if turn is None else turn
     shape = turn @ history.shape[row].to_value(u.km**2) @ turn.T
@@ -152,14 +152,14 @@ def animation(
         ``.gif``, or ``.mp4`` where ffmpeg is installed.
     title : str
     frames, rate : int
-        Number of pictures, and pictures per second.
+        Number of frames, and frames per second.
     progress : bool or function, optional
-        Whether to show a bar (:mod:`flybystab.progress`); after two seconds on a terminal by default.
+        Progress bar (:mod:`flybystab.progress`); by default after two seconds on a terminal.
 
     Raises
     ------
     InvalidInput
-        Another ending, or no ffmpeg for an ``.mp4``.
+        Another suffix, or no ffmpeg for an ``.mp4``.
     """
     from matplotlib.animation import FFMpegWriter, FuncAnimation, PillowWriter
     from matplotlib.patches import Circle

@@ -167,7 +167,7 @@ def margin_plot(axes: Axes, table: QTable, names: int = 4) -> Axes:
 
 
 def _screened(table: QTable) -> tuple[dict[str, Array], NDArray[np.bool_], NDArray[np.bool_]]:
-    """The quantities of the figures, the rows that they show, and those whose margin is a bound."""
+    """Quantities of the figures, mask of the rows shown, and mask of the rows whose margin is a bound."""
     values = {
         "distance": table["distance"].to_value(u.au),
         "rise": np.maximum(table["friction_rise"].to_value(u.deg), NOTHING),

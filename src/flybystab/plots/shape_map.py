@@ -35,24 +35,24 @@ def shape_map(
     limits: tuple[float, float] | None = None,
     cmap: str = "viridis",
 ) -> PolyCollection:
-    """A quantity on the facets that face the viewer, in orthographic projection.
+    """Plot a quantity on the facets that face the viewer, in orthographic projection.
 
     Parameters
     ----------
     axes : matplotlib Axes
     shape : Shape
     values : ndarray (f,)
-        By facet.
+        One value per facet.
     view : str
         ``"+x"``, ``"+y"`` or ``"+z"``: the axis that points to the viewer.
     limits : (float, float), optional
-        Of the colours.
+        Range of the colour scale.
     cmap : str
 
     Returns
     -------
     PolyCollection
-        For a colour bar.
+        Mappable for a colour bar.
     """
     from matplotlib import colormaps
     from matplotlib.collections import PolyCollection
@@ -61,7 +61,7 @@ def shape_map(
         raise InvalidInput("axes, view", (axes, view), f"matplotlib axes and one of {[v[0] for v in VIEWS]}")
     if np.shape(values) != (len(shape.facets),) or cmap not in colormaps:
         raise InvalidInput(
-            "values, cmap", (np.shape(values), cmap), "one value a facet and the name of a colour map"
+            "values, cmap", (np.shape(values), cmap), "one value per facet and the name of a colour map"
         )
     if limits is not None and (np.shape(limits) != (2,) or not limits[0] < limits[1]):
         raise InvalidInput("limits", limits, "two numbers, the lower first")
@@ -136,7 +136,7 @@ def surface_history_figure(
     history : SurfaceHistory
         Of :func:`flybystab.surface_history`.
     repose : Quantity
-        Angle of repose, for the share of the area that is steeper.
+        Angle of repose, for the fraction of the area that is steeper.
     figure : matplotlib Figure, optional
         To draw on; in one narrower than 6 inches the colour bars are below the maps, and the curves below each other.
 

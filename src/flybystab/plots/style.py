@@ -33,7 +33,7 @@ _style: ContextVar[str | None] = ContextVar("style", default=None)
 
 @contextmanager
 def figure_style(name: str = "default") -> Iterator[None]:
-    """Use a style for all figures that are made inside of the context.
+    """Use a style for all figures made within the context.
 
     Parameters
     ----------
@@ -87,7 +87,7 @@ NARROW = 6.0
 def new_figure(
     width: float, height: float, dpi: float | None = None, layout: Layout | None = "constrained"
 ) -> Figure:
-    """A figure of a size in inches, scaled by the style, that is drawn without a window."""
+    """A figure of a given size in inches, scaled by the style, with a canvas that needs no window."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
 
