@@ -25,6 +25,7 @@ from flybystab.flybys.robustness import Robustness, surface_verdicts
 from flybystab.flybys.surface_change import slopes_of
 from flybystab.flybys.verdict import Verdict, letter_of, settled
 from flybystab.flybys.verdict_margins import VerdictMargins, verdict_margins
+from flybystab.saving import Columns
 from flybystab.tabular import Record
 from flybystab.typing import Array, Document
 from flybystab.units import brief
@@ -311,7 +312,7 @@ class FlybyResult(Record):
             return None
         return "path" if self.encounter.impact else "body"
 
-    def _columns(self) -> tuple[dict[str, object], dict[str, object]]:
+    def _columns(self) -> tuple[Columns, Document]:
         values = {name: getattr(self, name) for name in _COLUMNS}
         row = {
             name: value[None] if isinstance(value, Quantity) else np.asarray(value)[None]
