@@ -8,7 +8,7 @@ from scenes import PILE, R_E, earth
 
 import flybystab as fs
 from flybystab.errors import InvalidInput, UnitMismatch
-from flybystab.units import checked_time
+from flybystab.units import checked_time, number_of
 
 KMS = u.km / u.s
 GCC = u.g / u.cm**3
@@ -208,3 +208,7 @@ def test_dates_as_text(text, iso):
 def test_texts_that_are_no_dates(text):
     with pytest.raises(InvalidInput, match="a date such as 2029-04-13"):
         checked_time(text, "start")
+
+
+def test_number_of():
+    assert [number_of(n, "encounter") for n in (0, 1, 2)] == ["0 encounters", "1 encounter", "2 encounters"]

@@ -171,6 +171,11 @@ def counted(names: ArrayLike) -> str:
     return ", ".join(f"{counts[k]} {kinds[k]}" for k in np.argsort(-counts, kind="stable"))
 
 
+def number_of(count: int, noun: str) -> str:
+    """A count with its noun: ``1 encounter``, ``2 encounters``."""
+    return f"{count:d} {noun}" + ("" if count == 1 else "s")
+
+
 def frozen(value: Quantity) -> Quantity:
     """A read-only copy in the same unit, for objects that must not change."""
     copy = Quantity(value, copy=True)

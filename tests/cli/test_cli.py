@@ -91,7 +91,7 @@ def test_encounters(capsys):
     assert len(rows) == 1
     assert rows[0]["distance_km"] == pytest.approx(38011.5, abs=10)
     status, out, _ = run(capsys, "encounters", "Apophis", "--from", "2029-01-01", "--to", "2029-12-31")
-    assert "1 encounters" in out
+    assert "1 encounter within 0.05 au" in out
 
 
 def test_stability(capsys):

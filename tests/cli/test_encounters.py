@@ -81,7 +81,7 @@ def test_orbits_from_files(capsys, tmp_path):
     )
     status, out, _ = run(capsys, many, *YEAR)
     assert status == 0
-    assert "2 asteroids): 1 encounters" in out
+    assert "2 asteroids): 1 encounter within" in out
     status, _, err = run(capsys, "Toro", *YEAR, "--clones", -1)
     assert status == 2
     assert "--clones" in err

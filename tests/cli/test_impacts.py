@@ -23,7 +23,7 @@ def test_2024_yr4_and_the_moon(capsys, shared):
     assert row["v_inf_km_s"] == pytest.approx(13.9, abs=0.1)
     assert "palermo" not in row
     assert main(["impacts", file, *MOON]) == 0
-    assert "1 possible impacts on moon" in capsys.readouterr().out
+    assert "1 possible impact on moon" in capsys.readouterr().out
 
 
 def test_scales_of_bennu_in_2182():

@@ -124,7 +124,7 @@ def test_what_is_not_known_of_an_orbit_is_said():
 def test_a_clone_that_stays_away_is_judged_without_following_it():
     p = Passage(APOPHIS, "earth", Time(2462240.5, format="jd", scale="tdb"), 4.5e9, 6000.0, missed=True)
     assert np.isfinite(p.bounds()[0])
-    with pytest.raises(LookupError, match="no passage"):
+    with pytest.raises(LookupError, match="no encounter"):
         p.meet()
 
 

@@ -51,7 +51,7 @@ def test_truncation_keeps_the_shape_inside():
         ({"albedo": {"kind": "lognormal", "median": -1.0, "sigma": 1.0}}, InvalidInput, "positive scale"),
         ({"albedo": {"kind": "normal", "mean": float("nan"), "sd": 1.0}}, InvalidInput, "finite"),
         ({"replace_assumed": 1}, InvalidInput, "true or false"),
-        ({"cohesion_Pa": {"kind": "normal", "mean": 50, "sd": 50}}, InvalidInput, "low and high to cut"),
+        ({"cohesion_Pa": {"kind": "normal", "mean": 50, "sd": 50}}, InvalidInput, "low and high truncate"),
         ({"flattening": 1.2}, InvalidInput, "within"),
         ({"albedo": {"kind": "catalogue"}}, InvalidInput, "numbers of its own"),
         ({"density_by_class_kg_m3": {"S-type": 2000}}, InvalidInput, "first letters"),

@@ -330,10 +330,10 @@ def test_finished_tables_are_not_overwritten_unasked(tmp_path):
     run.run(out)
     before = out.read_bytes()
     blind = Screening(run.asteroids, run.settings, lambda a, s: pytest.fail("computed"))
-    with pytest.raises(InvalidInput, match=r"x\.ecsv: expected a file that is not there yet; --overwrite"):
+    with pytest.raises(InvalidInput, match=r"x\.ecsv: expected a file that does not exist; --overwrite"):
         blind.run(out)
     more.write_text("mine")
-    with pytest.raises(InvalidInput, match=r"y\.ecsv: expected a file that is not there yet"):
+    with pytest.raises(InvalidInput, match=r"y\.ecsv: expected a file that does not exist"):
         blind.run(tmp_path / "z.ecsv", samples_output=more)
     assert (out.read_bytes(), more.read_text()) == (before, "mine")
     assert sorted(f.name for f in tmp_path.iterdir()) == ["x.ecsv", "y.ecsv"]
@@ -501,7 +501,7 @@ def test_a_table_of_another_run_is_not_replaced_by_a_continued_one(tmp_path):
     screening(2, seed=5).run(tmp_path / "other.ecsv")
     (tmp_path / "other.ecsv").rename(out)
     before = out.read_bytes()
-    with pytest.raises(InvalidInput, match="not there yet"):
+    with pytest.raises(InvalidInput, match="does not exist"):
         run.run(out)
     assert out.read_bytes() == before
     run.run(out, overwrite=True)

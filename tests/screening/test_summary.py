@@ -38,9 +38,9 @@ def test_summary_counts_and_ranks(tmp_path):
     assert s.errors == {"NotConverged: x": 1}
     assert s.contributors == {"friction angle": 3}
     text = s.text()
-    assert "most sensitive to (passages): friction angle (3)" in text
+    assert "most sensitive to (encounters): friction angle (3)" in text
     assert "unfinished" in text
-    assert "margin -3.00 deg, 1 deg by the passage, yields in 40 % of the samples" in text
+    assert "margin -3.00 deg, 1 deg by the encounter, yields in 40 % of the samples" in text
 
 
 def test_probabilities_come_before_the_catalogue_values():

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
 
 from flybystab.cli.body_options import check_body_options
 from flybystab.cli.common import material_of, tdb
@@ -56,7 +55,7 @@ def _list(value: str | list[str] | None) -> list[str]:
     return value if isinstance(value, list) else [] if value is None else [value]
 
 
-def _dates(given: dict[str, Any]) -> None:
+def _dates(given: Mapping[str, str]) -> None:
     options = {"start": "--from", "stop": "--to", "date": "--date"}
     dates = {k: tdb(given[k], name) for k, name in options.items() if given.get(k) is not None}
     if "stop" in dates and not dates["start"] < dates["stop"]:

@@ -21,7 +21,7 @@ def arguments(sub: argparse.ArgumentParser) -> None:
         metavar="FOLDER",
         help="new folder (atlas); its index.html opens from disk",
     )
-    sub.add_argument("--overwrite", action="store_true", help="replace an atlas that is there")
+    sub.add_argument("--overwrite", action="store_true", help="replace an existing atlas")
 
 
 def run(options: argparse.Namespace) -> None:
@@ -31,6 +31,7 @@ def run(options: argparse.Namespace) -> None:
     from flybystab.errors import InvalidInput
     from flybystab.io.atlas import atlas, check_folder
     from flybystab.screening.results import FORMATS, read_results
+    from flybystab.units import number_of
 
     folder = Path(options.output)
     check_folder(folder, options.overwrite)
@@ -47,5 +48,5 @@ def run(options: argparse.Namespace) -> None:
     show(
         options,
         lambda: document("atlas", page=str(page), encounters=len(results), table=str(table)),
-        lambda: [f"{len(results)} encounters", f"table      {table}", f"page       {page}"],
+        lambda: [number_of(len(results), "encounter"), f"table      {table}", f"page       {page}"],
     )

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import argparse
 import re
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from flybystab.errors import InvalidInput
 
 if TYPE_CHECKING:
+    from astropy.units import Quantity
+
     from flybystab.catalogues.asteroid import Asteroid
     from flybystab.screening.priors import Population
 
@@ -74,7 +76,7 @@ def body_arguments(sub: argparse.ArgumentParser) -> None:
     )
     sub.add_argument("--axes", metavar="AxBxC", help="semi-axes, with errors: '200x170x150+-10 m', '0.2 km'")
     sub.add_argument("--diameter", metavar="D", help="diameter, which scales a known shape: '340+-40 m'")
-    sub.add_argument("--H", metavar="H", help="absolute magnitude, from which --assume takes a size")
+    sub.add_argument("--H", metavar="H", help="absolute magnitude, from which --assume derives a size")
     sub.add_argument("--density", metavar="RHO", help="density: '2000+-300 kg/m3', '2 g/cm3'")
     sub.add_argument("--period", metavar="P", help="spin period: '5.3+-0.1 h'")
     sub.add_argument(
@@ -83,7 +85,7 @@ def body_arguments(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
         "--assume",
         action="store_true",
-        help="take missing properties from the population of screen: its medians; in a report, samples",
+        help="take missing properties from the priors of screen: their medians, in a report samples",
     )
 
 
@@ -93,7 +95,7 @@ def check_body_options(options: argparse.Namespace) -> None:
 
 
 def _axes(text: str) -> tuple[list[float], list[float]]:
-    """Semi-axes and their errors, m; an error or unit at the end counts for all."""
+    """Semi-axes and their errors, m; an error or unit at the end applies to all."""
     parts = re.split(r"\s*[x×]\s*", text.strip())
     if len(parts) not in (1, 3):
         raise InvalidInput("--axes", text, "one or three semi-axes: '200x170x150+-10 m'")
@@ -123,7 +125,7 @@ def _given(options: argparse.Namespace) -> tuple[dict[str, str], list[str]]:
 
     row: dict[str, str] = {}
     names = []
-    sigmas: dict[str, Any] = {}
+    sigmas: dict[str, Quantity] = {}
     if getattr(options, "axes", None) is not None:
         axes, errors = _axes(options.axes)
         row |= dict(zip(SHAPE, map(repr, axes), strict=True)) | {
@@ -198,9 +200,15 @@ def population_of(options: argparse.Namespace) -> Population | None:
     from flybystab.screening.distributions import Distribution
     from flybystab.screening.priors import Population
 
-    changes: dict[str, Any] = {}
+    changes: dict[str, Distribution] = {}
     for name, key, high in (("friction", "friction_angle_deg", 89.0), ("cohesion", "cohesion_Pa", None)):
         value = getattr(options, name, None)
         if isinstance(value, Measured) and value.sigma > 0.0:
             changes[key] = Distribution("normal", mean=float(value), sd=value.sigma, low=0.0, high=high)
-    return Population(**changes) if changes else None
+    if not changes:
+        return None
+    default = Population()
+    return Population(
+        friction_angle_deg=changes.get("friction_angle_deg", default.friction_angle_deg),
+        cohesion_Pa=changes.get("cohesion_Pa", default.cohesion_Pa),
+    )

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
 
 from flybystab.cli.common import document, show
 
@@ -28,7 +27,7 @@ def run(options: argparse.Namespace) -> None:
     show(options, lambda: document("references", bibtex=entries), lambda: ["\n\n".join(entries)])
 
 
-def _result(path: str | None) -> Any:
+def _result(path: str | None) -> object:
     if path is None:
         return None
     if not path.endswith(".json"):

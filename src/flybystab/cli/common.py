@@ -9,7 +9,7 @@ import re
 import sys
 import unicodedata
 from collections.abc import Callable, Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from flybystab._version import __version__
 from flybystab.cli.body_options import cohesion, friction, with_body_options
@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from flybystab.body.body import Material
     from flybystab.catalogues.asteroid import Asteroid
     from flybystab.flybys.result import FlybyResult
+    from flybystab.typing import Document
 
 #: Yield surfaces, the default first.
 SURFACES = (DEFAULT, *(name for name in NAMES if name != DEFAULT))
@@ -82,7 +83,7 @@ def movie_argument(sub: argparse.ArgumentParser) -> None:
     sub.add_argument("--movie", metavar="FILE", help=f"also write an animation ({', '.join(FILMS)})")
 
 
-def show(options: argparse.Namespace, document: Callable[[], Any], lines: Callable[[], list[str]]) -> None:
+def show(options: argparse.Namespace, document: Callable[[], object], lines: Callable[[], list[str]]) -> None:
     """Print a result: one JSON document with ``--json``, else text."""
     if options.json:
         print(json.dumps(document(), indent=1, allow_nan=False))
@@ -90,7 +91,7 @@ def show(options: argparse.Namespace, document: Callable[[], Any], lines: Callab
         print("\n".join(_coloured(printable(line)) for line in lines()))
 
 
-def document(kind: str, **content: Any) -> dict[str, Any]:
+def document(kind: str, **content: object) -> Document:
     """Document of a kind in :data:`flybystab.io.schema.NAMES`, with its schema and the version of the package."""
     from flybystab.flybys.document import plain
 
@@ -155,7 +156,7 @@ def sampling_arguments(
 
 
 def names_a_file(word: str) -> bool:
-    """Whether an argument that may be the name of an asteroid or a file is a file.
+    """True if an argument, the name of an asteroid or of a file, is that of a file.
 
     It is one if the file exists, if it ends like a file name, or if it lies in a folder that exists. Comet
     designations such as C/2020 F3 are names.
@@ -240,7 +241,7 @@ def check_table(path: str | None, formats: tuple[str, ...] = ()) -> None:
 
 
 def grains_arguments(sub: argparse.ArgumentParser) -> None:
-    """Add the number of grains and of piles."""
+    """Add the options --grains and --piles."""
     sub.add_argument(
         "--grains", type=int, metavar="N", help="follow piles of N grains where the ellipsoid ends (500)"
     )

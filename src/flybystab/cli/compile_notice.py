@@ -22,8 +22,7 @@ def announced(stream: TextIO, *, elsewhere: bool = False) -> Iterator[None]:
     ----------
     stream : text file
     elsewhere : bool
-        Whether other processes compute: the notice is then written at once unless the cache holds a kernel of a
-        screening.
+        Other processes compute: the notice is written at once unless the cache holds a kernel of a screening.
     """
     listener = Announcement(stream)
     if elsewhere and not _cached():
@@ -36,7 +35,7 @@ def announced(stream: TextIO, *, elsewhere: bool = False) -> Iterator[None]:
 
 
 def _cached() -> bool:
-    """Whether the cache holds the first kernel of a screening, or there is no cache."""
+    """True if the cache holds the first kernel of a screening, or there is no cache."""
     from flybystab.core.ellipsoid.yield_bound import quick_margins
 
     folder = quick_margins.stats.cache_path

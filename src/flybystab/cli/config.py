@@ -21,9 +21,12 @@ import argparse
 import os
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING
 
 from flybystab.errors import WrongUsage
+
+if TYPE_CHECKING:
+    from flybystab.typing import Document
 
 VARIABLE = "FLYBYSTAB_CONFIG"
 #: Largest file, bytes.
@@ -51,7 +54,7 @@ def config_file() -> Path | None:
 
 
 def default_words(command: str, parsers: dict[str, argparse.ArgumentParser], given: list[str]) -> list[str]:
-    """Words of the command line for the defaults of a command.
+    """Arguments of the command line for the defaults of a command.
 
     Parameters
     ----------
@@ -59,7 +62,7 @@ def default_words(command: str, parsers: dict[str, argparse.ArgumentParser], giv
     parsers : dict
         Parser of every command.
     given : list of str
-        The command line: options that it has are left out.
+        The command line; defaults of options that it contains are omitted.
 
     Raises
     ------
@@ -89,7 +92,7 @@ def default_words(command: str, parsers: dict[str, argparse.ArgumentParser], giv
 
 
 def _options(*parsers: argparse.ArgumentParser) -> dict[str, argparse.Action]:
-    """Options by name without dashes; help is none."""
+    """Options by name without dashes, except --help."""
     return {
         word[2:]: action
         for parser in parsers
@@ -99,7 +102,7 @@ def _options(*parsers: argparse.ArgumentParser) -> dict[str, argparse.Action]:
     }
 
 
-def _words(path: Path, key: str, value: Any, action: argparse.Action) -> list[str]:
+def _words(path: Path, key: str, value: object, action: argparse.Action) -> list[str]:
     if action.nargs == 0:  # a switch
         if not isinstance(value, bool):
             raise WrongUsage(f"{path}: {key} = {value!r}: expected true or false")
@@ -110,7 +113,7 @@ def _words(path: Path, key: str, value: Any, action: argparse.Action) -> list[st
     return [f"--{key}={v}" for v in values]
 
 
-def _tables(path: Path) -> dict[str, Any]:
+def _tables(path: Path) -> Document:
     import tomllib
 
     from flybystab.files import read_text

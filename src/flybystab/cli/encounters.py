@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from flybystab.cli.common import catalogue_argument, check_table, names_a_file, show, span_arguments, tdb
 from flybystab.errors import WrongUsage
@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from astropy.table import QTable, Row
 
     from flybystab.catalogues.asteroid import Asteroid
+    from flybystab.encounter.distribution import EncounterDistribution
 
 HELP = "close approaches of an asteroid or of a catalogue"
 #: Number of encounters printed at most: the closest ones.
@@ -54,6 +55,7 @@ def run(options: argparse.Namespace) -> None:
     from flybystab.orbit.search.encounter_finder import find_encounters
     from flybystab.progress import Bar
     from flybystab.screening.tables import write_table
+    from flybystab.units import number_of
 
     if not options.name and not options.all:
         raise WrongUsage("NAME: expected an asteroid, or --all for the whole catalogue")
@@ -70,7 +72,7 @@ def run(options: argparse.Namespace) -> None:
         within=options.within * u.au,
         error=options.error * u.km,
         growth=not options.all,
-        progress=None if bar is None else lambda done, _, found: bar(done, f"{found} encounters"),
+        progress=None if bar is None else lambda done, _, found: bar(done, number_of(found, "encounter")),
     )
     if bar is not None:
         bar.close()
@@ -80,7 +82,7 @@ def run(options: argparse.Namespace) -> None:
         write_table(table, options.output)
     many = len(asteroids) > 1
     source = ", ".join(options.name) or options.catalogue or "embedded catalogue"
-    head = f"{len(table)} encounters within {options.within:g} au"
+    head = f"{number_of(len(table), 'encounter')} within {options.within:g} au"
     head += ", without the errors of the orbits" if options.all else ""
     show(
         options,
@@ -122,7 +124,7 @@ def _with_clones(table: QTable, asteroids: list[Asteroid], clones: int, seed: in
     from flybystab.encounter.clone_columns import add_clones
     from flybystab.encounter.distribution import distributions
 
-    found: list[Any] = [None] * len(table)
+    found: list[EncounterDistribution | None] = [None] * len(table)
     for i in np.unique(table["index"]).tolist():
         if len(asteroids) > 1 and asteroids[i].orbit.covariance is None:
             continue
@@ -135,10 +137,7 @@ def _with_clones(table: QTable, asteroids: list[Asteroid], clones: int, seed: in
 
 def _lines(table: QTable, many: bool) -> list[str]:
     """The table as text: distances, then predictability."""
-    import astropy.units as u
     import numpy as np
-
-    from flybystab.io.text import grade
 
     if not len(table):
         return []
@@ -146,47 +145,58 @@ def _lines(table: QTable, many: bool) -> list[str]:
     count = len(table)
     if count > SHOWN:
         table = table[np.sort(np.argsort(table["distance"])[:SHOWN])]
-    head = f"{'planet':8s} {'time (TDB)':19s} {'distance (km)':>16s} {'(au)':>9s} {'v_inf (km/s)':>12s} "
-    head += f"{'B.T (km)':>13s} {'B.R (km)':>13s}" + (
-        f" {'sigma (km)':>11s} {'model (km)':>11s}  predictability" if known else ""
-    )
-    if clones:
-        head = head.replace(
-            "  predictability",
-            f" {'clones (km)':>11s} {'P(impact), 95 %':>24s} {'linear':>9s}  predictability",
-        )
-    out = [(f"{'asteroid':16s} " if many else "") + head]
-    for row in table:
-        line = f"{row['asteroid'][:16]:16s} " if many else ""
-        line += (
-            f"{row['planet']:8s} {_time(row)} {row['distance'].to_value(u.km):16,.1f} "
-            f"{row['distance'].to_value(u.au):9.6f} "
-        )
-        v_inf = row["v_inf"].to_value(u.km / u.s)
-        if v_inf > 0.0:
-            line += f"{v_inf:12.4f} {row['b_t'].to_value(u.km):13,.0f} {row['b_r'].to_value(u.km):13,.0f}"
-        else:  # no asymptote and no target plane
-            line += f"{'bound':>12s} {'-':>13s} {'-':>13s}"
-        if known:
-            line += f" {row['displacement'].to_value(u.km):11.4g} {row['model_error'].to_value(u.km):11.4g}"
-        if clones:
-            odds = f"{row['p_impact']:.3g} ({row['p_impact_low']:.2g}-{row['p_impact_high']:.2g})"
-            line += f" {row['distance_sigma'].to_value(u.km):11.4g} {odds:>24s} {row['p_impact_linear']:9.2g}"
-        said = [grade(row["predictability"])] if known else []
-        if row["impact"]:
-            said.append("impact: time of entry" + _place(row))
-        out.append(f"{line}  {', '.join(said)}".rstrip())
+    out = [_head(many, known, clones), *(_line(row, many, known, clones) for row in table)]
     if any(v == 0.0 for v in table["v_inf"].value):
         out.append("bound: slower than the escape speed at closest approach, without an asymptote")
     if count > SHOWN:
         out.append(f"the closest {SHOWN} of {count}; --output FILE writes all")
+    return [*out, *_notes(table, clones)] if known else out
+
+
+def _head(many: bool, known: bool, clones: bool) -> str:
+    """Headings of the columns."""
+    head = f"{'asteroid':16s} " if many else ""
+    head += f"{'planet':8s} {'time (TDB)':19s} {'distance (km)':>16s} {'(au)':>9s} {'v_inf (km/s)':>12s} "
+    head += f"{'B.T (km)':>13s} {'B.R (km)':>13s}"
     if not known:
-        return out
-    neighbours = "; ".join(table.meta["neighbours"])
-    out.append(
-        f"sigma: displacement at the encounter of an orbit {neighbours}; "
-        "model: error by ephemeris, tolerance and forces left out"
-    )
+        return head
+    head += f" {'sigma (km)':>11s} {'model (km)':>11s}"
+    if clones:
+        head += f" {'clones (km)':>11s} {'P(impact), 95 %':>24s} {'linear':>9s}"
+    return head + "  predictability"
+
+
+def _line(row: Row, many: bool, known: bool, clones: bool) -> str:
+    """One encounter."""
+    import astropy.units as u
+
+    from flybystab.io.text import grade
+
+    line = f"{row['asteroid'][:16]:16s} " if many else ""
+    line += f"{row['planet']:8s} {_time(row)} {row['distance'].to_value(u.km):16,.1f} "
+    line += f"{row['distance'].to_value(u.au):9.6f} "
+    v_inf = row["v_inf"].to_value(u.km / u.s)
+    if v_inf > 0.0:
+        line += f"{v_inf:12.4f} {row['b_t'].to_value(u.km):13,.0f} {row['b_r'].to_value(u.km):13,.0f}"
+    else:  # no asymptote and no target plane
+        line += f"{'bound':>12s} {'-':>13s} {'-':>13s}"
+    if known:
+        line += f" {row['displacement'].to_value(u.km):11.4g} {row['model_error'].to_value(u.km):11.4g}"
+    if clones:
+        odds = f"{row['p_impact']:.3g} ({row['p_impact_low']:.2g}-{row['p_impact_high']:.2g})"
+        line += f" {row['distance_sigma'].to_value(u.km):11.4g} {odds:>24s} {row['p_impact_linear']:9.2g}"
+    remarks = [grade(row["predictability"])] if known else []
+    if row["impact"]:
+        remarks.append("impact: time of entry" + _place(row))
+    return f"{line}  {', '.join(remarks)}".rstrip()
+
+
+def _notes(table: QTable, clones: bool) -> list[str]:
+    """Explanation of the errors in the table."""
+    out = [
+        f"sigma: displacement at the encounter of an orbit {'; '.join(table.meta['neighbours'])}; "
+        "model: error by ephemeris, tolerance and omitted forces"
+    ]
     if clones:
         lost = int((table["clones"] - table["clones_found"]).max())
         out.append(

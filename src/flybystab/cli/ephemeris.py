@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
 HELP = "positions of an asteroid in the sky"
 EXAMPLE = "flybystab ephemeris Apophis --from 2029-04-10 --to 2029-04-15 --step 6h --observer 568"
-#: Most positions of one table.
+#: Largest number of positions in one table.
 LARGEST = 100_000
 _UNITS = {"d": 86400.0, "h": 3600.0, "m": 60.0, "s": 1.0}
 
@@ -35,7 +35,7 @@ def arguments(sub: argparse.ArgumentParser) -> None:
 
 
 def run(options: argparse.Namespace) -> None:
-    """Answer the command."""
+    """Execute the command."""
     from flybystab.cli.common import check_table
     from flybystab.flybys.document import table_document
     from flybystab.orbit.observation import sky_positions

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 SPAN = ("2000-01-01", "2050-01-01")
 
 
-def passage_arguments(sub: argparse.ArgumentParser) -> None:
+def encounter_arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of asteroid, encounter, material and sampled attitudes."""
     sub.add_argument(
         "name",

@@ -12,7 +12,7 @@ from flybystab.cli.common import (
     show,
     write_picture,
 )
-from flybystab.cli.flown import attitude_words, flown, passage_arguments
+from flybystab.cli.flown import attitude_words, encounter_arguments, flown
 from flybystab.cli.shape_options import check_map, map_argument, surface_of, write_map
 from flybystab.plots.formats import FIGURES, FILMS
 
@@ -22,7 +22,7 @@ EXAMPLE = "flybystab flyby Apophis --output apophis.png"
 
 def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
-    passage_arguments(sub)
+    encounter_arguments(sub)
     grains_arguments(sub)
     figure_argument(sub, films=True)
     movie_argument(sub)

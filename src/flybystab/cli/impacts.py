@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from flybystab.cli.common import catalogue_argument, check_table, dates_arguments, show, tdb
 
 if TYPE_CHECKING:
     from astropy.table import QTable
+    from astropy.time import Time
+    from astropy.units import Quantity
 
     from flybystab.catalogues.asteroid import Asteroid
 
@@ -50,6 +52,7 @@ def run(options: argparse.Namespace) -> None:
     from flybystab.encounter.virtual_impactors import virtual_impactors
     from flybystab.flybys.document import table_document
     from flybystab.screening.tables import write_table
+    from flybystab.units import number_of
 
     check_table(options.output)
     asteroid = asteroid_named(options)
@@ -74,7 +77,7 @@ def run(options: argparse.Namespace) -> None:
         options,
         lambda: table_document(table),
         lambda: [
-            f"{asteroid.label}: {len(table)} possible impacts on {table.meta['planet']}, "
+            f"{asteroid.label}: {number_of(len(table), 'possible impact')} on {table.meta['planet']}, "
             f"{options.start} to {options.stop}",
             *_lines(table),
             *(
@@ -87,7 +90,7 @@ def run(options: argparse.Namespace) -> None:
     )
 
 
-def _mass(asteroid: Asteroid, mass: float | None) -> Any:
+def _mass(asteroid: Asteroid, mass: float | None) -> Quantity | None:
     """Mass of the option or of the body in the catalogue; None where it is not known."""
     import astropy.units as u
 
@@ -103,7 +106,7 @@ def _mass(asteroid: Asteroid, mass: float | None) -> Any:
         return None
 
 
-def _add_scales(table: QTable, mass: Any, date: Any) -> None:
+def _add_scales(table: QTable, mass: Quantity, date: Time) -> None:
     """Add the energy (megatons of TNT) and the Palermo and Torino scales; the time counts from `date`."""
     import astropy.units as u
     import numpy as np

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from flybystab.cli.body_options import body_arguments
 from flybystab.cli.common import (
@@ -20,6 +20,7 @@ from flybystab.cli.shape_options import shape_arguments
 
 if TYPE_CHECKING:
     from astropy.table import QTable
+    from astropy.units import Quantity
 
     from flybystab.catalogues.asteroid import Asteroid
 
@@ -56,7 +57,7 @@ def run(options: argparse.Namespace) -> None:
 
     check_picture(options.output)
     asteroid = asteroid_of(options)
-    passages = survived(
+    encounters = survived(
         asteroid,
         tdb(options.start, "--from"),
         tdb(options.stop, "--to"),
@@ -65,7 +66,7 @@ def run(options: argparse.Namespace) -> None:
     )
     table = infer(
         asteroid,
-        passages,
+        encounters,
         attitudes=options.attitudes,
         seed=options.seed,
         yield_surface=options.surface,
@@ -134,7 +135,7 @@ def _lines(asteroid: Asteroid, table: QTable) -> list[str]:
     return lines
 
 
-def _density_bound(intervals: Any) -> str:
+def _density_bound(intervals: Quantity) -> str:
     import astropy.units as u
 
     from flybystab.body.body import DENSITY_RANGE

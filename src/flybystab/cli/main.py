@@ -52,10 +52,9 @@ def main(argv: Sequence[str] | None = None) -> int:
     warnings.filterwarnings("ignore", message=".*dubious year.*")
     try:
         check_arguments(options)
-        if (
-            "flybystab.core.numerics.compile_notice" in sys.modules
-        ):  # the notice of Python would be a second one
-            sys.modules["flybystab.core.numerics.compile_notice"].uninstall()
+        # The notice of the Python interface would repeat that of the command.
+        if (notice := sys.modules.get("flybystab.core.numerics.compile_notice")) is not None:
+            notice.uninstall()
         if options.json or options.command in ("cite", "completion"):
             _run(options)
         else:

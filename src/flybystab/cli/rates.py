@@ -3,10 +3,17 @@
 from __future__ import annotations
 
 import argparse
-from typing import Any
+from typing import TYPE_CHECKING
 
 from flybystab.cli.common import document, sampling_arguments, show, style_argument, surface_argument
 from flybystab.errors import InvalidInput
+
+if TYPE_CHECKING:
+    from astropy.table import QTable
+    from astropy.units import Quantity
+
+    from flybystab.population.rates import Orbits
+    from flybystab.typing import Document
 
 HELP = "encounter rates of a population, and the rates of the verdicts"
 EXAMPLE = "flybystab rates --planet earth --within 0.05"
@@ -65,6 +72,7 @@ def run(options: argparse.Namespace) -> None:
     import astropy.units as u
 
     from flybystab.population.rates import elements_table, encounter_rates
+    from flybystab.units import number_of
 
     orbits = elements_table(_orbits(options))
     planets = options.planet or list(PLANETS)
@@ -95,19 +103,21 @@ def run(options: argparse.Namespace) -> None:
                     "v_inf_km_s": speed,
                 }
             )
-            said = "" if speed is None else f"   v_inf {speed:.1f} km/s (mean)"
-            lines.append(f"{rates.planet.name:8s} {_interval(total)}   {int(met.sum())} orbits{said}")
+            mean = "" if speed is None else f"   v_inf {speed:.1f} km/s (mean)"
+            lines.append(
+                f"{rates.planet.name:8s} {_interval(total)}   {number_of(int(met.sum()), 'orbit')}{mean}"
+            )
         what = "encounters " + ("at the surface" if within is None else f"within {options.within:g} au")
     show(
         options,
         lambda: document("rates", source=source, orbits=count, rows=rows),
-        lambda: [f"{source} ({count} orbits): {what}", *lines],
+        lambda: [f"{source} ({number_of(count, 'orbit')}): {what}", *lines],
     )
 
 
 def _verdicts(
-    options: argparse.Namespace, orbits: Any, planets: list[str]
-) -> tuple[list[dict[str, Any]], list[str], int]:
+    options: argparse.Namespace, orbits: QTable, planets: list[str]
+) -> tuple[list[Document], list[str], int]:
     """Rows of the document, lines of the text, and the number of orbits."""
     from pathlib import Path
 
@@ -150,7 +160,7 @@ def _verdicts(
         from flybystab.screening.tables import write_table
 
         write_table(result.samples, output)
-    rows: list[dict[str, Any]] = [
+    rows: list[Document] = [
         {
             "planet": str(row["planet"]),
             "verdict": str(row["verdict"]),
@@ -166,7 +176,7 @@ def _verdicts(
     return rows, lines, len(orbits)
 
 
-def _diameter(text: str) -> Any:
+def _diameter(text: str) -> Quantity | None:
     """Diameter from the option: a number of km, or H."""
     import astropy.units as u
 
@@ -185,7 +195,7 @@ def _interval(rate: float) -> str:
     return f"{rate:9.3e} /yr   one in {1.0 / rate:.3g} yr" if rate > 0.0 else f"{rate:9.3e} /yr"
 
 
-def _orbits(options: argparse.Namespace) -> Any:
+def _orbits(options: argparse.Namespace) -> Orbits:
     """Orbits of a file: a population (table or law), or any catalogue; the known asteroids without a file."""
     from flybystab.catalogues.catalogue import catalogue
     from flybystab.population.model_population import is_population, known_population, read_population

@@ -6,7 +6,7 @@ import argparse
 
 from flybystab.cli.body_options import population_of
 from flybystab.cli.common import asteroid_of, check_picture, grains_arguments, show
-from flybystab.cli.flown import flown, passage_arguments
+from flybystab.cli.flown import encounter_arguments, flown
 from flybystab.cli.shape_options import surface_of
 
 HELP = "HTML report of one encounter"
@@ -15,7 +15,7 @@ EXAMPLE = "flybystab report Apophis --output apophis.html"
 
 def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
-    passage_arguments(sub)
+    encounter_arguments(sub)
     grains_arguments(sub)
     sub.add_argument(
         "--samples",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import argparse
 from collections import Counter
-from typing import Any
+from typing import TYPE_CHECKING
 
 from flybystab._version import __version__
 from flybystab.cli.body_options import body_arguments
@@ -19,6 +19,9 @@ from flybystab.cli.common import (
 )
 from flybystab.cli.shape_options import rest_slopes, shape_arguments
 from flybystab.errors import WrongUsage
+
+if TYPE_CHECKING:
+    from flybystab.typing import Array
 
 HELP = "equilibrium and stability of an isolated asteroid, or of a whole catalogue"
 EXAMPLE = "flybystab stability Anteros --friction 30"
@@ -163,7 +166,7 @@ def _asteroid(options: argparse.Namespace) -> None:
     )
 
 
-def _period_range(limits: Any) -> str:
+def _period_range(limits: Array) -> str:
     """Range of spin periods between the spin limits (rad/s), about the short axis."""
     import numpy as np
 

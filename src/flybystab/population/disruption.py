@@ -11,8 +11,8 @@ import hashlib
 import warnings
 from collections.abc import Iterator, Sequence
 from concurrent.futures import Executor
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
 
 import astropy.units as u
 import numpy as np
@@ -25,12 +25,13 @@ from flybystab.body.body import Material, refuse_cut_off
 from flybystab.errors import FlybystabWarning, InvalidInput
 from flybystab.flybys.verdict import Verdict
 from flybystab.orbit.planets import planet
-from flybystab.population.rates import EncounterRates, elements_table
+from flybystab.population.rates import EncounterRates, Orbits, elements_table
 from flybystab.population.sampled_encounters import LISTED_FRAGMENTS, Plan, impact_and_total, sampled
 from flybystab.population.verdict_rates import DisruptionRates
 from flybystab.progress import Progressing, progress_bar
 from flybystab.screening.journal import Journal
 from flybystab.screening.priors import Population
+from flybystab.typing import Document
 from flybystab.units import to_si, whole
 
 #: Planets that near-Earth asteroids encounter.
@@ -41,7 +42,7 @@ STRATA = 8
 
 @check_arguments
 def disruption_rates(
-    population: Any,
+    population: Orbits,
     planets: Sequence[str] = PLANETS,
     *,
     diameter: Quantity | None = 1.0 * u.km,
@@ -77,8 +78,8 @@ def disruption_rates(
     priors : flybystab.screening.priors.Population, optional
         Distributions of density, shape, spin period, friction and cohesion.
     grains : int, optional
-        Number of grains of the pile that replaces the ellipsoid where it ends (BEYOND MODEL, MASS LOSS, DISRUPTED): a
-        few seconds for each. Without it such bodies keep the verdict of the ellipsoid.
+        Number of grains of the pile that replaces the ellipsoid after the verdicts BEYOND MODEL, MASS LOSS and
+        DISRUPTED: a few seconds for each. Without it such bodies keep the verdict of the ellipsoid.
     workers : int, optional
         Number of threads; results do not depend on it.
     executor : concurrent.futures.Executor, optional
@@ -97,6 +98,42 @@ def disruption_rates(
     ------
     InvalidInput, UnitMismatch, UnknownName
     """
+    plan = _plan(population, planets, diameter, radii, samples, seed, material, priors, grains)
+    rates = {name: impact_and_total(plan, name, workers) for name in plan.planets}
+    tasks = [
+        (k, i)
+        for k, name in enumerate(plan.planets)
+        for i in range(STRATA)
+        if rates[name][0].total.value > 0.0
+    ]
+    parts: dict[tuple[int, int], QTable] = {}
+    with (
+        _journal(journal, plan) as book,
+        progress_bar(progress, len(tasks), "strata", "rates of verdicts") as tick,
+    ):
+        if book is not None:
+            parts |= {tasks[done["task"]]: _restored(done["columns"]) for done in book.tasks()}
+        todo = [(n, t) for n, t in enumerate(tasks) if t not in parts]
+        for number, task, table in _results(plan, todo, rates, workers, executor):
+            parts[task] = table
+            if book is not None:
+                book.add(number, {"columns": _stored(table)})
+            tick(len(parts))
+    return _joined(plan, rates, parts)
+
+
+def _plan(
+    population: Orbits,
+    planets: Sequence[str],
+    diameter: Quantity | None,
+    radii: float,
+    samples: int,
+    seed: int,
+    material: Material | None,
+    priors: Population | None,
+    grains: int | None,
+) -> Plan:
+    """Checked arguments of :func:`disruption_rates`."""
     size = np.nan if diameter is None else to_si(diameter, u.m, "diameter", low=0.0, open_low=True)
     limit = to_si(radii, u.dimensionless_unscaled, "radii", low=1.0, high=100.0, open_low=True)
     number, first = whole(samples, "samples", STRATA), whole(seed, "seed", 0)
@@ -108,7 +145,7 @@ def disruption_rates(
     if diameter is None and "H" not in orbits.colnames:
         raise InvalidInput("diameter", None, "a diameter, or a population with absolute magnitudes H")
     refuse_cut_off(material or Material(), "disruption_rates")
-    plan = Plan(
+    return Plan(
         orbits,
         tuple(planet(name).name for name in planets),
         tuple(1.0 + (limit - 1.0) * np.linspace(0.0, 1.0, STRATA + 1)),
@@ -119,40 +156,27 @@ def disruption_rates(
         priors or Population(),
         0 if grains is None else whole(grains, "grains", 1),
     )
-    rates = {name: impact_and_total(plan, name, workers) for name in plan.planets}
-    tasks = [
-        (k, i)
-        for k, name in enumerate(plan.planets)
-        for i in range(STRATA)
-        if rates[name][0].total.value > 0.0
-    ]
-    parts: dict[tuple[int, int], QTable] = {}
-    book = None if journal is None else Journal(Path(journal), _fingerprint(plan))
-    if book is not None and book.damaged:
-        warnings.warn(
-            f"{book.path} is damaged in {len(book.damaged)} of its lines; these strata are recomputed",
-            FlybystabWarning,
-            stacklevel=2,
-        )
+
+
+@contextmanager
+def _journal(path: str | Path | None, plan: Plan) -> Iterator[Journal | None]:
+    """The journal of a run, removed when the run ends without an error; None without a path."""
+    if path is None:
+        yield None
+        return
+    book = Journal(Path(path), _fingerprint(plan))
     try:
-        done = {record["task"]: record for record in book.tasks()} if book is not None else {}
-        for number, task in enumerate(tasks):
-            if number in done:
-                parts[task] = _restored(done[number]["columns"])
-        todo = [(n, t) for n, t in enumerate(tasks) if t not in parts]
-        with progress_bar(progress, len(tasks), "strata", "rates of verdicts") as tick:
-            for number, task, table in _results(plan, todo, rates, workers, executor):
-                parts[task] = table
-                if book is not None:
-                    book.add(number, {"columns": _stored(table)})
-                tick(len(parts))
+        if book.damaged:
+            warnings.warn(
+                f"{book.path} is damaged in {len(book.damaged)} of its lines; these strata are recomputed",
+                FlybystabWarning,
+                stacklevel=5,
+            )
+        yield book
     except BaseException:
-        if book is not None:
-            book.close()
+        book.close()
         raise
-    if book is not None:
-        book.close(remove=True)
-    return _joined(plan, rates, parts)
+    book.close(remove=True)
 
 
 def _results(
@@ -184,7 +208,7 @@ def _task(plan: Plan, planet_index: int, stratum: int) -> QTable:
     return sampled(plan, planet_index, stratum, rates, 1)
 
 
-def _fingerprint(plan: Plan) -> dict[str, Any]:
+def _fingerprint(plan: Plan) -> Document:
     """Description of a run: two runs share a journal only if it agrees."""
     digest = hashlib.sha256()
     for name in plan.orbits.colnames:
@@ -205,7 +229,7 @@ def _fingerprint(plan: Plan) -> dict[str, Any]:
     }
 
 
-def _stored(table: QTable) -> dict[str, Any]:
+def _stored(table: QTable) -> Document:
     """Columns of a table as lists, with their units."""
     return {
         name: [np.asarray(getattr(table[name], "value", table[name])).tolist(), str(table[name].unit or "")]
@@ -213,7 +237,7 @@ def _stored(table: QTable) -> dict[str, Any]:
     }
 
 
-def _restored(columns: dict[str, Any]) -> QTable:
+def _restored(columns: Document) -> QTable:
     """Inverse of `_stored`."""
     return QTable(
         {

@@ -10,7 +10,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import astropy.units as u
 import numpy as np
@@ -22,7 +21,7 @@ from flybystab.arguments import check_arguments
 from flybystab.catalogues.asteroid import Asteroid
 from flybystab.errors import InvalidInput
 from flybystab.orbit.search.encounter_finder import find_encounters
-from flybystab.population.rates import encounter_rates
+from flybystab.population.rates import Orbits, encounter_rates
 from flybystab.tabular import Record
 from flybystab.typing import Array
 from flybystab.units import checked_time, to_si, whole
@@ -33,7 +32,7 @@ WEATHERING = 1e6 * u.yr
 
 @dataclass(frozen=True, eq=False)
 class Freshness(Record):
-    """Whether a surface is fresh.
+    """Probability that a surface is fresh, and the encounters that refresh it.
 
     Attributes
     ----------
@@ -46,7 +45,7 @@ class Freshness(Record):
     followed : QTable
         The refreshing encounters in that time; ``index`` is the number of the clone.
     share_followed : float
-        Share of the possible orbits with such an encounter younger than the weathering time: 0 or 1 without clones.
+        Fraction of the possible orbits with such an encounter younger than the weathering time: 0 or 1 without clones.
     clones : int
         Number of possible orbits; zero for the nominal orbit alone.
     """
@@ -118,9 +117,9 @@ def freshness(
         be known over it: choose it shorter for a poor orbit.
     clones : int
         Number of orbits drawn from the covariance and followed back instead of the nominal one: the probability is the
-        mean over them, so that an encounter counts with the share of the orbits that have it.
+        mean over them, so that an encounter is weighted with the fraction of the orbits that have it.
     seed : int
-        Of the clones.
+        Random seed of the clones.
 
     Returns
     -------
@@ -159,13 +158,13 @@ def freshness(
 
 @check_arguments
 def fresh_fraction(
-    population: Any,
+    population: Orbits,
     radii: Mapping[str, float],
     *,
     weathering: Quantity = WEATHERING,
     workers: int | None = None,
 ) -> float:
-    """Share of a population whose surface was refreshed by an encounter within the weathering time.
+    """Fraction of a population whose surfaces were refreshed by an encounter within the weathering time.
 
     Parameters
     ----------
@@ -181,13 +180,12 @@ def fresh_fraction(
     Returns
     -------
     float
-        Weighted mean of ``1 - exp(-rate weathering)``, the rates those of the present orbits.
+        Weighted mean of ``1 - exp(-rate weathering)``, with the rates of the present orbits.
     """
     if not radii:
         raise InvalidInput("radii", radii, "at least one planet with its refreshing distance")
     aged = to_si(weathering, u.yr, "weathering", low=0.0, open_low=True)
-    rate: Any = 0.0
-    weight: Any = 1.0
+    rate, weight = np.zeros(()), np.ones(())
     for name, factor in radii.items():
         limit = to_si(factor, u.dimensionless_unscaled, f"radii[{name!r}]", low=1.0)
         found = encounter_rates(population, name, workers=workers)

@@ -1,6 +1,6 @@
 """Populations of orbits: the known asteroids, a debiased model as a table, or a law in TOML.
 
-Three kinds of text are read:
+Three kinds of files are read:
 
 - a table with a header that names the columns, CSV or ECSV: semi-major axis, eccentricity, inclination, and optionally
   absolute magnitude and the number of asteroids that a row represents (:data:`NAMES` lists the accepted names);
@@ -22,11 +22,10 @@ A law in TOML gives a distribution of each element::
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from importlib import resources
 from io import StringIO
 from pathlib import Path
-from typing import Any
 
 import astropy.units as u
 import numpy as np
@@ -34,7 +33,7 @@ from astropy.table import QTable
 
 from flybystab.arguments import check_arguments
 from flybystab.errors import InvalidInput, UnknownName
-from flybystab.files import csv_rows, parse_toml, read_text
+from flybystab.files import Document, csv_rows, parse_toml, read_text
 from flybystab.screening.distributions import Distribution, distribution_of
 from flybystab.typing import Array
 from flybystab.units import whole
@@ -51,7 +50,7 @@ NAMES = {
 GRANVIK = ("a", "e", "i", "node", "argument_of_perihelion", "mean_anomaly", "H")
 #: Absolute magnitude of a diameter of 1 km at an albedo of 0.14.
 KILOMETRE = 17.75
-#: Longest rejection sampling of a law: draws per accepted orbit.
+#: Largest number of draws per requested orbit in the rejection sampling of a law.
 _TRIES = 1000
 
 
@@ -67,7 +66,7 @@ def read_population(path: str | Path, *, columns: Sequence[str] | None = None, s
         Order of the columns of a table without a header: ``a``, ``e``, ``i`` and optionally ``H`` and ``weight``; other
         names are skipped.
     seed : int
-        Of the orbits drawn from a law.
+        Random seed of the orbits drawn from a law.
 
     Returns
     -------
@@ -125,7 +124,7 @@ def known_population(limit: float = KILOMETRE) -> QTable:
 
 
 def is_population(path: str | Path) -> bool:
-    """Whether a file is a law or a table of orbits without identities, rather than a catalogue of asteroids."""
+    """True for a law or a table of orbits without identities, False for a catalogue of asteroids."""
     if str(path).endswith(".toml"):
         return True
     text = read_text(path, "population file")
@@ -187,7 +186,7 @@ def _named(text: str, path: str | Path, names: Sequence[str]) -> QTable:
     return out
 
 
-def _numbers(values: Any, key: str, path: str | Path) -> Array:
+def _numbers(values: Iterable[str | float | None], key: str, path: str | Path) -> Array:
     try:
         return np.array([float(v) if v not in ("", None) else np.nan for v in values])
     except (TypeError, ValueError) as error:
@@ -219,7 +218,7 @@ def _unnamed(text: str, path: str | Path, columns: Sequence[str] | None) -> QTab
     return out
 
 
-def _drawn(law: Mapping[str, Any], seed: int) -> QTable:
+def _drawn(law: Document, seed: int) -> QTable:
     """Orbits drawn from a law."""
     known = ("count", "asteroids", "a", "e", "i", "H", "perihelion")
     for key in law:
@@ -259,7 +258,7 @@ def _quantile(distribution: Distribution, x: Array) -> Array:
     return distribution.quantile(x)
 
 
-def _perihelion(limits: Any) -> tuple[float, float]:
+def _perihelion(limits: Iterable[float]) -> tuple[float, float]:
     try:
         low, high = (float(x) for x in limits)
     except (TypeError, ValueError):
@@ -269,7 +268,7 @@ def _perihelion(limits: Any) -> tuple[float, float]:
     return low, high
 
 
-def _magnitudes(law: Any, x: Array) -> Array:
+def _magnitudes(law: object, x: Array) -> Array:
     """Absolute magnitudes with ``N(< H) ~ 10^(slope H)`` between two limits, or of a distribution with a kind."""
     if not isinstance(law, Mapping) or "slope" not in law:
         return _quantile(distribution_of("H", law), x)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Any
+from typing import TypeAlias
 
 import astropy.units as u
 import numpy as np
@@ -26,6 +26,8 @@ from flybystab.units import to_si, whole
 
 #: Orbits of one task of a thread.
 BLOCK = 20_000
+#: Orbits of a population: a table with columns ``a``, ``e`` and ``i``, orbits, or asteroids.
+Orbits: TypeAlias = Table | Orbit | Asteroid | Iterable[Orbit | Asteroid]
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,7 +122,7 @@ class EncounterRates(Tabular):
 
 @check_arguments
 def encounter_rates(
-    orbits: Any,
+    orbits: Orbits,
     planet_name: str | Planet = "earth",
     periapsis: Quantity | None = None,
     *,
@@ -153,8 +155,8 @@ def encounter_rates(
     Notes
     -----
     Angles are taken to circulate uniformly (:mod:`flybystab.population.wetherill`): resonances, correlated returns and
-    the evolution of ``a``, ``e`` and ``i`` are left out. For a single asteroid the rate over the next centuries can
-    differ arbitrarily; for a population the mean rate is that of the counted passages (tests/population).
+    the evolution of ``a``, ``e`` and ``i`` are neglected. For a single asteroid the rate over the next centuries can
+    differ arbitrarily; for a population the mean rate agrees with counted encounters (tests/population).
     """
     body = planet(planet_name)
     distance = body.radius * u.m if periapsis is None else periapsis
@@ -212,7 +214,7 @@ def _rates(
     )
 
 
-def elements_table(orbits: Any) -> QTable:
+def elements_table(orbits: Orbits) -> QTable:
     """Orbits as a table of ``a``, ``e`` and ``i``, which :func:`encounter_rates` does not convert again.
 
     Columns ``weight`` and ``H`` of a table, and absolute magnitudes of asteroids, are kept.
@@ -233,7 +235,7 @@ def elements_table(orbits: Any) -> QTable:
     return table
 
 
-def _weight(orbits: Any) -> Array | None:
+def _weight(orbits: Orbits) -> Array | None:
     """Number of asteroids of each row of a table; None without the column."""
     if not isinstance(orbits, Table) or "weight" not in orbits.colnames:
         return None
@@ -244,7 +246,7 @@ def _weight(orbits: Any) -> Array | None:
     return weight
 
 
-def _elements(orbits: Any) -> Array:
+def _elements(orbits: Orbits) -> Array:
     """Semi-major axis (m), eccentricity and inclination (rad) of each orbit, ``(n, 3)``."""
     if isinstance(orbits, Table):
         columns = []
@@ -279,7 +281,7 @@ def _elements(orbits: Any) -> Array:
     return np.ascontiguousarray(out)
 
 
-def _of_orbit(orbit: Any, number: int) -> tuple[float, float, float]:
+def _of_orbit(orbit: object, number: int) -> tuple[float, float, float]:
     if not isinstance(orbit, Orbit):
         raise InvalidInput(
             f"orbits[{number}]", orbit, "an Orbit, an Asteroid with one, or a table with a, e, i"

@@ -26,9 +26,9 @@ from flybystab.typing import Array
 
 #: Geometric albedo that converts a given diameter to the absolute magnitude by which LCDB spin periods are selected.
 ALBEDO = 0.14
-#: Number of sets of bodies that are drawn at most to find enough bodies in equilibrium.
+#: Largest number of sets of bodies drawn to find enough bodies in equilibrium.
 _ATTEMPTS = 20
-#: Verdicts of the ellipsoid after which a body is simulated by grains, if requested.
+#: Verdicts of the ellipsoid after which a body is continued with grains, if requested.
 ENDS = (str(Verdict.BEYOND_MODEL), str(Verdict.MASS_LOSS), str(Verdict.DISRUPTED))
 #: Fragments of at least this mass fraction are counted.
 LEAST_FRAGMENT = 0.01

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import astropy.units as u
 import numpy as np
@@ -50,7 +49,7 @@ class DisruptionRates(Collection):
     bodies: float
     diameter: Quantity | None
 
-    def _rows(self) -> dict[str, Any]:
+    def _rows(self) -> dict[str, object]:
         return {name: self.table[name] for name in self.table.colnames}
 
     @check_arguments
@@ -97,8 +96,8 @@ class DisruptionRates(Collection):
     def fragment_rate(self, diameters: Quantity) -> Quantity:
         """Rate, 1/yr, at which fragments larger than each of the diameters are made, the largest remnants left out.
 
-        Only bodies carried on by grains have fragments, and of each the dozen largest are known: the rate is a lower
-        limit where small ones count.
+        Only bodies continued with grains have fragments, of which the twelve largest are kept: the rate is a lower
+        limit if smaller ones exceed the diameter.
         """
         sizes = np.atleast_1d(to_si(diameters, u.m, "diameters", shape=None, low=0.0, open_low=True))
         own = np.cbrt(self.samples["fragment_fractions"]) * self.samples["diameter"].to_value(u.m)[:, None]
@@ -117,7 +116,7 @@ class DisruptionRates(Collection):
         order = np.argsort(-rate, kind="stable")[:most]
         return QTable({"orbit": orbits[order], "rate": rate[order] / u.yr, "samples": counts[order]})
 
-    def survivors(self) -> dict[str, Any]:
+    def survivors(self) -> dict[str, tuple[float, float, float]]:
         """Weighted medians (16 and 84 %) of spin ratio, spin period and elongation of bodies that were changed."""
         chosen = self.samples[self._mask(CHANGED)]
         weight = chosen["weight"].to_value(1 / u.yr)

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import warnings
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 import astropy.units as u
 import numpy as np
@@ -22,6 +21,7 @@ from flybystab.errors import FlybystabError
 from flybystab.result_table import ResultTable
 from flybystab.screening.draws import nominal
 from flybystab.screening.priors import Population
+from flybystab.screening.result_rows import Row
 from flybystab.screening.results import Column, table_of
 from flybystab.screening.selection import listed
 
@@ -61,7 +61,7 @@ COLUMNS: dict[str, Column] = {
     "density": Column(float, u.kg / u.m**3, "bulk density"),
     "spin_period": Column(float, u.h, "2 pi over the spin rate"),
     "assumed": Column(str, None, "catalogue values that are assumed, not measured"),
-    "drawn": Column(str, None, "quantities missing from the catalogue: the median of the prior is used"),
+    "drawn": Column(str, None, "quantities missing from the catalogue, set to the median of the prior"),
     "error": Column(str, None, "reason why the row could not be computed"),
 }
 
@@ -83,7 +83,7 @@ def classification(
         As in :func:`flybystab.screening.screening.screen`; the embedded catalogue by default. Bodies of tables of
         orbits get their spins and shapes from the embedded tables; missing values are medians of their distributions.
     material : Material, optional
-        For the critical strain and the cohesion needed; 35 deg without cohesion by default. Its yield surface
+        For the critical strain and the required cohesion; 35 deg without cohesion by default. Its yield surface
         applies to all columns.
     dilatancy : float
         ``beta/min k`` of the test; 1 is associative flow.
@@ -103,11 +103,27 @@ def classification(
         warnings.warn("threads is deprecated: use workers", DeprecationWarning, stacklevel=2)
         workers = threads
     material = material or Material()
-    rows: list[dict[str, Any]] = []
-    bodies: list[Body] = []
-    which: list[int] = []
-    for asteroid in listed(asteroids):
-        row: dict[str, Any] = {"asteroid": asteroid.name, "number": asteroid.number}
+    rows, bodies = _prepared(listed(asteroids), material, population)
+    _add_stability(rows, bodies, material, dilatancy, workers)
+    meta = {
+        "flybystab": __version__,
+        "friction_angle_deg": float(material.friction_angle.to_value(u.deg)),
+        "cohesion_Pa": material.c_pa,
+        "yield_surface": material.yield_surface,
+        "dilatancy": float(dilatancy),
+        "levels": {str(i): name for i, name in enumerate(LEVELS)},
+    }
+    return table_of(rows, COLUMNS, meta)
+
+
+def _prepared(
+    asteroids: Sequence[Asteroid], material: Material, population: Population | None
+) -> tuple[list[Row], dict[int, Body]]:
+    """Rows with the inputs of every asteroid, and the bodies by row; a row without a body has its reason."""
+    rows: list[Row] = []
+    bodies: dict[int, Body] = {}
+    for i, asteroid in enumerate(asteroids):
+        row: Row = {"asteroid": asteroid.name, "number": asteroid.number}
         rows.append(row)
         try:
             draw = nominal(asteroid, material, population)
@@ -119,20 +135,27 @@ def classification(
         row |= dict(zip(("semi_axis_a", "semi_axis_b", "semi_axis_c"), body.axes, strict=True))
         row |= {"density": body.rho, "spin_period": draw.period[0] / 3600.0}
         row["w2"] = float(body.omega @ body.omega) * body.dynamical_time**2
-        bodies.append(body)
-        which.append(len(rows) - 1)
+        bodies[i] = body
+    return rows, bodies
 
-    def table(depth: str, friction: Quantity | None = None, cohesionless: bool = False) -> StabilityTable:
-        bare = Material(yield_surface=material.yield_surface, bulk_modulus=material.bulk_modulus)
-        them = [b.with_(material=bare) for b in bodies] if cohesionless else bodies
+
+def _add_stability(
+    rows: list[Row], bodies: Mapping[int, Body], material: Material, dilatancy: float, workers: int | None
+) -> None:
+    """Compute the stability of all bodies and add it to their rows."""
+    own_material = list(bodies.values())
+    bare = Material(yield_surface=material.yield_surface, bulk_modulus=material.bulk_modulus)
+    cohesionless = [b.with_(material=bare) for b in own_material]
+
+    def table(them: list[Body], depth: str, friction: Quantity | None = None) -> StabilityTable:
         return stability_many(
             them, friction_angle=friction, dilatancy=dilatancy, depth=depth, workers=workers
         )
 
-    own = table("barrier")
-    required = table("friction", cohesionless=True).required_friction_angle.to_value(u.deg)
-    levels = {f"level_{angle:g}": table("second", angle * u.deg).level for angle in ANGLES}
-    for k, (i, body) in enumerate(zip(which, bodies, strict=True)):
+    own = table(own_material, "barrier")
+    required = table(cohesionless, "friction").required_friction_angle.to_value(u.deg)
+    levels = {f"level_{angle:g}": table(own_material, "second", angle * u.deg).level for angle in ANGLES}
+    for k, (i, body) in enumerate(bodies.items()):
         energy = float(own.energy_barrier[k].to_value(u.J))
         sphere = 0.6 * G * body.mass.value**2 / body.mean_radius.value
         rows[i] |= {
@@ -146,15 +169,6 @@ def classification(
             "in_tension": bool(own.mean_pressure[k].value < 0.0),
             **{name: int(level[k]) for name, level in levels.items()},
         }
-    meta = {
-        "flybystab": __version__,
-        "friction_angle_deg": float(material.friction_angle.to_value(u.deg)),
-        "cohesion_Pa": material.c_pa,
-        "yield_surface": material.yield_surface,
-        "dilatancy": float(dilatancy),
-        "levels": {str(i): name for i, name in enumerate(LEVELS)},
-    }
-    return table_of(rows, COLUMNS, meta)
 
 
 def counts(table: QTable) -> dict[str, dict[str, int]]:

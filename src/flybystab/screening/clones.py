@@ -1,7 +1,7 @@
 """Orbital uncertainty in the samples of an encounter: each sample moves on its own clone of the orbit.
 
 Where the full covariance is known and the uncertainty of the distance is significant, sample k uses clone k of the
-orbit, integrated with all forces and without linearisation. Otherwise all samples share the nominal passage, and the
+orbit, integrated with all forces and without linearisation. Otherwise all samples share the nominal encounter, and the
 row gives the reason. The choice between the two is made with a few clones; the others are drawn and integrated
 together with their samples.
 """
@@ -24,18 +24,19 @@ from flybystab.screening.draws import stream
 from flybystab.screening.encounters import Passage
 from flybystab.typing import Array
 
-#: Clones are used if five sigma of the distance exceed this fraction of it: the tide changes by three times as much.
+#: Clones are used if five sigma of the distance exceed this fraction of it; the relative change of the tide is three
+#: times as large.
 MATTERS = 1e-3
 #: Largest nonlinearity at which sigma is taken from the linear map of the covariance.
 LINEAR = 0.1
-#: Number of clones from which sigma is estimated where the map is not linear.
+#: Number of clones from which sigma is estimated where the linear map is not accurate.
 _PROBES = 16
 #: Largest difference in time between the encounter of a clone and the nominal one.
 _SEARCH = 30.0 * u.d
 
 
 class Clones(NamedTuple):
-    """The clones of an asteroid at one passage, drawn and integrated on demand.
+    """The clones of an asteroid in one encounter, drawn and integrated on demand.
 
     Attributes
     ----------
@@ -44,9 +45,9 @@ class Clones(NamedTuple):
     time : Time
         Its closest approach.
     within : float
-        Largest distance of a passage, m. A clone that stays farther away is evaluated at this distance.
+        Largest distance of an encounter, m. A clone that stays farther away is evaluated at this distance.
     samples, key : int
-        Number of all clones, and seed: clone k depends on the key and k alone.
+        Number of clones, and seed: clone k depends on `key` and k only.
     """
 
     passage: Passage
@@ -56,7 +57,7 @@ class Clones(NamedTuple):
     key: int
 
     def passages(self, first: int, last: int) -> list[Passage]:
-        """The passages of clones `first` to ``last - 1``; those of one clone do not depend on the others."""
+        """Encounters of clones `first` to ``last - 1``; that of one clone does not depend on the others."""
         p = self.passage
         clones = p.asteroid.orbit.clones(self.samples, self.key, first=first, last=last)
         offset, distance, v_inf = clone_encounters(
@@ -75,20 +76,20 @@ class Clones(NamedTuple):
         return out
 
     def sigma(self, distance: Array) -> float:
-        """1-sigma of the distances of the samples, m, without the clones that do not come near."""
+        """Standard deviation of the distances of the samples, m, without clones that stay beyond `within`."""
         near = distance[distance < self.within]
         return float(near.std(ddof=1)) if len(near) > 1 else np.nan
 
 
 class OrbitSampling(NamedTuple):
-    """Contribution of the orbital uncertainty to the samples of a passage.
+    """Contribution of the orbital uncertainty to the samples of an encounter.
 
     Attributes
     ----------
     clones : Clones or None
-        One per sample; None where all samples share the nominal passage.
+        One per sample; None where all samples share the nominal encounter.
     sigma : float
-        1-sigma of the distance, m; nan if unknown, or if it follows from the full set of clones only.
+        1-sigma of the distance, m; nan if unknown, or if only the full set of clones gives it.
     note : str
         Reason why the orbit is not sampled; empty where it is, or where its error is insignificant.
     """
@@ -99,18 +100,18 @@ class OrbitSampling(NamedTuple):
 
 
 def orbit_sampling(passage: Passage, samples: int, seed: int) -> OrbitSampling:
-    """Decide whether the samples of a passage have their own orbits, and draw them.
+    """Decide whether each sample of an encounter has its own orbit, and prepare the clones.
 
     Parameters
     ----------
     passage : Passage
         Of the nominal orbit.
     samples, seed : int
-        Clone k depends on the seed, the asteroid and k alone: it is the same in every passage.
+        Clone k depends on the seed, the asteroid and k only: it is the same in every encounter.
     """
     asteroid = passage.asteroid
     if passage.encounter is not None and passage.encounter.time is None:
-        return OrbitSampling(None, np.nan, "scripted passage")
+        return OrbitSampling(None, np.nan, "scripted encounter")
     covariance = asteroid.orbit.covariance
     if covariance is None:
         return OrbitSampling(None, np.nan, "orbit without errors (no covariance)")

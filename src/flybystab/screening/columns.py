@@ -24,7 +24,7 @@ COLUMNS: dict[str, Column] = {
     "number": Column(int, None, "IAU number, -1 without"),
     "planet": Column(str, None, "planet encountered"),
     "time_tdb": Column(
-        str, None, "closest approach, ISO 8601, TDB; empty where the asteroid could not be followed"
+        str, None, "closest approach, ISO 8601, TDB; empty where the orbit could not be integrated"
     ),
     "jd_tdb": Column(float, u.d, "closest approach, Julian date, TDB"),
     "distance": Column(float, u.au, "distance of the centres at closest approach"),
@@ -34,9 +34,9 @@ COLUMNS: dict[str, Column] = {
         float, u.deg, "friction angle minus the largest one mobilised; a lower limit if decided by bound"
     ),
     "decided_by": Column(str, None, "bound, dynamics or grains"),
-    "friction_angle": Column(float, u.deg, "of the catalogue body"),
-    "cohesion": Column(float, u.Pa, "of the catalogue body"),
-    "yield_surface": Column(str, None, "yield surface, of the samples also"),
+    "friction_angle": Column(float, u.deg, "friction angle of the catalogue body"),
+    "cohesion": Column(float, u.Pa, "cohesion of the catalogue body"),
+    "yield_surface": Column(str, None, "yield surface, also of the samples"),
     "semi_axis_a": Column(float, u.m, "long semi-axis of the catalogue body"),
     "semi_axis_b": Column(float, u.m, "middle semi-axis of the catalogue body"),
     "semi_axis_c": Column(float, u.m, "short semi-axis of the catalogue body"),
@@ -45,18 +45,20 @@ COLUMNS: dict[str, Column] = {
     "required_friction_at_rest": Column(
         float,
         u.deg,
-        "largest mobilised far from the planet, of a tumbler in all its phases; inf if no friction suffices",
+        "largest mobilised far from the planet, for a tumbler over all phases; inf if no friction suffices",
     ),
-    "friction_rise": Column(float, u.deg, "increase during the passage; an upper limit if decided by bound"),
+    "friction_rise": Column(
+        float, u.deg, "increase during the encounter; an upper limit if decided by bound"
+    ),
     "samples": Column(int, None, "samples drawn"),
-    "samples_dynamic": Column(int, None, "samples that needed the dynamics"),
-    "samples_grains": Column(int, None, "samples carried on by grains"),
+    "samples_dynamic": Column(int, None, "samples that were integrated"),
+    "samples_grains": Column(int, None, "samples continued with grains"),
     **{share_of(v): Column(float, None, f"fraction of the samples with verdict {v}") for v in VERDICTS},
     "p_yield": Column(float, None, "fraction of the samples in equilibrium that yield or hit the planet"),
-    "p_yield_low": Column(float, None, "95 % interval (Wilson) of that probability"),
-    "p_yield_high": Column(float, None, "95 % interval (Wilson) of that probability"),
+    "p_yield_low": Column(float, None, "lower end of its 95 % interval (Wilson)"),
+    "p_yield_high": Column(float, None, "upper end of its 95 % interval (Wilson)"),
     "distance_sigma": Column(
-        float, u.km, "1-sigma of the distance, from the orbit's covariance; nan where none is known"
+        float, u.km, "1-sigma of the distance, from the covariance of the orbit; nan without one"
     ),
     "contributors": Column(
         str, None, "inputs to which the mobilised friction is most sensitive, with Spearman's rho"
@@ -70,8 +72,8 @@ COLUMNS: dict[str, Column] = {
     "seed": Column(int, None, "seed of the run"),
     "orbit": Column(str, None, "orbit solution"),
     "catalogue": Column(str, None, "catalogue of the asteroid"),
-    "ephemeris": Column(str, None, "of the planets"),
-    "version": Column(str, None, "of flybystab"),
+    "ephemeris": Column(str, None, "ephemeris of the planets"),
+    "version": Column(str, None, "version of flybystab"),
     "error": Column(str, None, "reason why the row could not be computed"),
 }
 
@@ -87,18 +89,18 @@ SAMPLE_COLUMNS: dict[str, Column] = {
     "semi_axis_c": Column(float, u.m, "short semi-axis"),
     "density": Column(float, u.kg / u.m**3, "bulk density"),
     "spin_period": Column(float, u.h, "2 pi over the spin rate"),
-    "friction_angle": Column(float, u.deg, "angle of friction"),
+    "friction_angle": Column(float, u.deg, "friction angle"),
     "cohesion": Column(float, u.Pa, "cohesion"),
-    "pole_x": Column(float, None, "direction of the angular momentum at the start, ICRF"),
-    "pole_y": Column(float, None, "direction of the angular momentum at the start, ICRF"),
-    "pole_z": Column(float, None, "direction of the angular momentum at the start, ICRF"),
-    "angle": Column(float, u.deg, "turn about the pole"),
+    "pole_x": Column(float, None, "x of the direction of the initial angular momentum, ICRF"),
+    "pole_y": Column(float, None, "y of the direction of the initial angular momentum, ICRF"),
+    "pole_z": Column(float, None, "z of the direction of the initial angular momentum, ICRF"),
+    "angle": Column(float, u.deg, "rotation angle about the pole"),
     "phase": Column(float, None, "rotation phase of a tumbler"),
     "verdict": Column(str, None, "verdict"),
     "margin": Column(
         float, u.deg, "friction angle minus the largest one mobilised; a lower limit if decided by bound"
     ),
     "decided_by": Column(str, None, "bound, dynamics or grains"),
-    "largest_fraction": Column(float, None, "largest clump of grains over the mass; nan without grains"),
+    "largest_fraction": Column(float, None, "mass fraction of the largest clump; nan without grains"),
     "error": Column(str, None, "reason why the sample could not be computed"),
 }

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from difflib import get_close_matches
-from typing import Any
 
 import numpy as np
 from scipy.special import ndtr, ndtri
@@ -72,7 +71,7 @@ class Distribution:
             raise InvalidInput("distribution", self, "a positive scale and a spread of zero or more")
 
     def quantile(self, x: Array, values: Array | None = None) -> Array:
-        """Values at cumulative probabilities `x` in (0, 1); `values` serves the kinds "catalogue" and "lightcurves"."""
+        """Values at cumulative probabilities `x` in (0, 1); `values` are the data of "catalogue" and "lightcurves"."""
         x = np.asarray(x, dtype=float)
         if self.kind == "fixed":
             return np.full(x.shape, self.value)
@@ -115,15 +114,15 @@ class Distribution:
 
 
 def truncated_normal(x: Array, mean: float, sd: float, low: float = -np.inf, high: float = np.inf) -> Array:
-    """Quantile of a normal distribution cut to [low, high]."""
+    """Quantile of a normal distribution truncated to [low, high]."""
     if sd == 0.0:
         return np.full(np.shape(x), min(max(mean, low), high))
     a, b = ndtr((low - mean) / sd), ndtr((high - mean) / sd)
     return np.clip(mean + sd * ndtri(a + x * (b - a)), low, high)
 
 
-def distribution_of(key: str, value: Any) -> Distribution:
-    """Distribution that a number (fixed) or a table with a "kind" describes; `key` names it in errors."""
+def distribution_of(key: str, value: object) -> Distribution:
+    """Distribution given by a number (fixed) or a table with a "kind"; `key` names it in errors."""
     if isinstance(value, int | float) and not isinstance(value, bool):
         value = {"kind": "fixed", "value": float(value)}
     if not isinstance(value, Mapping) or "kind" not in value:

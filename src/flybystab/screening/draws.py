@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import hashlib
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import astropy.units as u
 import numpy as np
@@ -26,7 +26,7 @@ from flybystab.typing import Array
 
 
 def stream(seed: int, *names: object, skip: int = 0) -> np.random.Generator:
-    """Random numbers that depend on the seed and the names only, without the first `skip` of them."""
+    """Generator of random numbers that depend on the seed and the names only; the first `skip` are omitted."""
     digest = hashlib.sha256("|".join(str(n) for n in names).encode()).digest()
     words = [int.from_bytes(digest[i : i + 4], "little") for i in range(0, 16, 4)]
     bits = np.random.PCG64(np.random.SeedSequence([seed, *words]))
@@ -49,7 +49,7 @@ class Draws(NamedTuple):
     drawn : tuple of str
         Quantities drawn from a prior instead of the catalogue.
     solution : ndarray (n,) of int
-        Number of the rival spin solution; -1 for the values of the catalogue.
+        Number of the alternative spin solution; -1 for the values of the catalogue.
     """
 
     axes: Array
@@ -67,13 +67,13 @@ class Draws(NamedTuple):
         arrays = {name: getattr(self, name)[first:last] for name in self._fields if name != "drawn"}
         return self._replace(**arrays)
 
-    def rows(self, samples: NDArray[np.int64], attitudes: Array, material: Material) -> NDArray[Any]:
+    def rows(self, samples: NDArray[np.int64], attitudes: Array, material: Material) -> NDArray[np.void]:
         """Records of samples in one encounter, with rotations (n, 3, 3), body axes -> frame of the encounter.
 
         Raises
         ------
         InvalidInput
-            For a density that no asteroid has.
+            A density is outside :data:`DENSITY_RANGE`.
         """
         rho = self.rho[samples]
         for i in samples[~((DENSITY_RANGE[0] <= rho) & (rho <= DENSITY_RANGE[1]))]:
@@ -83,7 +83,7 @@ class Draws(NamedTuple):
         )  # fmt: skip
 
     def body(self, i: int, material: Material) -> Body:
-        """Sample `i` as a body; friction and cohesion are the sample's, the rest is of `material`."""
+        """Sample `i` as a body; with the friction and cohesion of the sample, otherwise of `material`."""
         return Body(
             semi_axes=self.axes[i] * u.m,
             density=self.rho[i] * u.kg / u.m**3,
@@ -95,7 +95,7 @@ class Draws(NamedTuple):
 
 
 def nominal(asteroid: Asteroid, material: Material, population: Population | None = None) -> Draws:
-    """The catalogue body as a draw of one; missing quantities have the median of their prior.
+    """The catalogue body as a single sample; missing quantities have the median of their prior.
 
     Raises
     ------
@@ -108,7 +108,7 @@ def nominal(asteroid: Asteroid, material: Material, population: Population | Non
 
 
 def free_rotation(asteroid: Asteroid, draw: Draws, phases: int = 720) -> Draws:
-    """The catalogue body, a draw of one, at equally spaced phases of its free rotation; itself unless it tumbles."""
+    """The catalogue body at equally spaced phases of its free rotation; unchanged unless it tumbles."""
     if not asteroid.tumbles:
         return draw
     omega = asteroid.angular_velocities(np.arange(phases) / phases)
@@ -214,7 +214,7 @@ class Attitudes:
         out = isotropic_directions(self.uniform[:, :2])
         if known is not None:
             out[self.draws.solution < 0] = known
-        for k, solution in enumerate(solutions):  # one without a pole leaves it unknown
+        for k, solution in enumerate(solutions):  # a solution without a pole leaves it unknown
             if solution.pole is not None:
                 out[self.draws.solution == k] = ecliptic_direction(*np.radians(solution.pole).tolist())
         return out
@@ -235,6 +235,6 @@ class Samples:
     encounter: tuple[object, ...]
 
     def part(self, first: int, last: int) -> Attitudes:
-        """Samples `first` to ``last - 1``: the same as those of a draw of all."""
+        """Samples `first` to ``last - 1``: the same as in a draw of all samples."""
         draw = draws(self.asteroid, last - first, self.seed, self.population, first=first)
         return Attitudes.at(self.asteroid, draw, self.seed, *self.encounter, first=first)

@@ -1,4 +1,4 @@
-"""Passages of asteroids by planets: found, bounded, and integrated only where the bound does not decide."""
+"""Encounters of asteroids with planets, integrated only where bounds on the tide do not decide the verdict."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class Passage:
     orbit : Orbit or None
         A clone, instead of the asteroid's own orbit.
     missed : bool
-        The clone stays farther away than `distance` and has no passage.
+        The clone stays farther away than `distance` and has no encounter.
     """
 
     asteroid: Asteroid
@@ -64,9 +64,9 @@ class Passage:
     def bounds(self) -> tuple[float, float]:
         """Bounds on the tide, as of :func:`tide_size`, from distance and speed alone; infinite where unknown.
 
-        The encounter lasts from the distance D = `usual_start` inbound to D outbound and SETTLE longer. What
-        pulls the asteroid away from the planet is at most ``kappa r`` with ``kappa = 2 GM_sun/d^3``, d the
-        least distance from the Sun, plus, at the Earth, the Moon's pull on both. With E the two-body energy,
+        The encounter lasts from the distance D = `usual_start` inbound to D outbound and SETTLE longer. The
+        acceleration of the asteroid away from the planet is at most ``kappa r`` with ``kappa = 2 GM_sun/d^3``, d the
+        least distance from the Sun, plus, at the Earth, the Moon's acceleration of both. With E the two-body energy,
         ``(r^2)''/2 = 2 E + GM/r + r.a``, and E changes by ``int a.v dt``. Along a path from q to D
         ``int r ds < 0.7 D^2`` and ``int ds < 1.2 D``. So ``(r^2)''/2 >= v_inf^2 (1 - eps)`` with the `eps`
         below: there is one minimum, ``r^2 >= q^2 + (1 - eps) v_inf^2 t^2``, hence the time to D and
@@ -102,7 +102,9 @@ class Passage:
     def meet(self) -> Encounter:
         """The encounter, integrated with all forces."""
         if self.missed:
-            raise NoEncounter(f"the clone has no passage within {self.distance / AU:.3g} au of {self.planet}")
+            raise NoEncounter(
+                f"the clone has no encounter within {self.distance / AU:.3g} au of {self.planet}"
+            )
         if self.encounter is None:
             self.encounter = Encounter.from_orbit(
                 self.orbit or self.asteroid.orbit,
@@ -119,7 +121,7 @@ class Passage:
 
 
 def passages(asteroid: Asteroid, settings: Settings) -> list[Passage]:
-    """Encounters of an asteroid, in time."""
+    """Encounters of an asteroid in order of time."""
     from flybystab.orbit.search.encounter_finder import find_encounters
 
     table = find_encounters(

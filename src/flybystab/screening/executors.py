@@ -14,10 +14,9 @@ from multiprocessing import get_context, parent_process
 from multiprocessing.connection import wait
 from pathlib import Path
 from threading import Thread
-from typing import Any
 
 from flybystab.errors import FlybystabWarning, InvalidInput, MissingExtra, WorkersLost
-from flybystab.files import parse_json, read_text
+from flybystab.files import Document, parse_json, read_text
 from flybystab.units import whole
 
 
@@ -125,7 +124,7 @@ def _dask_client(where: str, timeout: float) -> AbstractContextManager:
         with ThreadPoolExecutor(1) as thread:
             found = thread.submit(asyncio.run, _identity(address, timeout)).result()
         client = Client(address, timeout=timeout)
-    except Exception as error:  # of any type, where the answer does not come from a dask scheduler
+    except Exception as error:  # of any type if the address is not that of a dask scheduler
         raise WorkersLost(
             f"no dask scheduler answers at {where} ({_reason(error, timeout)}){_certificates(address)}. Nothing was "
             "computed; results of an earlier, unfinished run are kept"
@@ -139,7 +138,7 @@ def _dask_client(where: str, timeout: float) -> AbstractContextManager:
 
 @contextmanager
 def _quiet_dask() -> Iterator[None]:
-    """Keep tracebacks that distributed logs off the terminal: lost connections are raised as `WorkersLost`."""
+    """Suppress tracebacks in the log of distributed: lost connections are raised as `WorkersLost`."""
 
     def critical(record: logging.LogRecord) -> bool:
         return record.levelno >= logging.CRITICAL
@@ -168,12 +167,12 @@ def _address(where: str) -> str:
     return address
 
 
-async def _identity(address: str, timeout: float) -> dict[str, Any]:
-    """What a scheduler says of itself; asked first because ``Client`` may wait longer than its timeout."""
+async def _identity(address: str, timeout: float) -> Document:
+    """Identity of a scheduler, requested first because ``Client`` may wait longer than its timeout."""
     from distributed.comm import connect
     from distributed.security import Security
 
-    async def ask() -> dict[str, Any]:
+    async def ask() -> Document:
         comm = await connect(address, timeout=timeout, **Security().get_connection_args("client"))
         try:
             await comm.write({"op": "identity", "reply": True})

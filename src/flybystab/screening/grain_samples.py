@@ -1,7 +1,7 @@
-"""Samples of a screening that grains carry on where the ellipsoid ends.
+"""Samples of a screening that are continued with grains where the ellipsoid model ends.
 
-Each such sample is one pile with its own seed, the number of the sample, and one unit of work and of the journal. A
-sample is a draw of all inputs already: the scatter of piles is part of the distribution over the samples.
+Each such sample is one pile, whose seed is the number of the sample; it is one unit of work and one record of the
+journal. The scatter between piles is thus part of the distribution over the samples.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ class GrainSample:
     attitudes : Attitudes
         Of this sample, with its body.
     verdict : str
-        Of the ellipsoid; it stays where grains cannot answer.
+        Of the ellipsoid; kept where the grains give none.
     """
 
     passage: Passage
@@ -50,7 +50,7 @@ class GrainSample:
     verdict: str
 
     def judged(self, settings: Settings) -> SampleVerdicts:
-        """Verdict of one pile of grains; with the reason where there is none."""
+        """Verdict of one pile of grains, or the reason why there is none."""
         passage = self.passage
         error, verdict, largest = "", self.verdict, np.nan
         try:
@@ -58,7 +58,7 @@ class GrainSample:
                 (passage,) = self.clones.passages(self.number, self.number + 1)
             encounter = passage.meet()
             turn = periapsis_axes(encounter) @ self.attitudes.matrix(0)
-            with warnings.catch_warnings():  # few grains have warned when the settings were made
+            with warnings.catch_warnings():  # a small number of grains is warned of with the settings
                 warnings.simplefilter("ignore", UserWarning)
                 outcome = grains_flyby(
                     self.attitudes.draws.body(0, settings.material),
@@ -80,5 +80,5 @@ class GrainSample:
 
 
 def needing_grains(first: int, verdicts: Sequence[str]) -> dict[int, str]:
-    """Numbers and verdicts of the samples from `first` on where the ellipsoid ends."""
+    """Numbers and verdicts of the samples from `first` on that the ellipsoid cannot follow to the end."""
     return {first + k: str(v) for k, v in enumerate(verdicts) if v in ESCALATED}

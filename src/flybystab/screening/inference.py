@@ -1,16 +1,16 @@
 """Bounds on the material of a body from its shape, its spin and the encounters that it survived.
 
 For each density and cohesion there is a least friction angle at which the body is in equilibrium (theory,
-section 4) and one at which it passes a planet without yielding. The second depends on the attitude, which is
+section 4) and one at which it survives an encounter without yielding. The second depends on the attitude, which is
 unknown for past encounters: its minimum over all attitudes is necessary, its maximum is sufficient. The bounds
-from passages assume that the body kept its shape; a body that yielded and took its present shape in the
+from encounters assume that the body kept its shape; a body that yielded and took its present shape in the
 encounter is not constrained by them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import Any
+from typing import NamedTuple
 
 import astropy.units as u
 import numpy as np
@@ -31,6 +31,7 @@ from flybystab.orbit.search.encounter_finder import find_encounters
 from flybystab.progress import Progressing, progress_bar
 from flybystab.result_table import ResultTable
 from flybystab.screening.draws import stream
+from flybystab.typing import Document
 from flybystab.units import to_si, whole
 
 _TOLERANCE = 1e-7
@@ -57,12 +58,12 @@ def infer(
     ----------
     asteroid : Asteroid or Body
     encounters : sequence of Encounter
-        Passages that it is known to have survived. Where the analytic bound on the increase is below 0.05 deg the
-        encounter is not integrated: the bound is used for every attitude, and zero for any attitude.
+        Encounters that it is known to have survived. Where the analytic bound on the increase is below 0.05 deg the
+        encounter is not integrated: the bound counts at the worst attitude and zero at the best.
     densities, cohesions : Quantity (n,), (m,)
         The grid; by default 1000 to 3500 kg/m3, and cohesions from zero to three times the mean internal stress.
     attitudes : int
-        Attitudes tried in every passage: the catalogue's pole where it is known, isotropic ones elsewhere.
+        Attitudes sampled in every encounter: about the catalogued pole where it is known, else isotropic.
     seed : int
         Seed of the random attitudes.
     yield_surface : str
@@ -73,59 +74,35 @@ def infer(
     Returns
     -------
     ResultTable
-        Rows over densities, then cohesions: ``density``, ``cohesion``, ``friction_equilibrium`` (of a tumbler: in
-        all its phases), and over all passages ``friction_any_attitude`` (necessary at any attitude) and
-        ``friction_every_attitude`` (sufficient at every attitude tried); deg, inf where no friction suffices.
-        ``meta["passages"]`` gives the increase by each passage.
+        Rows over densities, then cohesions: ``density``, ``cohesion``, ``friction_equilibrium`` (of a tumbler: over
+        all its phases), and over all encounters ``friction_any_attitude`` (necessary at any attitude) and
+        ``friction_every_attitude`` (sufficient at every sampled attitude); deg, inf where no friction suffices.
+        ``meta["passages"]`` gives the increase by each encounter.
 
     Raises
     ------
     InvalidInput, UnitMismatch, UnknownName
     """
-    rho = (
-        np.linspace(1000.0, 3500.0, 11) if densities is None else _grid(densities, u.kg / u.m**3, "densities")
-    )
-    if np.any(rho <= 0.0):
-        raise InvalidInput("densities", densities, "positive values")
     whole(attitudes, "attitudes", 1)
     whole(seed, "seed", 0)
-    if not isinstance(encounters, Iterable) or not all(isinstance(e, Encounter) for e in encounters):
-        raise InvalidInput("encounters", encounters, "a sequence of Encounter")
-    if not isinstance(asteroid, Asteroid | Body):
-        raise InvalidInput(
-            "asteroid", asteroid, "an Asteroid (Asteroid.from_catalogue finds a name) or a Body"
-        )
+    _check_bodies(asteroid, encounters)
+    rho = np.linspace(1000.0, 3500.0, 11)
+    if densities is not None:
+        rho = _grid(densities, u.kg / u.m**3, "densities")
+    if np.any(rho <= 0.0):
+        raise InvalidInput("densities", densities, "positive values")
     code = Material(yield_surface=yield_surface).surface_code
     bodies, turns = _attitudes(asteroid, attitudes, seed)
     cohesion = _cohesions(bodies[0]) if cohesions is None else _grid(cohesions, u.Pa, "cohesions")
-    sizes = [tide_size(e.tide, e.t_start, e.t_stop) for e in encounters]
-    shape = (len(rho), len(cohesion))
-    rest = np.empty(shape)
-    needs = np.empty((*shape, len(encounters), 2))  # at the best and at the worst attitude
-    followed = np.zeros(len(encounters), dtype=bool)
-    with progress_bar(progress, len(rho) * len(cohesion), "materials", "bounds") as tick:
-        for i, r in enumerate(rho):
-            for j, c in enumerate(cohesion):
-                free, bounds = _by_bound(bodies, float(r), float(c), code, sizes)
-                rest[i, j] = free
-                for k, encounter in enumerate(encounters):
-                    if bounds[k] < free + NEGLIGIBLE or not np.isfinite(free):
-                        needs[i, j, k] = free, max(free, bounds[k] if np.isfinite(free) else free)
-                        continue
-                    followed[k] = True
-                    found = [
-                        _need(body, q, encounter, float(r), float(c), code)
-                        for body, q in zip(bodies, turns, strict=True)
-                    ]
-                    needs[i, j, k] = max(free, min(found)), max(free, *found)
-                tick(i * len(cohesion) + j + 1)
-    least, most = (
-        np.maximum(rest, needs[..., side].max(axis=2)) if len(encounters) else rest for side in (0, 1)
-    )
+    friction = _over_grid(bodies, turns, encounters, rho, cohesion, code, progress)
     table = ResultTable()
     table["density"] = np.repeat(rho, len(cohesion)) * u.kg / u.m**3
     table["cohesion"] = np.tile(cohesion, len(rho)) * u.Pa
-    for name, values in (("equilibrium", rest), ("any_attitude", least), ("every_attitude", most)):
+    for name, values in (
+        ("equilibrium", friction.equilibrium),
+        ("any_attitude", friction.over_encounters(0)),
+        ("every_attitude", friction.over_encounters(1)),
+    ):
         table[f"friction_{name}"] = np.rad2deg(values.ravel()) * u.deg
     table.meta = {
         "title": "least friction angle by density and cohesion",
@@ -133,29 +110,101 @@ def infer(
         "semi_axes_m": [float(a) for a in bodies[0].axes],
         "spin_period_h": 2.0 * np.pi / float(np.linalg.norm(bodies[0].omega)) / 3600.0,
         "catalogue_density_kg_m3": _known_density(asteroid),
-        "passages": [
-            {
-                "passage": _label(e),
-                "tide_s-2": float(sizes[k][0]),
-                "followed": bool(followed[k]),
-                "adds_at_any_attitude_deg": _largest(needs[..., k, 0], rest),
-                "adds_at_worst_attitude_deg": _largest(needs[..., k, 1], rest),
-            }
-            for k, e in enumerate(encounters)
-        ],
+        "passages": friction.by_encounter(encounters),
         "attitudes": attitudes,
         "pole": "catalogue" if isinstance(asteroid, Asteroid) and asteroid.pole is not None else "isotropic",
         "seed": seed,
         "yield_surface": yield_surface,
-        "reading": "bounds from passages hold for a body that has kept its shape since",
+        "reading": "bounds from encounters hold for a body that has kept its shape since",
     }
     return table
 
 
-def strongest_passage(table: QTable) -> dict[str, Any] | None:
-    """The passage with the strongest tide out of ``meta["passages"]``; None without passages.
+class _Friction(NamedTuple):
+    """Mobilised friction angles (rad) over the grid of densities (n) and cohesions (m), for k encounters.
 
-    Passages are ordered by tide, not by increase, since an increase may be an upper bound.
+    Attributes
+    ----------
+    equilibrium : ndarray (n, m)
+        Of the isolated body, the largest over its phases.
+    in_encounters : ndarray (n, m, k, 2)
+        In each encounter, at the most and at the least favourable attitude.
+    integrated : ndarray (k,) of bool
+        The encounter was integrated for at least one point of the grid; otherwise the analytic bound was sufficient.
+    tides : sequence of tuple
+        Largest norm (1/s2) of each tide and its time integral (1/s).
+    """
+
+    equilibrium: np.ndarray
+    in_encounters: np.ndarray
+    integrated: np.ndarray
+    tides: Sequence[tuple[float, float]]
+
+    def over_encounters(self, side: int) -> np.ndarray:
+        """Largest angle in equilibrium and all encounters, at the most (0) or least (1) favourable attitude."""
+        if not len(self.tides):
+            return self.equilibrium
+        return np.maximum(self.equilibrium, self.in_encounters[..., side].max(axis=2))
+
+    def by_encounter(self, encounters: Sequence[Encounter]) -> list[dict[str, object]]:
+        """Strength of the tide and largest increase of the friction angle (deg) in each encounter."""
+        return [
+            {
+                "passage": _label(e),
+                "tide_s-2": float(self.tides[k][0]),
+                "followed": bool(self.integrated[k]),
+                "adds_at_any_attitude_deg": _largest(self.in_encounters[..., k, 0], self.equilibrium),
+                "adds_at_worst_attitude_deg": _largest(self.in_encounters[..., k, 1], self.equilibrium),
+            }
+            for k, e in enumerate(encounters)
+        ]
+
+
+def _check_bodies(asteroid: object, encounters: object) -> None:
+    """Check the types of the asteroid and of its encounters."""
+    if not isinstance(encounters, Iterable) or not all(isinstance(e, Encounter) for e in encounters):
+        raise InvalidInput("encounters", encounters, "a sequence of Encounter")
+    if not isinstance(asteroid, Asteroid | Body):
+        raise InvalidInput(
+            "asteroid", asteroid, "an Asteroid (Asteroid.from_catalogue finds a name) or a Body"
+        )
+
+
+def _over_grid(
+    bodies: Sequence[Body],
+    turns: Sequence[np.ndarray],
+    encounters: Sequence[Encounter],
+    rho: np.ndarray,
+    cohesion: np.ndarray,
+    code: int,
+    progress: Progressing,
+) -> _Friction:
+    """Friction angles at every density (kg/m3) and cohesion (Pa), by the bound or by integration."""
+    sizes = [tide_size(e.tide, e.t_start, e.t_stop) for e in encounters]
+    shape = (len(rho), len(cohesion))
+    found = _Friction(
+        np.empty(shape), np.empty((*shape, len(encounters), 2)), np.zeros(len(encounters), dtype=bool), sizes
+    )
+    with progress_bar(progress, len(rho) * len(cohesion), "materials", "bounds") as tick:
+        for i, j in np.ndindex(shape):
+            r, c = float(rho[i]), float(cohesion[j])
+            free, bounds = _by_bound(bodies, r, c, code, sizes)
+            found.equilibrium[i, j] = free
+            for k, encounter in enumerate(encounters):
+                if bounds[k] < free + NEGLIGIBLE or not np.isfinite(free):
+                    found.in_encounters[i, j, k] = free, max(free, bounds[k] if np.isfinite(free) else free)
+                    continue
+                found.integrated[k] = True
+                needed = [_need(b, q, encounter, r, c, code) for b, q in zip(bodies, turns, strict=True)]
+                found.in_encounters[i, j, k] = max(free, min(needed)), max(free, *needed)
+            tick(i * len(cohesion) + j + 1)
+    return found
+
+
+def strongest_passage(table: QTable) -> Document | None:
+    """The encounter with the strongest tide in ``meta["passages"]``; None without encounters.
+
+    Encounters are ordered by tide, not by increase, since an increase may be an upper bound.
     """
     return max(table.meta.get("passages", []), key=lambda p: p["tide_s-2"], default=None)
 
@@ -209,7 +258,7 @@ def survived(
     planets: Sequence[str] = ("earth",),
     within: Quantity = 0.05 * u.au,
 ) -> list[Encounter]:
-    """Passages of an asteroid between two dates, integrated with all forces, for :func:`infer`.
+    """Encounters of an asteroid between two dates, integrated with all forces, for :func:`infer`.
 
     Raises
     ------
@@ -251,7 +300,7 @@ def _attitudes(asteroid: Asteroid | Body, n: int, seed: int) -> tuple[list[Body]
 def _need(
     body: Body, turn: np.ndarray, encounter: Encounter, rho: float, cohesion: float, code: int
 ) -> float:
-    """Largest friction angle (rad) that the rigid body mobilises in a passage."""
+    """Largest friction angle (rad) that the rigid body mobilises in an encounter."""
     run = integrate(
         body_state(body.axes, rho, body.omega, turn, phi=0.5, cohesion=cohesion, surface=code),
         (encounter.t_start, encounter.t_stop),

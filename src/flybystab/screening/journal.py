@@ -2,7 +2,7 @@
 
 The journal is kept beside the output during a run. Each record is one line of JSON with a checksum. It is written as
 soon as its result is available, and synchronised to disk at least every `SYNC_INTERVAL` seconds and before the run
-reports success. A run that was killed, also by a power cut, resumes from its journal; the last line may then be
+reports success. A run that was killed, also by a power failure, resumes from its journal; the last line may then be
 incomplete and is dropped. A record whose checksum does not agree is reported, and its result is recomputed.
 """
 
@@ -15,12 +15,14 @@ import time as clock
 from array import array
 from collections.abc import Iterator, Mapping
 from hashlib import blake2b
+from io import FileIO
 from pathlib import Path
-from typing import Any, BinaryIO
+from typing import BinaryIO
 
 from flybystab.errors import InvalidInput, OutputFailed
+from flybystab.typing import Document
 
-#: Longest time between two fsync calls while records are written, s: the work that a power cut can lose.
+#: Longest time between two fsync calls while records are written, s: the most work that a power failure can lose.
 SYNC_INTERVAL = 1.0
 
 _MARK = b', "checksum": "'
@@ -51,7 +53,7 @@ class Journal:
         The file is the journal of another run, or not a journal, or in use by another process.
     """
 
-    def __init__(self, path: Path, header: Mapping[str, Any]) -> None:
+    def __init__(self, path: Path, header: Mapping[str, object]) -> None:
         self.path = path
         self.count = 0
         self.damaged: list[int] = []
@@ -123,13 +125,13 @@ class Journal:
         self._parts.pop(task, None)
         self.count += 1
 
-    def add(self, task: int, content: Mapping[str, Any]) -> None:
+    def add(self, task: int, content: Mapping[str, object]) -> None:
         """Record a finished task, unless it is recorded already."""
         if task in self:
             return
         self._note(task, self._append({"task": task, **content}))
 
-    def add_part(self, task: int, passage: int, first: int, content: Mapping[str, Any]) -> None:
+    def add_part(self, task: int, passage: int, first: int, content: Mapping[str, object]) -> None:
         """Record a part of a task: the samples from `first` on of one of its encounters."""
         offset = self._append({"task": task, "passage": passage, "first": first, **content})
         self._parts.setdefault(task, []).append(offset)
@@ -138,7 +140,7 @@ class Journal:
         """Record that this run writes the file `path`, to be removed if the run does not reach its end."""
         self._append({"unfinished_file": path.name, "inode": path.stat().st_ino, "folder": str(path.parent)})
 
-    def _append(self, content: Mapping[str, Any]) -> int:
+    def _append(self, content: Mapping[str, object]) -> int:
         """Write one record; returns its offset."""
         body = json.dumps(content).encode()[:-1]
         line = memoryview(body + _MARK + self._checksum(body) + b'"}\n')
@@ -152,7 +154,7 @@ class Journal:
     def _checksum(self, body: bytes) -> bytes:
         return blake2b(body, digest_size=8, key=self._key).hexdigest().encode()
 
-    def _decoded(self, line: bytes) -> dict[str, Any] | None:
+    def _decoded(self, line: bytes) -> Document | None:
         """Content of a record; None if it is damaged."""
         body, mark, rest = line.rpartition(_MARK)
         if not mark or rest != self._checksum(body) + b'"}\n':
@@ -164,12 +166,12 @@ class Journal:
         sync_file(self._file.fileno())
         self._synced = clock.monotonic()
 
-    def parts(self, task: int) -> list[dict[str, Any]]:
+    def parts(self, task: int) -> list[Document]:
         """The parts of a task that is not finished."""
         with self.path.open("rb") as stream:
             return [self._record(stream, offset) for offset in self._parts.get(task, ())]
 
-    def _record(self, stream: BinaryIO, offset: int) -> dict[str, Any]:
+    def _record(self, stream: BinaryIO, offset: int) -> Document:
         stream.seek(offset)
         found = self._decoded(stream.readline())
         if found is None:
@@ -179,14 +181,14 @@ class Journal:
             )
         return found
 
-    def tasks(self) -> Iterator[dict[str, Any]]:
+    def tasks(self) -> Iterator[Document]:
         """The finished tasks in their order, read one by one."""
         with self.path.open("rb") as stream:
             for offset in self._offsets:
                 if offset >= 0:
                     yield self._record(stream, offset)
 
-    def task(self, task: int) -> dict[str, Any]:
+    def task(self, task: int) -> Document:
         """A finished task."""
         with self.path.open("rb") as stream:
             return self._record(stream, self._offsets[task])
@@ -202,7 +204,7 @@ class Journal:
         self._file.close()
 
 
-def _open_locked(path: Path) -> Any:
+def _open_locked(path: Path) -> FileIO:
     """The file opened for appending and locked, without following a symbolic link."""
     while True:
         try:
@@ -226,7 +228,7 @@ def _open_locked(path: Path) -> Any:
         file.close()  # another run has just finished and removed it
 
 
-def _lock(file: Any, path: Path) -> None:
+def _lock(file: FileIO, path: Path) -> None:
     """Refuse a second process on the same journal."""
     try:
         import fcntl

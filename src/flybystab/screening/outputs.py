@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 from flybystab.screening.journal import Journal
+from flybystab.screening.result_rows import Row
 from flybystab.screening.results import Column
 from flybystab.screening.table_files import TableFile, write_rows
 
@@ -32,7 +32,7 @@ class Outputs:
     """
 
     def __init__(
-        self, journal: Journal, tables: Tables, meta: Mapping[str, Any], *, replace: bool = True
+        self, journal: Journal, tables: Tables, meta: Mapping[str, object], *, replace: bool = True
     ) -> None:
         self._journal, self._tables, self._replace = journal, tables, replace
         self._next = 0
@@ -51,7 +51,7 @@ class Outputs:
             self.discard()
             raise
 
-    def follow(self, task: int = -1, content: Mapping[str, Any] | None = None) -> None:
+    def follow(self, task: int = -1, content: Mapping[str, list[Row]] | None = None) -> None:
         """Append the rows of all tasks that are next; `content` is that of `task`, which need not be read again."""
         while self._next in self._journal:
             found = content if content and task == self._next else self._journal.task(self._next)
@@ -71,7 +71,7 @@ class Outputs:
         for file in self._files.values():
             file.discard()
 
-    def so_far(self, meta: Mapping[str, Any]) -> None:
+    def so_far(self, meta: Mapping[str, object]) -> None:
         """Write valid tables of the finished tasks.
 
         They are rebuilt from the journal, since an interrupt may have left an incomplete row.

@@ -6,13 +6,12 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, fields
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from flybystab.body.body import DENSITY_RANGE
 from flybystab.errors import InvalidInput, UnknownName
-from flybystab.files import DOCUMENT_LIMIT, parse_toml, read_text
+from flybystab.files import DOCUMENT_LIMIT, Document, parse_toml, read_text
 from flybystab.screening.distributions import Distribution, distribution_of
 
 #: Admissible range of each quantity.
@@ -75,7 +74,7 @@ class Population:
             ends = distribution.quantile(np.array([1e-9, 1.0 - 1e-9]))
             if ends[0] < low or ends[1] > high:
                 raise InvalidInput(
-                    name, distribution, f"values within [{low:g}, {high:g}]: give low and high to cut it"
+                    name, distribution, f"values within [{low:g}, {high:g}]: low and high truncate it"
                 )
         for name in ("log_elongation_per_mag", "log_elongation_sigma"):
             x = getattr(self, name)
@@ -98,7 +97,7 @@ class Population:
         return self.density_kg_m3, "density"
 
     @classmethod
-    def from_mapping(cls, data: Mapping[str, Any]) -> Population:
+    def from_mapping(cls, data: Mapping[str, object]) -> Population:
         """From a mapping such as a TOML table: ``{"cohesion_Pa": {"kind": "fixed", "value": 0}}``.
 
         A `density_kg_m3` without `density_by_class_kg_m3` applies to every class.
@@ -108,7 +107,7 @@ class Population:
         UnknownName, InvalidInput
         """
         known = {f.name for f in fields(cls)}
-        made: dict[str, Any] = {"density_by_class_kg_m3": {}} if "density_kg_m3" in data else {}
+        made: Document = {"density_by_class_kg_m3": {}} if "density_kg_m3" in data else {}
         for key, value in data.items():
             if key not in known:
                 near = get_close_matches(key, known)
@@ -136,10 +135,10 @@ class Population:
     def toml(self) -> str:
         """The population as a TOML file."""
         lines = [
-            "# What a screening draws. Kinds: fixed (value), uniform or loguniform (low, high), normal (mean, sd),",
-            "# lognormal (median, sigma of the natural logarithm), each of the last two with low and high to cut it;",
-            "# catalogue: values of the embedded catalogue; lightcurves: LCDB periods of bodies of like size.",
-            "# friction_angle_deg and cohesion_Pa count for every body, the rest where the catalogue is silent.",
+            "# Priors of a screening. Kinds: fixed (value), uniform or loguniform (low, high), normal (mean, sd),",
+            "# lognormal (median, sigma of the natural logarithm), the last two optionally truncated by low and high;",
+            "# catalogue: values of the embedded catalogue; lightcurves: LCDB periods of bodies of similar size.",
+            "# friction_angle_deg and cohesion_Pa apply to every body, the others where the catalogue has no value.",
         ]
         tables: list[str] = []
         for f in fields(self):

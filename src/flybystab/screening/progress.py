@@ -8,6 +8,7 @@ from typing import TextIO
 import numpy as np
 
 from flybystab.progress import Bar
+from flybystab.units import number_of
 
 
 @dataclass(frozen=True)
@@ -52,7 +53,7 @@ class Progress:
     def note(self) -> str:
         """Encounters by verdict, the most frequent first."""
         verdicts = ", ".join(f"{n} {v}" for v, n in sorted(self.verdicts.items(), key=lambda x: -x[1]))
-        return f"{self.rows} encounters" + (f": {verdicts}" if verdicts else "")
+        return number_of(self.rows, "encounter") + (f": {verdicts}" if verdicts else "")
 
 
 class ProgressBar:

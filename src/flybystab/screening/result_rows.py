@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 import numpy as np
 
@@ -27,11 +26,12 @@ from flybystab.screening.sample_verdicts import (
     wilson,
 )
 from flybystab.screening.settings import Settings
+from flybystab.typing import Document
 
 #: Values by column; omitted columns are empty.
-Row = dict[str, Any]
+Row = Document
 
-#: The margin of the catalogue body is integrated where the bound exceeds the value at rest by this, rad.
+#: The catalogue body is integrated if the bound on its friction angle exceeds the value at rest by more than this, rad.
 SHARP = float(np.radians(0.01))
 
 
@@ -83,7 +83,7 @@ def body_row(passage: Passage, settings: Settings) -> Row:
 
 
 def catalogue_body(passage: Passage, settings: Settings) -> Attitudes:
-    """Attitude of the catalogue body, with the body."""
+    """The catalogue body with its attitude."""
     asteroid = passage.asteroid
     known = nominal(asteroid, settings.material, settings.population)
     return Attitudes.at(asteroid, known, settings.seed, "nominal", *passage.key)
@@ -101,7 +101,7 @@ def sampled_row(row: Row, orbits: OrbitSampling, tally: Tally, draw: Draws, resu
     draw : Draws
         The first samples, `RANKED` at most.
     result : SampleVerdicts
-        Of these samples at least; of all of them where each has its own orbit.
+        Verdicts on at least these samples, and on all samples where each has its own orbit.
     """
     counts = tally.verdicts
     judged = tally.samples - counts[""]

@@ -6,7 +6,7 @@ import itertools
 import json
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import astropy.units as u
 import numpy as np
@@ -15,10 +15,16 @@ from astropy.table.meta import get_header_from_yaml
 from flybystab.errors import InvalidInput, MissingExtra
 from flybystab.result_table import ResultTable, read_table
 from flybystab.saving import pyarrow
+from flybystab.typing import Document
 
 #: Formats of tables that are read back, and all that tables are written in.
 FORMATS = (".ecsv", ".parquet")
 WRITTEN = (*FORMATS, ".csv")
+
+#: A value in a result table.
+Cell = float | int | bool | str
+#: Value of an empty cell by the type of its column.
+_EMPTY: dict[type, Cell] = {float: np.nan, int: -1, bool: False, str: ""}
 
 
 class Column(NamedTuple):
@@ -29,11 +35,11 @@ class Column(NamedTuple):
     text: str
 
 
-def empty_table(columns: Mapping[str, Column], meta: Mapping[str, Any]) -> ResultTable:
+def empty_table(columns: Mapping[str, Column], meta: Mapping[str, object]) -> ResultTable:
     """A table without rows."""
     table = ResultTable()
     for name, c in columns.items():
-        values: Any = np.array([], dtype="U1" if c.kind is str else c.kind)
+        values: np.ndarray = np.array([], dtype="U1" if c.kind is str else c.kind)
         table[name] = values * c.unit if c.unit is not None else values
         table[name].info.description = c.text
     table.meta = dict(meta)
@@ -41,13 +47,13 @@ def empty_table(columns: Mapping[str, Column], meta: Mapping[str, Any]) -> Resul
 
 
 def table_of(
-    rows: Iterable[Mapping[str, Any]], columns: Mapping[str, Column], meta: Mapping[str, Any]
+    rows: Iterable[Mapping[str, object]], columns: Mapping[str, Column], meta: Mapping[str, object]
 ) -> ResultTable:
     """A table of rows held in memory."""
     found = list(rows)
     table = ResultTable()
     for name, c in columns.items():
-        values: Any = np.array(
+        values: np.ndarray = np.array(
             [cell(r.get(name), c.kind) for r in found], dtype=str if c.kind is str else c.kind
         )
         table[name] = values * c.unit if c.unit is not None else values
@@ -56,11 +62,12 @@ def table_of(
     return table
 
 
-def cell(value: Any, kind: type) -> Any:
+def cell(value: object, kind: type) -> Cell:
     """A value of a column's kind; None becomes nan, -1, False or an empty text."""
     if value is None:
-        return {float: np.nan, int: -1, bool: False, str: ""}[kind]
-    return kind(value)
+        return _EMPTY[kind]
+    found: Cell = kind(value)
+    return found
 
 
 def read_results(path: str | Path) -> ResultTable:
@@ -76,7 +83,7 @@ def read_results(path: str | Path) -> ResultTable:
     return read_table(path, "result file")
 
 
-def read_meta(path: Path) -> dict[str, Any]:
+def read_meta(path: Path) -> Document:
     """Provenance of a result file, without its rows; empty if it has none."""
     try:
         if path.suffix == ".parquet":

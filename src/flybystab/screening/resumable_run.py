@@ -9,7 +9,6 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
-from typing import Any
 
 from flybystab.errors import FlybystabWarning, InvalidInput, OutputFailed
 from flybystab.screening.columns import COLUMNS, SAMPLE_COLUMNS
@@ -21,6 +20,7 @@ from flybystab.screening.results import Column, read_meta
 from flybystab.screening.sample_verdicts import SampleVerdicts
 from flybystab.screening.table_files import check_output
 from flybystab.screening.tasks import Rows
+from flybystab.typing import Document
 
 #: Path and columns of each table of a run.
 Tables = dict[str, tuple[Path, Mapping[str, Column]]]
@@ -76,8 +76,8 @@ class ResumableRun:
         self,
         tables: Tables,
         total: int,
-        meta: Callable[[bool], dict[str, Any]],
-        fingerprint: Mapping[str, Any],
+        meta: Callable[[bool], Document],
+        fingerprint: Mapping[str, object],
         *,
         overwrite: bool,
         progress: Callable[[Progress], None] | None,
@@ -101,7 +101,7 @@ class ResumableRun:
         return self.output.with_name(self.output.name + ".journal")
 
     def _existing(self, *, overwrite: bool) -> bool:
-        """Whether a table exists; an error unless it may be replaced."""
+        """True if a table exists; raises InvalidInput if it may not be replaced."""
         unfinished = os.path.lexists(self._journal_file)
         taken = [path for path, _ in self.tables.values() if os.path.lexists(path)]
         for path in () if overwrite else taken:
@@ -110,7 +110,7 @@ class ResumableRun:
                 raise InvalidInput(
                     "output",
                     str(path),
-                    "a file that is not there yet; --overwrite (overwrite=True) replaces it",
+                    "a file that does not exist; --overwrite (overwrite=True) replaces it",
                 )
         return bool(taken)
 
@@ -139,7 +139,7 @@ class ResumableRun:
 
     @contextmanager
     def writing(self) -> Iterator[None]:
-        """Errors of the disk as :class:`OutputFailed`, which says what is saved and how to resume."""
+        """Raise :class:`OutputFailed` for errors of the disk, with what is saved and how to resume."""
         try:
             yield
         except OSError as error:
@@ -150,7 +150,7 @@ class ResumableRun:
             ) from None
 
     def finish(self, results: Results) -> Progress:
-        """Compute the missing results and write the tables; a table of the finished rows if this is interrupted."""
+        """Compute the missing results and write the tables; after an interruption, tables of the finished rows."""
         journal, outputs = self.journal, None
         try:
             with self.writing():
@@ -189,6 +189,6 @@ class KeptParts:
         with self._writing():
             self._journal.add_part(asteroid, encounter, first, verdicts.stored())
 
-    def of(self, asteroid: int) -> list[dict[str, Any]]:
+    def of(self, asteroid: int) -> list[Document]:
         """The stored parts of an asteroid."""
         return self._journal.parts(asteroid)

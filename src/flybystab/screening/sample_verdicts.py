@@ -1,11 +1,11 @@
-"""Verdicts on many bodies in one passage: by the bound where it decides, by integration elsewhere."""
+"""Verdicts on many bodies in one encounter: by the bound where it decides, else by integration."""
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import astropy.units as u
 import numpy as np
@@ -19,7 +19,7 @@ from flybystab.flybys.flyby_many import follow_rows
 from flybystab.flybys.verdict import Verdict
 from flybystab.screening.draws import Attitudes, Draws
 from flybystab.screening.encounters import Passage
-from flybystab.typing import Array
+from flybystab.typing import Array, Document
 
 
 def _quick(draw: Draws, code: int, size: tuple[float, float]) -> tuple[Array, NDArray[np.int64]]:
@@ -46,26 +46,26 @@ def friction_at_rest(draw: Draws, material: Material) -> Array:
 
 @dataclass
 class SampleVerdicts:
-    """Verdicts on the samples of one passage.
+    """Verdicts on the samples of one encounter.
 
     Attributes
     ----------
     verdict : list of str
         Empty where there is none.
     margin, rest : ndarray
-        Friction angle of the material minus the largest one mobilised in the passage; the one mobilised at rest, rad.
+        Friction angle of the material minus the largest one mobilised in the encounter; the one mobilised at rest, rad.
     dynamic : ndarray of bool
-        Decided by the dynamics, not by the bound.
+        Decided by integration, not by the bound.
     error : list of str
         Reason why there is no verdict; empty if there is one.
     distance : ndarray
-        Of the passage, m.
+        Of the closest approach, m.
     numerical : float
         Numerical error of the first mobilised angle, deg, where it was measured.
     grains : ndarray of bool
-        Carried on by grains.
+        Continued with grains.
     largest : ndarray
-        Largest clump of grains over the mass; nan without grains.
+        Mass fraction of the largest clump; nan without grains.
     """
 
     verdict: list[str]
@@ -103,7 +103,7 @@ class SampleVerdicts:
         nothing = np.full(1, np.nan)
         return cls([""], nothing, nothing.copy(), np.zeros(1, dtype=bool), [error], np.full(1, distance))
 
-    def stored(self) -> dict[str, Any]:
+    def stored(self) -> Document:
         """As JSON-compatible data, without loss of digits."""
         arrays = {name: getattr(self, name).tolist() for name in ("margin", "rest", "dynamic", "distance")}
         if self.grains.any():
@@ -111,7 +111,7 @@ class SampleVerdicts:
         return {"verdict": [str(v) for v in self.verdict], "error": self.error, **arrays}
 
     @classmethod
-    def restored(cls, stored: Mapping[str, Any]) -> SampleVerdicts:
+    def restored(cls, stored: Document) -> SampleVerdicts:
         """Inverse of `stored`."""
         margin, rest, distance = (np.array(stored[n], dtype=float) for n in ("margin", "rest", "distance"))
         dynamic = np.array(stored["dynamic"], dtype=bool)
@@ -127,7 +127,7 @@ RANKED = 100_000
 
 
 class Tally(NamedTuple):
-    """Counts of samples: by verdict, by the dynamics, by grains, and failed ones with the first reason."""
+    """Counts of samples: by verdict, integrated, continued with grains, and failed, with the first reason."""
 
     verdicts: Counter[str]
     dynamic: int
@@ -174,7 +174,7 @@ def sample_verdicts(
     sharp: float = np.inf,
     measure: bool = False,
 ) -> SampleVerdicts:
-    """Verdicts on bodies in one passage: by the bound where it decides, else by the dynamics.
+    """Verdicts on bodies in one encounter: by the bound where it decides, else by integration.
 
     Parameters
     ----------
@@ -185,7 +185,7 @@ def sample_verdicts(
     material : Material
         Yield surface, dilatancy and brittleness; friction and cohesion are those of the draw.
     quick : bool
-        Whether the bound may decide.
+        Use the bound; otherwise every body is integrated.
     sharp : float
         Integrate a body although the bound decides if the bound on its mobilised friction angle exceeds the
         angle at rest by more than this, rad: the margin is then a value instead of a lower limit.
@@ -246,7 +246,7 @@ def verdicts_each(
     *,
     tolerance: float = 1e-7,
 ) -> SampleVerdicts:
-    """Verdicts on bodies with a separate passage for each (arguments as of :func:`sample_verdicts`)."""
+    """Verdicts on bodies with a separate encounter for each (arguments as of :func:`sample_verdicts`)."""
     return SampleVerdicts.joined(
         [
             sample_verdicts(p, draw.part(i, i + 1), attitudes.part(i, i + 1), material, tolerance=tolerance)

@@ -22,7 +22,7 @@ from flybystab.typing import Array
 
 #: Columns of uniform numbers behind a draw.
 _SIZE, _SHAPE, _FLAT, _THIRD, _DENSITY, _PERIOD, _FRICTION, _COHESION, _PHASE, _ALBEDO, _SOLUTION = range(11)
-#: Number of uniform numbers of a sample; one is spare.
+#: Number of uniform numbers of a sample; one is unused.
 WIDTH = 12
 
 
@@ -69,7 +69,7 @@ class SampledInputs:
         self.drawn: list[str] = []
 
     def _known(self, *columns: str) -> bool:
-        """Whether the columns have values that are not to be replaced by the prior."""
+        """True if the columns have values that the prior does not replace."""
         assumed = self.replace and any(c in self.asteroid.assumed for c in columns)
         return self.asteroid.knows(*columns) and not assumed
 
@@ -162,7 +162,7 @@ class SampledInputs:
         return truncated_normal(x, centre, self._sigma("density_sigma_kg_m3"), least, most)
 
     def spins(self) -> SampledSpins:
-        """Spins: of a tumbler at random phases, of the rival solutions by their weights, or by period."""
+        """Spins: of a tumbler at random phases, of alternative solutions by their weights, or from the period."""
         n = len(self.x)
         phase = np.zeros(n) if self.keep else self.x[:, _PHASE]
         none = np.full(n, -1, dtype=np.int64)

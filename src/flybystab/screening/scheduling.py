@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import os
 from collections import deque
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import islice
 from pickle import PickleError
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, ParamSpec, Protocol, TypeVar
 
 from flybystab.catalogues.catalogue import Asteroid
 from flybystab.errors import WorkersLost
@@ -18,6 +18,10 @@ from flybystab.screening.grain_samples import GrainSample
 from flybystab.screening.sample_verdicts import SampleVerdicts
 from flybystab.screening.settings import Settings
 from flybystab.screening.tasks import OpenPassage, Part, Rows, begin, joined
+from flybystab.typing import Document
+
+P = ParamSpec("P")
+R = TypeVar("R")
 
 
 def _begin(
@@ -32,7 +36,7 @@ def _judge(part: Part | GrainSample, settings: Settings) -> SampleVerdicts:
 
 @dataclass(eq=False)
 class _Asteroid:
-    """An asteroid in progress: its passages, the number of open ones, and their initial number of samples."""
+    """An asteroid in progress: its encounters, the number of open ones, and their initial number of samples."""
 
     position: int
     work: list[Rows | OpenPassage]
@@ -42,7 +46,7 @@ class _Asteroid:
 
 
 class _Piece(NamedTuple):
-    """Position of the result of a part."""
+    """Asteroid, encounter and first sample of a part."""
 
     asteroid: _Asteroid
     number: int
@@ -54,9 +58,9 @@ class Parts(Protocol):
     """Store of finished parts of long tasks."""
 
     def add(self, asteroid: int, passage: int, first: int, judged: SampleVerdicts) -> None:
-        """Store a part: samples from `first` on of one passage of the asteroid."""
+        """Store a part: samples from `first` on of one encounter of the asteroid."""
 
-    def of(self, asteroid: int) -> Sequence[Mapping[str, Any]]:
+    def of(self, asteroid: int) -> Sequence[Document]:
         """Stored parts of an asteroid, with ``passage``, ``first`` and the result of `SampleVerdicts.stored`."""
 
 
@@ -65,9 +69,9 @@ class SerialExecutor(Executor):
 
     _max_workers = 1
 
-    def submit(self, fn: Callable[..., Any], /, *args: Any, **kwargs: Any) -> Future[Any]:
+    def submit(self, fn: Callable[P, R], /, *args: P.args, **kwargs: P.kwargs) -> Future[R]:
         """The result, in a finished future."""
-        future: Future[Any] = Future()
+        future: Future[R] = Future()
         try:
             future.set_result(fn(*args, **kwargs))
         except Exception as error:
@@ -99,7 +103,7 @@ def scheduled(
     window : int
         Calls in flight at a time: memory does not grow with the length of the list.
     block : int
-        Samples by the dynamics in one part (:func:`flybystab.screening.tasks.opened`).
+        Integrated samples in one part (:func:`flybystab.screening.tasks.opened`).
     report : callable, optional
         Called after every part with the completed fractions of the asteroids in progress, summed.
     parts : Parts, optional
@@ -110,73 +114,116 @@ def scheduled(
     WorkersLost
         Names the asteroids in progress.
     """
-    positions = iter(todo)
-    waiting: deque[Iterator[tuple[_Piece, Part | GrainSample]]] = deque()
-    calls: dict[Future[Any], list[int] | _Piece] = {}
-    begun: dict[int, float] = {}
-
-    def send() -> bool:
-        """Send one call; False if there is nothing to send."""
-        while waiting:
-            if (found := next(waiting[0], None)) is not None:
-                piece, part = found
-                calls[executor.submit(_judge, part, settings)] = piece
-                return True
-            waiting.popleft()
-        if chosen := list(islice(positions, chunk)):
-            future = executor.submit(_begin, [asteroids[i] for i in chosen], settings, finder, block)
-            calls[future] = chosen
-        return bool(chosen)
-
+    schedule = _Schedule(asteroids, iter(todo), settings, finder, executor, chunk, block, parts)
     try:
         while True:
-            while len(calls) < window and send():
+            while len(schedule.calls) < window and schedule.send():
                 pass
-            if not calls:
+            if not schedule.calls:
                 return
-            finished, _ = wait(calls, return_when=FIRST_COMPLETED)
+            finished, _ = wait(schedule.calls, return_when=FIRST_COMPLETED)
             for future in finished:
-                call = calls.pop(future)
-                try:
-                    answer = future.result()
-                except Exception as error:
-                    names = ", ".join(asteroids[i].name for i in _positions(call))
-                    if (reason := _failed_workers(error, executor)) is None:
-                        raise
-                    raise WorkersLost(
-                        f"{reason}; in progress: {names}. Finished asteroids are kept: the same call continues the run"
-                    ) from error
+                call, answer = schedule.received(future)
                 if isinstance(call, _Piece):
-                    call.passage.take(call.first, answer)
-                    asteroid = call.asteroid
-                    if parts is not None:
-                        parts.add(asteroid.position, call.number, call.first, answer)
-                    asteroid.open -= not call.passage.left
-                    if not call.passage.unjudged and call.passage.needed and not call.passage.sent:
-                        asteroid.samples += len(call.passage.needed)
-                        waiting.appendleft(_grain_pieces(asteroid, call.number, call.passage))
-                    asteroid.done += len(answer.verdict)
-                    begun[asteroid.position] = asteroid.done / asteroid.samples
-                    if not asteroid.open:
-                        del begun[asteroid.position]
-                        yield asteroid.position, joined(asteroid.work, settings)
+                    if (rows := schedule.take(call, answer)) is not None:
+                        yield call.asteroid.position, rows
                     elif report is not None:
-                        report(sum(begun.values()))
+                        report(sum(schedule.completed.values()))
                     continue
                 for i, work in zip(call, answer, strict=True):
-                    for part in () if parts is None else parts.of(i):
-                        found = work[part["passage"]] if part["passage"] < len(work) else None
-                        if isinstance(found, OpenPassage):
-                            found.take_stored([part])
-                    left = [(n, w) for n, w in enumerate(work) if isinstance(w, OpenPassage) and w.left]
-                    if left:
-                        samples = sum(w.left for _, w in left)
-                        waiting.append(_pieces(_Asteroid(i, work, len(left), samples), left))
-                    else:
-                        yield i, joined(work, settings)
+                    if (rows := schedule.start(i, work)) is not None:
+                        yield i, rows
     finally:
-        for future in calls:
+        for future in schedule.calls:
             future.cancel()
+
+
+@dataclass(eq=False)
+class _Schedule:
+    """State of :func:`scheduled`, whose arguments it holds.
+
+    Attributes
+    ----------
+    waiting : deque of iterators
+        Parts of asteroids in progress that have not been sent.
+    calls : dict
+        Calls in flight: positions of new asteroids, or one part.
+    completed : dict of int to float
+        Completed fractions of the asteroids in progress.
+    """
+
+    asteroids: Sequence[Asteroid]
+    positions: Iterator[int]
+    settings: Settings
+    finder: Finder
+    executor: Executor
+    chunk: int
+    block: int
+    parts: Parts | None
+    waiting: deque[Iterator[tuple[_Piece, Part | GrainSample]]] = field(default_factory=deque)
+    calls: dict[Future[Any], list[int] | _Piece] = field(default_factory=dict)
+    completed: dict[int, float] = field(default_factory=dict)
+
+    def send(self) -> bool:
+        """Send one call; False if there is nothing to send."""
+        while self.waiting:
+            if (found := next(self.waiting[0], None)) is not None:
+                piece, part = found
+                self.calls[self.executor.submit(_judge, part, self.settings)] = piece
+                return True
+            self.waiting.popleft()
+        if chosen := list(islice(self.positions, self.chunk)):
+            new = [self.asteroids[i] for i in chosen]
+            self.calls[self.executor.submit(_begin, new, self.settings, self.finder, self.block)] = chosen
+        return bool(chosen)
+
+    def received(self, future: Future[Any]) -> tuple[list[int] | _Piece, Any]:
+        """A finished call and its result.
+
+        Raises
+        ------
+        WorkersLost
+        """
+        call = self.calls.pop(future)
+        try:
+            return call, future.result()
+        except Exception as error:
+            if (reason := _failed_workers(error, self.executor)) is None:
+                raise
+            names = ", ".join(self.asteroids[i].name for i in _positions(call))
+            raise WorkersLost(
+                f"{reason}; in progress: {names}. Finished asteroids are kept: the same call continues the run"
+            ) from error
+
+    def take(self, piece: _Piece, verdicts: SampleVerdicts) -> Rows | None:
+        """Store the verdicts of a part; the rows of its asteroid if it was the last one."""
+        asteroid, passage = piece.asteroid, piece.passage
+        passage.take(piece.first, verdicts)
+        if self.parts is not None:
+            self.parts.add(asteroid.position, piece.number, piece.first, verdicts)
+        asteroid.open -= not passage.left
+        if not passage.unjudged and passage.needed and not passage.sent:
+            asteroid.samples += len(passage.needed)
+            self.waiting.appendleft(_grain_pieces(asteroid, piece.number, passage))
+        asteroid.done += len(verdicts.verdict)
+        self.completed[asteroid.position] = asteroid.done / asteroid.samples
+        if asteroid.open:
+            return None
+        del self.completed[asteroid.position]
+        return joined(asteroid.work, self.settings)
+
+    def start(self, position: int, work: list[Rows | OpenPassage]) -> Rows | None:
+        """Restore stored parts of an asteroid and queue the others; its rows if there are none."""
+        for part in () if self.parts is None else self.parts.of(position):
+            found = work[part["passage"]] if part["passage"] < len(work) else None
+            if isinstance(found, OpenPassage):
+                found.take_stored([part])
+        left = [(n, w) for n, w in enumerate(work) if isinstance(w, OpenPassage) and w.left]
+        if not left:
+            return joined(work, self.settings)
+        samples = sum(w.left for _, w in left)
+        self.waiting.append(_pieces(_Asteroid(position, work, len(left), samples), left))
+        return None
 
 
 def _pieces(
@@ -196,7 +243,7 @@ def _grain_pieces(
 
 
 def _failed_workers(error: Exception, executor: Executor) -> str | None:
-    """What happened to the workers; None for an error of the computation itself.
+    """Description of the loss of workers; None for an error of the computation itself.
 
     Errors of lost workers come from concurrent.futures or from dask (``KilledWorker``, closed connections).
     """
@@ -223,5 +270,5 @@ def _positions(call: list[int] | _Piece) -> list[int]:
 
 
 def window_of(executor: Executor) -> int:
-    """Calls in flight that keep all workers busy."""
+    """Number of calls in flight with which all workers are busy."""
     return 4 * int(getattr(executor, "_max_workers", 0) or os.cpu_count() or 1)

@@ -20,7 +20,6 @@ from collections import Counter
 from collections.abc import Callable, Container, Iterator, Sequence
 from concurrent.futures import Executor
 from pathlib import Path
-from typing import Any
 
 import astropy.units as u
 from astropy.time import Time
@@ -37,12 +36,14 @@ from flybystab.screening.columns import COLUMNS
 from flybystab.screening.encounters import Finder, passages
 from flybystab.screening.priors import Population
 from flybystab.screening.progress import Progress
+from flybystab.screening.result_rows import Row
 from flybystab.screening.results import table_of
 from flybystab.screening.resumable_run import ResumableRun, output_tables
 from flybystab.screening.scheduling import Parts, SerialExecutor, scheduled, window_of
 from flybystab.screening.selection import listed
 from flybystab.screening.settings import Settings, settings
 from flybystab.screening.tasks import Rows, block_of
+from flybystab.typing import Document
 
 
 class Screening:
@@ -61,7 +62,7 @@ class Screening:
         self.settings = settings
         self.finder = finder
 
-    def meta(self, *, complete: bool = True) -> dict[str, Any]:
+    def meta(self, *, complete: bool = True) -> Document:
         """Provenance of the table."""
         files = sorted({a.file for a in self.asteroids})
         return {
@@ -76,7 +77,7 @@ class Screening:
             "nominal": "catalogue values and the material given; unknown poles and angles are drawn",
         }
 
-    def fingerprint(self) -> dict[str, Any]:
+    def fingerprint(self) -> Document:
         """Settings that must agree for two runs to share a journal."""
         digest = hashlib.sha256()
         for a in self.asteroids:
@@ -220,9 +221,9 @@ def screen(
     samples : int
         Number of samples of the uncertain inputs per encounter, in addition to the catalogue values; 1 for none.
     seed : int
-        Seed of all random numbers; results do not depend on the executor.
+        Seed of all random numbers.
     executor : concurrent.futures.Executor, optional
-        Computes the asteroids; by default they are computed one by one in this process.
+        Computes the asteroids, by default one by one in this process; results do not depend on it.
     material : Material, optional
         Of the catalogue body: 35 deg and no cohesion by default. Samples draw theirs from `population`.
     population : Population, optional
@@ -230,10 +231,10 @@ def screen(
     tolerance : float
         Step tolerance of the dynamics.
     grains : int, optional
-        Number of grains of the piles with which samples are computed that the ellipsoid cannot follow to the end, one
-        pile each.
+        Number of grains per pile. Samples that the ellipsoid cannot follow to the end are continued with one pile
+        each.
     progress : bool or callable, optional
-        Whether to show a bar (:mod:`flybystab.progress`), or a function that is called with a :class:`Progress` after
+        Show a bar (:mod:`flybystab.progress`), or a function that is called with a :class:`Progress` after
         every asteroid.
     finder : callable
         Finds the encounters of an asteroid, in place of a search along its orbit.
@@ -253,7 +254,7 @@ def screen(
     )
     run = Screening(chosen, wanted, finder)
     began = clock.monotonic()
-    found: dict[int, list[dict[str, Any]]] = {}
+    found: dict[int, list[Row]] = {}
     counts: Counter[str] = Counter()
     check_progress(progress)
     with progress_bar(not callable(progress) and progress, len(chosen), "asteroids", "screening") as tick:

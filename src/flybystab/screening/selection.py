@@ -1,4 +1,4 @@
-"""The asteroids of a screening: named, from files, or the whole embedded catalogue; each of them once."""
+"""Selection of the asteroids of a screening: by name, from files, or the whole embedded catalogue."""
 
 from __future__ import annotations
 

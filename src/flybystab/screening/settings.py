@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from numbers import Real
-from typing import Any
 
 import astropy.units as u
 import numpy as np
@@ -21,9 +20,10 @@ from flybystab.flybys.grains_flyby import warn_of_few
 from flybystab.orbit.ephemeris import ephemeris
 from flybystab.orbit.planets import planet
 from flybystab.screening.priors import Population
+from flybystab.typing import Document
 from flybystab.units import checked_time, to_si, whole
 
-#: Time limit of one asteroid, s: ten thousand times the median; its row fails beyond it.
+#: Time limit of one asteroid, s, ten thousand times the median; beyond it the row has an error.
 TIME_LIMIT = 600.0
 
 
@@ -49,7 +49,7 @@ class Settings:
     time_limit : float
         Longest time to find the encounters of one asteroid and begin with its samples, s.
     grains : int
-        Grains of the piles that carry on the samples where the ellipsoid ends; 0 for none.
+        Grains per pile for samples that the ellipsoid cannot follow to the end; 0 for none.
     """
 
     start: float
@@ -65,7 +65,7 @@ class Settings:
     time_limit: float = TIME_LIMIT
     grains: int = 0
 
-    def stated(self) -> dict[str, Any]:
+    def stated(self) -> Document:
         """All settings that determine the rows, as plain data."""
         m = self.material
         return {

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import astropy.units as u
 import numpy as np
@@ -15,6 +14,8 @@ from flybystab.errors import InvalidInput
 from flybystab.flybys.verdict import Verdict
 from flybystab.screening.columns import VERDICTS, share_of
 from flybystab.screening.results import read_results
+from flybystab.typing import Document
+from flybystab.units import number_of
 
 #: Rows of a list in the text.
 TOP = 20
@@ -51,7 +52,7 @@ class Summary:
     sampled, assumed : int
         Encounters with samples, and those of bodies with properties that are assumed, not measured.
     samples, samples_dynamic : int
-        Samples drawn, and those that needed the dynamics.
+        Samples drawn, and those that were integrated.
     closest : QTable
         Encounters of bodies in equilibrium with the least margin, worst first.
     strongest : QTable
@@ -62,7 +63,7 @@ class Summary:
         Encounters of bodies that are not in equilibrium at their catalogue values but are in some samples, the largest
         probability of INTACT first.
     contributors : dict of str to int
-        Inputs to which the margin is most sensitive, with the number of passages.
+        Inputs to which the margin is most sensitive, with the number of encounters.
     errors : dict of str to int
         Reasons of failure.
     meta : dict
@@ -83,7 +84,7 @@ class Summary:
     undecided: QTable
     contributors: dict[str, int]
     errors: dict[str, int]
-    meta: dict[str, Any]
+    meta: Document
 
     @property
     def dynamic_share(self) -> float:
@@ -92,10 +93,7 @@ class Summary:
 
     def text(self) -> str:
         """A few lines for a terminal: probabilities over the samples first, then the verdicts at catalogue values."""
-        lines = [
-            f"{self.rows} encounter{'s' * (self.rows != 1)}"
-            + (f", {self.failed} not computed" if self.failed else "")
-        ]
+        lines = [number_of(self.rows, "encounter") + (f", {self.failed} not computed" if self.failed else "")]
         if not self.meta.get("complete", True):
             lines[0] += " (unfinished run)"
         if self.sampled:
@@ -103,21 +101,21 @@ class Summary:
             lines.append(
                 "probability over the samples"
                 if one
-                else f"expected number over the samples ({self.sampled} encounters with samples)"
+                else f"expected number over the samples ({number_of(self.sampled, 'encounter')} with samples)"
             )
             lines += [f"  {name}: {n:.3g}" for name, n in self.expected.items()]
         lines.append("at the catalogue values" + self._caveat())
         lines += [f"  {name}: {n}" for name, n in self.verdicts.items()]
         if self.samples:
-            lines.append(f"{self.samples} samples, {100 * self.dynamic_share:.2g} % of them by the dynamics")
+            lines.append(f"{self.samples} samples, {100 * self.dynamic_share:.2g} % of them integrated")
         if self.contributors:
             most = ", ".join(f"{name} ({n})" for name, n in self.contributors.items())
-            lines.append(f"margin most sensitive to (passages): {most}")
+            lines.append(f"margin most sensitive to (encounters): {most}")
         for title, table in (
             ("closest to failure", self.closest),
-            ("largest increase by the passage", self.strongest),
+            ("largest increase in the encounter", self.strongest),
             ("may yield", self.reshaped[:TOP]),
-            ("not in equilibrium at the catalogue values, but in a share of the samples", self.undecided),
+            ("not in equilibrium at the catalogue values, but in some of the samples", self.undecided),
         ):
             if len(table):
                 lines += [f"{title}:", *("  " + line for line in _lines(table))]
@@ -143,7 +141,7 @@ def _lines(table: QTable) -> list[str]:
             line += f" ({row['assumed']} assumed)" if row["assumed"] else ""
         else:
             line += f", margin {row['margin'].to_value(u.deg):.2f} deg, "
-            line += f"{row['friction_rise'].to_value(u.deg):.3g} deg by the passage"
+            line += f"{row['friction_rise'].to_value(u.deg):.3g} deg by the encounter"
         if np.isfinite(row["p_yield"]):
             line += f", yields in {100 * row['p_yield']:.3g} % of the samples"
         out.append(line)

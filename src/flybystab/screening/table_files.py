@@ -13,15 +13,15 @@ import os
 import shutil
 import stat
 import tempfile
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import Any, BinaryIO, Protocol
+from typing import BinaryIO, Protocol
 
 from flybystab.errors import InvalidInput, OutputFailed
 from flybystab.saving import DOCUMENT_UNITS, csv_cell, pyarrow, with_unit
 from flybystab.screening.journal import sync_file, sync_folder
-from flybystab.screening.results import FORMATS, Column, cell, empty_table
+from flybystab.screening.results import FORMATS, Cell, Column, cell, empty_table
 
 #: Rows of one Parquet row group.
 ROW_GROUP = 10_000
@@ -76,9 +76,9 @@ def check_output(path: str | Path, formats: tuple[str, ...] = FORMATS) -> Path:
 
 
 class _Format(Protocol):
-    """A file that takes rows."""
+    """Writer of the rows of a table."""
 
-    def write(self, cells: list[Any]) -> None:
+    def write(self, cells: Sequence[Cell]) -> None:
         """Append a row."""
 
     def close(self, *, finish: bool) -> None:
@@ -86,7 +86,7 @@ class _Format(Protocol):
 
 
 class _Ecsv:
-    def __init__(self, stream: BinaryIO, columns: Mapping[str, Column], meta: Mapping[str, Any]) -> None:
+    def __init__(self, stream: BinaryIO, columns: Mapping[str, Column], meta: Mapping[str, object]) -> None:
         text = io.StringIO()
         empty_table(columns, {**meta, "rows": _ROWS}).write(text, format="ascii.ecsv", delimiter=",")
         header = text.getvalue().encode()
@@ -95,7 +95,7 @@ class _Ecsv:
         self._stream.write(header)
         self._count = 0
 
-    def write(self, cells: list[Any]) -> None:
+    def write(self, cells: Sequence[Cell]) -> None:
         self._stream.write((",".join(map(csv_cell, cells)) + "\n").encode())
         self._count += 1
 
@@ -109,7 +109,7 @@ class _Ecsv:
 class _Csv:
     """Plain CSV: the unit in the name of each column, no metadata."""
 
-    def __init__(self, stream: BinaryIO, columns: Mapping[str, Column], meta: Mapping[str, Any]) -> None:
+    def __init__(self, stream: BinaryIO, columns: Mapping[str, Column], meta: Mapping[str, object]) -> None:
         units = {k: DOCUMENT_UNITS.get(k, c.unit) for k, c in columns.items() if c.unit is not None}
         self._factors = {
             i: columns[name].unit.to(unit)  # type: ignore[union-attr]
@@ -119,10 +119,13 @@ class _Csv:
         self._stream = stream
         self._put([with_unit(name, units[name]) if name in units else name for name in columns])
 
-    def write(self, cells: list[Any]) -> None:
-        self._put([x * self._factors[i] if i in self._factors else x for i, x in enumerate(cells)])
+    def write(self, cells: Sequence[Cell]) -> None:
+        factors = self._factors
+        self._put(
+            [x * factors[i] if i in factors and not isinstance(x, str) else x for i, x in enumerate(cells)]
+        )
 
-    def _put(self, cells: list[Any]) -> None:
+    def _put(self, cells: Sequence[Cell]) -> None:
         self._stream.write((",".join(map(csv_cell, cells)) + "\n").encode())
 
     def close(self, *, finish: bool) -> None:
@@ -130,7 +133,7 @@ class _Csv:
 
 
 class _Parquet:
-    def __init__(self, stream: BinaryIO, columns: Mapping[str, Column], meta: Mapping[str, Any]) -> None:
+    def __init__(self, stream: BinaryIO, columns: Mapping[str, Column], meta: Mapping[str, object]) -> None:
         self._pa = pa = pyarrow()
         types = {float: pa.float64(), int: pa.int64(), bool: pa.bool_(), str: pa.string()}
         units = {name: "" if c.unit is None else c.unit.to_string("vounit") for name, c in columns.items()}
@@ -143,10 +146,10 @@ class _Parquet:
         )
         self._stream = stream
         self._writer = pa.parquet.ParquetWriter(self._stream, self._schema, compression="zstd")
-        self._group: list[list[Any]] = [[] for _ in columns]
+        self._group: list[list[Cell]] = [[] for _ in columns]
         self._groups = 0
 
-    def write(self, cells: list[Any]) -> None:
+    def write(self, cells: Sequence[Cell]) -> None:
         for column, value in zip(self._group, cells, strict=True):
             column.append(value)
         if len(self._group[0]) >= ROW_GROUP:
@@ -196,7 +199,7 @@ class TableFile:
         self,
         path: Path,
         columns: Mapping[str, Column],
-        meta: Mapping[str, Any],
+        meta: Mapping[str, object],
         *,
         replace: bool = True,
     ) -> None:
@@ -213,7 +216,7 @@ class TableFile:
             self._remove()
             raise
 
-    def write(self, row: Mapping[str, Any]) -> None:
+    def write(self, row: Mapping[str, object]) -> None:
         """Append a row; missing values are empty."""
         self._file.write([cell(row.get(name), kind) for name, kind in self._kinds])
         self.count += 1
@@ -268,7 +271,7 @@ def _new_file(path: Path) -> tuple[Path, BinaryIO]:
 
 
 def _identity(path: Path) -> tuple[int, ...] | None:
-    """Tells whether a file is still the same one; None without a file."""
+    """Device, inode, size and time of a file, which tell whether it has changed; None without a file."""
     try:
         found = path.lstat()
     except OSError:
@@ -301,10 +304,10 @@ def move_into_place(part: Path, path: Path, replaced: tuple[int, ...] | None) ->
 
 
 def write_rows(
-    rows: Iterable[Mapping[str, Any]],
+    rows: Iterable[Mapping[str, object]],
     path: Path,
     columns: Mapping[str, Column],
-    meta: Mapping[str, Any],
+    meta: Mapping[str, object],
     *,
     replace: bool = True,
 ) -> int:

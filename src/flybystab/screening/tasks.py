@@ -1,17 +1,16 @@
-"""Units of work of a screening: an asteroid, and parts of the samples of a passage that takes long.
+"""Units of work of a screening: an asteroid, and parts of the samples of a long encounter.
 
-A worker starts an asteroid: it finds the passages and computes verdicts for the catalogue body and a few samples of
-each passage. The other samples are completed immediately where the bound decides. Those that need an integration of
-the body, or of their own orbit, are left in parts for all workers, so that a single passage keeps every core busy. A
+A worker starts an asteroid: it finds the encounters and computes verdicts for the catalogue body and a few samples of
+each encounter. The other samples are completed immediately where the bound decides. Those that need an integration of
+the body, or of their own orbit, are left in parts for all workers, so that a single encounter keeps every core busy. A
 sample depends on the seed, the asteroid and its number only (:mod:`flybystab.screening.draws`): the rows do not
 depend on the division into parts.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
@@ -32,10 +31,11 @@ from flybystab.screening.result_rows import (
 from flybystab.screening.sample_verdicts import RANKED, SampleVerdicts, Tally, sample_verdicts, verdicts_each
 from flybystab.screening.settings import Settings
 from flybystab.screening.time_limits import time_limit
+from flybystab.typing import Document
 
 #: ``rows`` of encounters, and ``samples`` where they are kept.
 Rows = dict[str, list[Row]]
-#: Samples from which a worker estimates how many need the dynamics.
+#: Samples from which a worker estimates the fraction that must be integrated.
 _PROBE = 8
 #: Least and largest number of integrated samples in one part, and the number of parts aimed at.
 _BLOCK, _LARGEST, _PARTS = 16, 256, 64
@@ -44,13 +44,13 @@ _BOUND = 1 / 64
 
 
 def block_of(samples: int) -> int:
-    """Integrated samples in one part of a passage."""
+    """Number of integrated samples in one part of an encounter."""
     return max(_BLOCK, min(_LARGEST, samples // _PARTS))
 
 
 @dataclass(frozen=True)
 class Part:
-    """Some samples of a passage.
+    """Some samples of an encounter.
 
     Attributes
     ----------
@@ -60,7 +60,7 @@ class Part:
     first, last : int
         Number of the first of these samples, and of the first that is not one of them.
     samples : Samples or Attitudes
-        All samples of the passage; those of the part are drawn by the worker.
+        All samples of the encounter; those of the part are drawn by the worker.
     """
 
     passage: Passage
@@ -78,9 +78,8 @@ class Part:
         n = attitudes.count
         try:
             followed = self.clones.passages(self.first, self.first + n)
-        except (
-            FlybystabError
-        ):  # one sample fails: it is isolated, so that the result does not depend on the division
+        except FlybystabError:
+            # The sample that fails is isolated, so that the result does not depend on the division into parts.
             return SampleVerdicts.joined(
                 [self._one(self.clones, attitudes.part(k, k + 1), self.first + k, settings) for k in range(n)]
             )
@@ -97,7 +96,7 @@ class Part:
 
 @dataclass
 class OpenPassage:
-    """A passage with samples that have no verdict yet.
+    """An encounter with samples that have no verdict yet.
 
     Attributes
     ----------
@@ -108,21 +107,23 @@ class OpenPassage:
     attitudes : Samples or Attitudes
         Of all samples, with their bodies.
     nominal : Attitudes or None
-        The catalogue body, where grains are to carry on bodies.
+        The catalogue body, if bodies are continued with grains.
     whole : bool
-        Whether the verdicts of all samples are kept, or their number only, apart from those of the first `RANKED`.
+        Keep the verdicts of all samples; otherwise only their counts and the verdicts of the first `RANKED`.
     size : int
         Samples of a part.
     judged : dict of int to SampleVerdicts
         Finished parts whose verdicts are kept, by their first sample.
     tallies : dict of int to Tally
         All finished parts, by their first sample.
-    needed : dict of int to str or None
-        Numbers and verdicts of the samples that grains have yet to carry on; None without grains.
+    needed : dict of int to str
+        Numbers and verdicts of the samples that remain to be continued with grains.
     carried : dict of int to SampleVerdicts
-        Those that grains have carried on.
+        Samples that have been continued with grains.
     unjudged : int
-        Samples without a verdict.
+        Number of samples without a verdict.
+    sent : bool
+        The samples for grains have been given out.
     """
 
     passage: Passage
@@ -146,7 +147,7 @@ class OpenPassage:
 
     @property
     def left(self) -> int:
-        """Samples without a verdict, or that grains have yet to carry on."""
+        """Number of samples without a verdict, or that remain to be continued with grains."""
         return self.unjudged + len(self.needed)
 
     def take(self, first: int, judged: SampleVerdicts) -> SampleVerdicts:
@@ -164,11 +165,11 @@ class OpenPassage:
         return judged
 
     def _need(self, first: int, verdicts: Sequence[str]) -> None:
-        """Note the samples where the ellipsoid ends."""
+        """Add the samples that the ellipsoid cannot follow to the end."""
         self.needed |= {k: v for k, v in needing_grains(first, verdicts).items() if k not in self.carried}
 
     def grain_samples(self) -> Iterator[tuple[int, GrainSample]]:
-        """The samples for grains with their numbers, once, when all samples have a verdict of the ellipsoid."""
+        """The samples for grains with their numbers, given once, when all samples have a verdict of the ellipsoid."""
         if self.unjudged or self.sent or self.nominal is None:
             return
         self.sent = True
@@ -187,7 +188,7 @@ class OpenPassage:
             for k in range(begin, end, max(1, self.size)):
                 yield k, self.part(k, min(k + self.size, end))
 
-    def take_stored(self, stored: Sequence[Mapping[str, Any]]) -> None:
+    def take_stored(self, stored: Sequence[Document]) -> None:
         """Store verdicts of an earlier run, from :meth:`flybystab.screening.journal.Journal.parts`."""
         for part in stored:
             first, judged = int(part["first"]), SampleVerdicts.restored(part)
@@ -224,14 +225,14 @@ class OpenPassage:
 
 
 def opened(passage: Passage, settings: Settings, block: int) -> Rows | OpenPassage:
-    """The rows of a passage, or the passage with its open samples.
+    """The rows of an encounter, or the encounter with its open samples.
 
     Parameters
     ----------
     passage : Passage
     settings : Settings
     block : int
-        Samples by the dynamics in one part.
+        Integrated samples in one part.
     """
     row = body_row(passage, settings)
     n = settings.samples
@@ -260,10 +261,10 @@ def opened(passage: Passage, settings: Settings, block: int) -> Rows | OpenPassa
 
 
 def begin(asteroid: Asteroid, settings: Settings, finder: Finder, block: int) -> list[Rows | OpenPassage]:
-    """An asteroid's passages, each as its rows or with its open samples.
+    """Encounters of an asteroid, each as its rows or with its open samples.
 
-    An asteroid that fails or that exceeds the time limit of the settings, gets one row with the
-    reason: it does not end the run, and a continued run does not compute it again.
+    An asteroid that fails or exceeds the time limit of the settings has one row with the reason: it does not end
+    the run, and a resumed run does not compute it again.
     """
     try:
         with time_limit(settings.time_limit, asteroid.name):
@@ -273,6 +274,6 @@ def begin(asteroid: Asteroid, settings: Settings, finder: Finder, block: int) ->
 
 
 def joined(work: Sequence[Rows | OpenPassage], settings: Settings) -> Rows:
-    """The rows of an asteroid whose passages are all finished."""
+    """The rows of an asteroid whose encounters are all finished."""
     rows = [w.rows(settings) if isinstance(w, OpenPassage) else w for w in work]
     return {kind: [r for w in rows for r in w[kind]] for kind in ("rows", "samples")}
