@@ -33,9 +33,9 @@ from astropy.table import QTable
 
 from flybystab.arguments import check_arguments
 from flybystab.errors import InvalidInput, UnknownName
-from flybystab.files import Document, csv_rows, parse_toml, read_text
+from flybystab.files import csv_rows, parse_toml, read_text
 from flybystab.screening.distributions import Distribution, distribution_of
-from flybystab.typing import Array
+from flybystab.typing import Array, Document
 from flybystab.units import whole
 
 #: Accepted names of each column, in lower case.

@@ -16,7 +16,8 @@ from pathlib import Path
 from threading import Thread
 
 from flybystab.errors import FlybystabWarning, InvalidInput, MissingExtra, WorkersLost
-from flybystab.files import Document, parse_json, read_text
+from flybystab.files import parse_json, read_text
+from flybystab.typing import Document
 from flybystab.units import whole
 
 

@@ -11,8 +11,9 @@ import numpy as np
 
 from flybystab.body.body import DENSITY_RANGE
 from flybystab.errors import InvalidInput, UnknownName
-from flybystab.files import DOCUMENT_LIMIT, Document, parse_toml, read_text
+from flybystab.files import DOCUMENT_LIMIT, parse_toml, read_text
 from flybystab.screening.distributions import Distribution, distribution_of
+from flybystab.typing import Document
 
 #: Admissible range of each quantity.
 _LIMITS = {
