@@ -5,8 +5,8 @@ python benchmarks/attack.py power [N]      journal and tables cut at any byte, a
 python benchmarks/attack.py cost           time of fsync and of the checksum per record of the journal
 python benchmarks/attack.py fuzz [N]       N calls of every public function with valid and invalid arguments
 python benchmarks/attack.py bombs          files that are too large, too deep or too long
-python benchmarks/attack.py table [N]      all of these, N calls of every function and the tests of each kind of attack:
-                                           the table of docs/reliability.md
+python benchmarks/attack.py table [N]      all of these, N (25) calls of every function and the tests of each kind of
+                                           attack: the table of docs/reliability.md; the rest goes to standard error
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ import time
 import warnings
 from collections import Counter
 from collections.abc import Callable
-from contextlib import suppress
+from contextlib import redirect_stdout, suppress
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "tests"))
@@ -282,7 +282,8 @@ def table(n: int) -> None:
         "finished table cut at any byte", tables.total(), tables["refused with a named error"],
         "a table without rows was read as complete", "`benchmarks/attack.py power`",
     )  # fmt: skip
-    ends = bombs()
+    with redirect_stdout(sys.stderr):
+        ends = bombs()
     row(
         "gzip of 1 GB, cells of 200 kB, nesting of 100,000, 5,000 digits, keys of 50,000 dots", ends.total(),
         ends["refused"], "raw errors", "`benchmarks/attack.py bombs`",
@@ -291,13 +292,14 @@ def table(n: int) -> None:
         passed, failed = tested(files, chosen)
         named = ", ".join(f"`tests/{file}`" for file in files)
         row(attack, passed + failed, passed, before, named)
-    calls = fuzz(n)
+    with redirect_stdout(sys.stderr):
+        calls = fuzz(n)
     row(
         f"calls of all {len(fuzzed.calls())} public callables with valid, borderline and invalid arguments",
         calls.total(), calls["result"] + calls["named error"], "481 of 32,000 raw", f"`benchmarks/attack.py fuzz {n}`",
     )  # fmt: skip
     print(
-        "\n| tried | times | survived | lost | lost before | repeated by |\n| --- | --- | --- | --- | --- | --- |"
+        "| tried | times | survived | lost | lost before | repeated by |\n| --- | --- | --- | --- | --- | --- |"
     )
     print("\n".join(rows))
 
@@ -318,7 +320,7 @@ def main() -> None:
     elif kind == "bombs":
         bombs()
     elif kind == "table":
-        table(n or 20)
+        table(n or 25)
     else:
         print(__doc__)
     shutil.rmtree(".hypothesis", ignore_errors=True)
