@@ -1,7 +1,7 @@
 """Positions of the bodies as polynomials on uniform grids, at a tenth of the cost of the ephemeris.
 
-A JPL ephemeris has intervals of its own for each body, and a search needs all bodies at once, hundreds of times
-per revolution. The almanac has three grids by speed: Earth, Moon, Mercury and Venus on intervals of 4 d (degree 12),
+A JPL ephemeris has different intervals for each body, while a search needs all bodies at once, hundreds of times per
+revolution. The almanac has three grids by speed: Earth, Moon, Mercury and Venus on intervals of 4 d (degree 12),
 Sun, Mars, the giant planets and Pluto on 16 d (degree 7), the massive asteroids on 32 d (degree 4). A fourth has
 velocities, accelerations and potentials of the heaviest bodies for 1PN, to a relative error of 1e-3. Intervals do
 not cross interval boundaries of the JPL files, where derivatives jump. Positions agree with the ephemeris to 0.1 m,
@@ -49,7 +49,7 @@ class Almanac(NamedTuple):
     Attributes
     ----------
     when : ndarray, shape (4, 3)
-        Per grid: start (s), pieces per second, pieces.
+        Per grid: start (s), pieces per second, number of pieces.
     fast : ndarray, shape (pieces, 13, columns)
         Positions (m) of ``FAST``; then the Sun's velocity (m/s) and an unused column.
     slow : ndarray, shape (pieces, 8, columns)
@@ -79,7 +79,7 @@ class Places(NamedTuple):
 
 @lru_cache(maxsize=4)
 def almanac(window: Window, belt: bool) -> Almanac:
-    """The almanac of a window, with the massive asteroids or without; the last ones are kept."""
+    """The almanac of a window, with or without the massive asteroids; the last results are cached."""
     grids = [
         _grid(window, MOON, 4.0 * DAY, 12, FAST, N_FAST, C_FAST),
         _grid(window, SUN, 16.0 * DAY, 7, SLOW, N_SLOW, C_SLOW),
@@ -106,7 +106,7 @@ def _grid(
     if names == HEAVY:
         rows = set(range(len(BODIES)))
     head = window.head[sorted(rows)]
-    # Times beyond the end of the ephemeris are never queried: a piece that reaches beyond is sampled at the end.
+    # Times beyond the end of the ephemeris are never requested: there the last piece is sampled at the end.
     times = np.clip(times, head[:, 3].max(), (head[:, 3] + head[:, 2] * head[:, 4]).min())
     sample = np.full((times.size, columns), _NOWHERE)
     if names == HEAVY:
@@ -124,7 +124,7 @@ def _grid(
 
 
 def _write_heavy(window: Window, times: Array, out: Array) -> None:
-    """Write what :class:`Almanac` has of the heavy bodies at ``times``, shape (n,), into ``out``, a row per time."""
+    """Write the columns of ``Almanac.heavy`` at ``times``, shape (n,), into ``out``, a row per time."""
     states = np.array([window.states(b, times) for b in range(len(BODIES))])
     for slot, name in enumerate((*HEAVY, "sun")):
         body = BODIES.index(name)
@@ -143,7 +143,7 @@ def _write_heavy(window: Window, times: Array, out: Array) -> None:
 
 @pasted_kernel
 def _piece(when: Array, t: float) -> tuple[int, float]:
-    """Number of the piece at `t` and the place -1...1 in it."""
+    """Number of the piece at `t` and the argument -1...1 in it."""
     s = (t - when[_START]) * when[_PER_SECOND]
     i = int(min(max(s, 0.0), when[PIECES] - 1.0))
     return i, 2.0 * (s - i) - 1.0
@@ -151,7 +151,7 @@ def _piece(when: Array, t: float) -> tuple[int, float]:
 
 @pasted_kernel
 def has_belt(book: Almanac) -> bool:
-    """Whether the massive asteroids are in the almanac and in use."""
+    """True if the massive asteroids are in the almanac."""
     return book.when[BELT_GRID, PIECES] > 0.0
 
 
@@ -168,8 +168,8 @@ def _find_quartic(when: Array, pieces: Array, t: float, p: Array, columns: int) 
 
 @pasted_kernel
 def find_places(book: Almanac, t: float, belt: bool, out: Places) -> None:
-    """Write where all bodies are at ``t`` (s)."""
-    # Powers in pairs of pairs (Estrin): independent products, which the compiler makes vectors of.
+    """Write the positions of all bodies at ``t`` (s) into ``out``."""
+    # Estrin's scheme: its products are independent, so that the compiler can vectorise them.
     i, x = _piece(book.when[_FAST], t)
     c = book.fast[i]
     p = out.fast
@@ -197,7 +197,7 @@ def find_places(book: Almanac, t: float, belt: bool, out: Places) -> None:
 
 @pasted_kernel
 def find_heavy(book: Almanac, t: float, out: Places) -> None:
-    """Write what relativity needs of the heavy bodies at ``t`` (s)."""
+    """Write the quantities of the heavy bodies for 1PN at ``t`` (s) into ``out``."""
     _find_quartic(book.when[_HEAVY], book.heavy, t, out.heavy, C_HEAVY)
 
 

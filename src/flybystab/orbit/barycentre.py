@@ -1,6 +1,6 @@
 """Barycentres of the solar system of different ephemerides.
 
-DE440 and DE441 count 30 bodies and a ring of the Kuiper belt (Park et al. 2021, AJ 161, 105), which moves their
+DE440 and DE441 include 30 bodies and a ring of the Kuiper belt (Park et al. 2021, AJ 161, 105), which shifts their
 barycentre by 115 to 136 km from that of older ephemerides. States relative to the barycentre are those of DE440 and
 DE441 in this package, as of Horizons, ASSIST and layup. For an older ephemeris they are shifted by the difference of
 the two positions of the Sun relative to its barycentre, a polynomial of time for DE421. From 1900 to 2052 it is within
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
     from flybystab.orbit.ephemeris import Window
 
-#: Ephemerides whose barycentre counts the Kuiper belt, and older ones, which agree with DE421 within a few km
+#: Ephemerides whose barycentre includes the Kuiper belt, and older ones, which agree with DE421 within a few km
 #: (DE430: 0.3 km in 2015).
 WITH_BELT = ("de440", "de441")
 WITHOUT_BELT = ("de421", "de430", "de431", "de432", "de433", "de434", "de435", "de436", "de438")

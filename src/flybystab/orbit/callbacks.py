@@ -44,7 +44,7 @@ class Layout(NamedTuple):
 
 @lru_cache(maxsize=1)
 def layout() -> Layout:
-    """The layout of the rebound that is installed."""
+    """The layout of the installed version of rebound."""
     sim, particle = rebound.Simulation, rebound.Particle
     return Layout(
         sim.t.offset,
@@ -94,7 +94,7 @@ def _integer_at(address: int) -> int:
 
 @inlined
 def under_way(sim: int, at: Layout, count: int) -> tuple[float, Array, Array, int]:
-    """Time (s), particles ``[count, at.words]``, model of the forces, and the address of what follows the model."""
+    """Time (s), particles ``[count, at.words]``, model of the forces, and the address after the model."""
     base: int = _address(sim)  # type: ignore[call-arg,arg-type]
     t = numbers_at(base + at.time, 1)[0]
     first = _integer_at(base + at.particles)

@@ -1,8 +1,9 @@
 """Closest approach as a zero of ``r.v``, and the relative motion around it as a smooth function of time.
 
-A log of integration steps (time, position, velocity, acceleration) is read between its rows by the quintic
-that matches all three at both ends. That locates each minimum of distance; the root itself is then found on
-the integrator's own trajectory, from the step before it: neither the step length nor the quintic matters.
+A log of integration steps (time, position, velocity, acceleration) is interpolated between its rows by the quintic that
+matches all three at both ends. Minima of the distance are located on it; the root itself is then found on the
+trajectory of the integrator, restarted from the preceding step, so that its accuracy depends neither on the step length
+nor on the quintic.
 """
 
 from __future__ import annotations
@@ -136,7 +137,7 @@ def steps_into(log: Array, head: Array, data: Array, gm: Array, body: int, floor
             pull += (states[k + 1, 3 + j] - states[k, 3 + j]) ** 2
         s = min(max(-rd / dd, 0.0), 1.0) if dd > 0.0 else 0.0
         chord = np.sqrt(max(rr + s * (2.0 * rd + s * dd), 0.0))
-        # Three times what the ends have: the acceleration may be larger between them.
+        # Three times the larger acceleration at the ends, since it may be larger between them.
         if chord < floor + 0.375 * h * h * np.sqrt(3.0 * bend) + 0.375 * abs(h) * np.sqrt(pull):
             out[count] = k
             count += 1
@@ -177,7 +178,8 @@ def _measure(s: Array, level: float) -> float:
 def periapsis_time(state_at: Callable[[float], Array], t: float) -> tuple[float, Array]:
     """Zero of ``r.v`` near `t` on an exact trajectory, and the relative state there.
 
-    Secant method: the slope of ``r.v`` is measured, since far from the planet the Sun makes as much of it.
+    Secant method: the derivative of ``r.v`` is a difference quotient, since far from the planet the acceleration by the
+    Sun contributes as much to it as that by the planet.
 
     Parameters
     ----------
@@ -196,7 +198,7 @@ def periapsis_time(state_at: Callable[[float], Array], t: float) -> tuple[float,
         if not slope > 0.0:
             break
         last, step = rv, -rv / slope
-        # A decimetre of the way, beside the 1e8 m of an encounter: rounding over centuries leaves centimetres.
+        # A decimetre along the path: over centuries rounding errors are centimetres.
         if abs(step) * float(np.linalg.norm(s[3:])) < 0.1:
             return t + step, state_at(t + step)
     raise NotConverged(f"closest approach near t = {t:.6g} s: the last correction was {step:.3g} s")
@@ -222,7 +224,7 @@ class PanelTrack:
     def states(self, t: Array) -> Array:
         """Position (m) and velocity (m/s), shape (n, 6), at ``t`` s from closest approach, shape (n,).
 
-        Beyond its ends the track does not exist: nan.
+        nan outside the span of the track.
         """
         time = np.asarray(t, dtype=float)
         v = (np.arcsinh(time / self.tau) - self.start) / self.width

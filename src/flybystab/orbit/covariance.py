@@ -1,7 +1,7 @@
 """Covariance of the elements of an orbit, and samples drawn from it.
 
-A covariance belongs to a set of elements at an epoch of its own, which can differ from that of the orbit (JPL's
-differ by years). Only deviations from its own mean are used. They are added to the orbit's state at that epoch without
+The epoch of the elements of a covariance can differ from that of the orbit (at JPL by years). Only deviations from the
+mean of the covariance are used. They are added to the orbit's state at that epoch without
 linearisation, so that the clones are centred on the orbit.
 """
 
@@ -43,9 +43,9 @@ _SI: Mapping[str, u.UnitBase] = (
     | dict.fromkeys(NONGRAV_PARAMETERS[:3], u.m / u.s**2)
     | {"e": u.dimensionless_unscaled, "tp": u.s, "DT": u.s, "AMRAT": u.m**2 / u.kg}
 )
-#: Caveat of a covariance by the printed digits of an orbit, which says nothing of the error of the orbit itself.
+#: Caveat of a covariance from the rounding of printed elements, which is unrelated to the error of the orbit itself.
 DIGITS = "by the digits of its elements"
-#: Caveat of a covariance by the uncertainty parameter of few old observations, whose errors have no known law.
+#: Caveat of a covariance from the uncertainty parameter of few old observations, whose error distribution is unknown.
 UNRELIABLE = "by the digits and U of its elements, not reliable for a weak orbit from old observations"
 #: Largest negative eigenvalue of the correlation matrix that is attributed to rounding of the published digits.
 _ROUNDING = 1e-6
@@ -184,12 +184,12 @@ class Covariance:
 
     @property
     def digits_alone(self) -> bool:
-        """Whether it holds the rounding of printed elements alone: the error of the orbit is not known then."""
+        """True if the covariance contains only the rounding of printed elements, not the error of the orbit."""
         return self.caveat == DIGITS
 
     @property
     def reliable(self) -> bool:
-        """Whether its errors are known to cover those of the orbit; an encounter is not called determined otherwise."""
+        """True if the covariance is known to cover the error of the orbit; required for a determined encounter."""
         return self.caveat not in (DIGITS, UNRELIABLE)
 
     @property
@@ -245,7 +245,7 @@ class Covariance:
         return np.asarray(parameters[:, self.names.index(name)])
 
     def _possible(self, parameters: Array) -> NDArray[np.bool_]:
-        """Which rows describe a conic."""
+        """True for each row that describes a conic."""
         kind = self.elements
         if kind == "cartesian":
             return np.ones(len(parameters), dtype=bool)

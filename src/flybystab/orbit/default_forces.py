@@ -1,4 +1,4 @@
-"""Forces on an orbit: those that act by default, and the massive asteroid that the orbit itself may be."""
+"""Default forces on an orbit, and identification of orbits that belong to massive asteroids."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from flybystab.typing import Array
 if TYPE_CHECKING:
     from flybystab.orbit.osculating_state import OsculatingState
 
-#: An orbit within this distance (m) and relative speed (m/s) of a massive asteroid at its epoch is that asteroid's.
+#: An orbit within this distance (m) and relative speed (m/s) of a massive asteroid at its epoch counts as its orbit.
 TWIN_DISTANCE, TWIN_SPEED = 1e8, 100.0
 
 
@@ -36,7 +36,7 @@ def massive_twin(window: Window, epoch: float, state: Array) -> str | None:
     """Name of the massive asteroid to which an orbit belongs, or None.
 
     The table of the massive asteroids has errors up to 60,000 km. An orbit is taken for that of a massive asteroid if
-    it is within 100,000 km of it at less than 100 m/s; passages in the main belt are much faster.
+    it is within 100,000 km of it at less than 100 m/s; encounters in the main belt are much faster.
 
     Parameters
     ----------

@@ -12,15 +12,15 @@ from flybystab.orbit.kepler import states_at_times, time_at_anomaly
 from flybystab.orbit.planets import PLANETS
 from flybystab.typing import Array
 
-#: Sun's GM behind the osculating elements of JPL (DE440/441), m3/s2.
+#: GM of the Sun for the osculating elements of JPL (DE440/441), m3/s2.
 GM_SUN = PLANETS["sun"].gm
-#: GM of the solar system, m3/s2, behind barycentric elements: 2.96309274879932e-4 au3/d2, the sum of the masses of
+#: GM of the solar system, m3/s2, for barycentric elements: 2.96309274879932e-4 au3/d2, the sum of the masses of
 #: DE440 with systems of satellites and 16 asteroids (``gm_total`` of Sorcha).
 GM_TOTAL = 2.9630927487993194e-04 * AU**3 / DAY**2
 
 
 def gm_of(centre: str) -> float:
-    """GM behind the elements about a centre, m3/s2: that of the body, or of the solar system for ``"ssb"``."""
+    """GM for elements about a centre, m3/s2: that of the body, or of the solar system for ``"ssb"``."""
     return GM_TOTAL if centre == "ssb" else PLANETS[centre].gm
 
 
@@ -46,7 +46,7 @@ def state_from_elements(
     since : float
         Time since perihelion, s.
     gm : float
-        GM of the Sun that the elements were made with, m3/s2.
+        GM of the Sun with which the elements were computed, m3/s2.
     """
     state = state_in_plane(q, e, i, node, peri, since, gm)
     turn = ecliptic_to_icrf()
@@ -162,7 +162,7 @@ def elements_from_state(state: Array, gm: float = GM_SUN) -> tuple[float, float,
     e = float(np.linalg.norm(vector))
     perihelion = vector / e if e > 1e-15 else towards_node
     q = momentum**2 / gm / (1.0 + e)
-    # 1 - e = q / a has all its digits near the parabola, where the length of the vector has lost them.
+    # 1 - e = q/a is accurate near the parabola, where 1 - |e| of the eccentricity vector cancels.
     inverse = 2.0 / r - float(v @ v) / gm
     f = -q * inverse if abs(q * inverse) < 0.01 else e - 1.0
     peri = np.arctan2(perihelion @ np.cross(normal, towards_node), perihelion @ towards_node) % (2.0 * np.pi)

@@ -1,13 +1,13 @@
 """JPL ephemerides of Sun, planets and Moon, evaluated by compiled code.
 
 A binary SPK file holds Chebyshev series per body and interval. A :class:`Window` copies the records of a time
-span out of the memory-mapped file into one flat array that kernels read; nothing is opened, read or copied
-before it is needed. Times inside a window are seconds (TDB) from an epoch of the caller's choice: counted
-from J2000 the rounding of the time alone would move the Earth by millimetres and spoil adaptive steps.
+span from the memory-mapped file into one flat array for the kernels; files are opened and read when first needed.
+Times in a window are seconds (TDB) from an epoch chosen by the caller: from J2000 the rounding of the time alone
+would shift the Earth by millimetres and disturb the step-size control.
 
-Bodies keep one order everywhere, :data:`BODIES`. Mars and the giant planets are the barycentres of their
-systems. Positions are barycentric, ICRF, m. The 16 most massive asteroids, :data:`BELT`, follow them: they come
-from a table in the package (JPL sb441-n16, heliocentric, to 60,000 km or better: 2e-4 of what their pull does).
+The order of the bodies is that of :data:`BODIES` everywhere. Mars and the giant planets are the barycentres of their
+systems. Positions are barycentric, ICRF, m. The 16 most massive asteroids, :data:`BELT`, follow them: they come from a
+table in the package (JPL sb441-n16, heliocentric, to 60,000 km or better: 2e-4 of the effect of their attraction).
 """
 
 from __future__ import annotations
@@ -32,8 +32,8 @@ from flybystab.typing import Array
 BODIES = tuple(name for name, body in PLANETS.items() if body.series is not None)
 N_BODIES = len(BODIES)
 SUN, EARTH, MOON = (BODIES.index(name) for name in ("sun", "earth", "moon"))
-#: (centre, target) of the SPK series behind each entry; Earth's is the barycentre of Earth and Moon,
-#: the Moon's is the Moon from there. The Earth itself is opposite, GM_moon/GM_earth times as far.
+#: (centre, target) of the SPK series of each entry; for the Earth that of the Earth-Moon barycentre, for the Moon its
+#: position from there. The Earth is on the opposite side, at GM_moon/GM_earth times the distance.
 _SERIES = tuple(body.series for body in PLANETS.values() if body.series is not None)
 
 #: The massive asteroids of DE441, and their GM, m3/s2 (header of DE441).
@@ -225,7 +225,7 @@ class Ephemeris:
             *((belt[:, i], first, BELT_LENGTH * DAY) for i in range(len(BELT))),
         ]
         for row, (records, first, length) in zip(head, series, strict=True):
-            # First difference whole days, then the fraction: no digit is lost.
+            # Difference of whole days first, then of the fractions: no loss of digits.
             begin = first + ((2451545.0 - zero.jd1) - zero.jd2) * DAY
             low = max(0, int((start - begin) // length) - 2)
             high = min(len(records), int((stop - begin) // length) + 3)

@@ -25,17 +25,17 @@ def later(origin: Time, t: float) -> Time:
 
 
 def warn_of_utc(time: object, name: str, *, stacklevel: int, any_time: bool = False) -> None:
-    """Warn of a time in UTC, the default of astropy, where orbits are published in TDB or TT.
+    """Warn of a time in UTC, the default of astropy; orbits are published in TDB or TT.
 
     Parameters
     ----------
     time : object
-        What the user gave; anything but a Time is ignored.
+        Argument of the user; anything but a Time is ignored.
     name : str
     stacklevel : int
         That of the caller of this function, as of :func:`warnings.warn`.
     any_time : bool
-        By default only midnight and noon count, at which epochs are published.
+        By default only times at midnight or noon cause a warning, as of published epochs.
     """
     if not isinstance(time, Time) or time.scale != "utc":
         return

@@ -2,10 +2,10 @@
 
 The asteroid is massless; Sun, planets and Moon move on the ephemeris. Barycentric ICRF, m, s. Formulas:
 
-- point masses, Newton; inside 0.9 radii a smooth core, so that the acceleration stays finite after an impact;
+- Newtonian point masses; a smooth core inside 0.9 radii, so that the acceleration is finite after an impact;
 - 1PN: :mod:`flybystab.orbit.relativity`;
 - zonal harmonics J2 to J4: ``GM Jn a^n/r^(n+2) [P'(n+1)(s) r/|r| - P'n(s) p]`` with the derivatives of Legendre
-  polynomials, ``s = r.p/|r|``, p the pole, the Earth's of date; J3 and J4 of the Earth alone;
+  polynomials, ``s = r.p/|r|``, p the pole (for the Earth that of date); J3 and J4 of the Earth only;
 - non-gravitational acceleration and radiation pressure: :mod:`flybystab.orbit.nongravitational`.
 
 A force is one entry of :data:`FORCES`.
@@ -64,16 +64,16 @@ INNER = 0.9
 
 
 class ForceModel(NamedTuple):
-    """The forces on an asteroid and the ephemeris behind them.
+    """The forces on an asteroid and the ephemeris from which they are computed.
 
-    Rows of bodies are those of ``BODIES``, then those of ``BELT`` where both are in.
+    Rows of bodies are those of ``BODIES``, then those of ``BELT`` where an array has both.
 
     Attributes
     ----------
     moon_ratio : float
         GM of the Moon over that of the Earth.
     relativity, oblate, nongravitational : bool
-        Whether the first post-Newtonian terms, any zonal harmonic, the non-gravitational acceleration act.
+        True if the first post-Newtonian terms, any zonal harmonic, the non-gravitational acceleration act.
     law : NonGravitationalParameters
     head, data : ndarray, shape (N_ALL, 5), ndarray
         Chebyshev series of the bodies, as in :class:`flybystab.orbit.ephemeris.Window`.
@@ -101,8 +101,8 @@ class ForceModel(NamedTuple):
     data: Array
 
 
-# A model as one flat array, which a C callback can be handed as a pointer: its length, three numbers of a log of steps
-# (address, rows, rows written), then the fields of ForceModel in their order.
+# A model as one flat array, to which a C callback gets a pointer: its length, three numbers of a log of steps (address,
+# rows, rows written), then the fields of ForceModel in their order.
 _LENGTH, LOG_ADDRESS, LOG_ROWS, LOG_COUNT, _MOON_RATIO, _RELATIVITY, _OBLATE, _NONGRAVITATIONAL, _LAW = range(
     9
 )
@@ -206,7 +206,7 @@ def bodies(model: ForceModel, t: float, out: Array, rates: Array) -> None:
                 rates[i, j] = state[3 + j]
         else:
             series_position(head, data, i, t, out[i])
-    # The Earth's velocity stays that of its barycentre with the Moon, 12 m/s off: the terms with it are small.
+    # For the Earth the velocity of the Earth-Moon barycentre is used, with an error of 12 m/s: its terms are small.
     for j in range(3):
         far = out[MOON, j]
         out[MOON, j] = out[EARTH, j] + far
@@ -253,7 +253,7 @@ def zonal_factors(c2: float, c3: float, c4: float, d: float, s: float) -> tuple[
 def core(s: float) -> float:
     """``s^(-3/2)`` continued into ``s < 1`` by its first nine Taylor terms at 1: finite and smooth.
 
-    A jump in any low derivative would stop a high-order integrator with adaptive steps.
+    At a jump of a low derivative the step of a high-order integrator would collapse.
     """
     x = 1.0 - s
     out = 1.0
@@ -338,7 +338,7 @@ def shares(window: Window, t: Array, states: Array, nongrav: NonGravitational | 
     """Order of magnitude of the displacement, m, that each force causes by the end of a track.
 
     ``3 int |a_i(t)| (t_end - t) dt`` along the track: a velocity change at t displaces a free particle by its product
-    with ``t_end - t``, and a tangential one on an orbit by three times that. Close passages amplify it further.
+    with ``t_end - t``, and a tangential one on an orbit by three times that. Close encounters amplify it further.
 
     Parameters
     ----------

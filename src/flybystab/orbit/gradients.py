@@ -19,7 +19,7 @@ from flybystab.core.numerics.jit import kernel
 from flybystab.orbit.forces import fade, zonal_factors
 from flybystab.typing import Array
 
-#: Step of the differences over the distance.
+#: Step of the difference quotients over the distance.
 _RELATIVE_STEP = 1e-4
 
 
@@ -28,7 +28,7 @@ def add_attraction_gradient(p: Array, n: int, gm: Array, inner2: Array, y: Array
     """Add the gradient of the attraction by `n` bodies at ``y[:3]`` (m) to ``a[3, 6]``.
 
     ``p`` has the positions (m): x of all bodies, then y, then z; ``inner2`` the squares of the radii of their smooth
-    cores, m2. Inside its core a body counts as if the asteroid were on the surface of the core.
+    cores, m2. Inside a core the gradient is that at its surface.
     """
     x, y_, z = y[0], y[1], y[2]
     sxx = sxy = sxz = syy = syz = szz = trace = 0.0

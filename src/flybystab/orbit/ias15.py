@@ -1,4 +1,4 @@
-"""An asteroid among prescribed bodies, moved by rebound (IAS15) through a compiled force.
+"""Integration of an asteroid among prescribed bodies by rebound (IAS15) with a compiled force.
 
 rebound calls the force and the log through C function pointers that numba compiles: a Python callback costs
 about 90 times as much.
@@ -23,8 +23,8 @@ from flybystab.orbit.forces import LOG_ADDRESS, LOG_COUNT, LOG_ROWS, acceleratio
 from flybystab.typing import Array
 
 #: Step-size criterion of IAS15 (Aarseth 1985) and its number in rebound 4, which takes no names. With rebound's
-#: default (Pham, Rein & Spiegel 2024, "PRS23") a step can pass over an encounter: after ten years 10 of 635 near-Earth
-#: asteroids are off by more than 100 km (up to 12,000 km), with this one none, at 1.2 times the cost.
+#: default (Pham, Rein & Spiegel 2024, "PRS23") a step can skip an encounter: after ten years the errors of 10 of 635
+#: near-Earth asteroids exceed 100 km (up to 12,000 km); with this criterion none does, at 1.2 times the cost.
 STEP_CONTROL, _STEP_CONTROL_4 = "AARSETH85", 3
 #: Tolerances: the default, and the one that measures its error.
 EPSILON, TIGHT = 1e-9, 1e-11
@@ -41,7 +41,7 @@ def set_step_control(sim: rebound.Simulation, epsilon: float) -> Structure:
 
 @lru_cache(maxsize=1)
 def _callbacks() -> tuple[CFunc, CFunc]:
-    """The force and the log for the rebound that is installed."""
+    """The callbacks of force and log for the installed version of rebound."""
     return _compile(layout())
 
 
@@ -79,7 +79,7 @@ def _compile(at: Layout) -> tuple[CFunc, CFunc]:
 def simulation(t: float, states: Array, epsilon: float, memory: Array, force: CFunc) -> rebound.Simulation:
     """A simulation of test particles at `t` (s) with states (n, 6), m and m/s, moved by a compiled force alone.
 
-    The force reads `memory`, which has to live as long as the simulation.
+    The force reads `memory`, which must not be freed before the simulation.
     """
     sim = rebound.Simulation()
     for x, y, z, vx, vy, vz in states:
@@ -89,7 +89,7 @@ def simulation(t: float, states: Array, epsilon: float, memory: Array, force: CF
     sim.gravity = "none"
     sim.force_is_velocity_dependent = 1
     sim.dt = 3600.0
-    # Far below any step of a path outside a planet: no integration can stall.
+    # Far below any step outside a planet, so that an integration cannot stall.
     set_step_control(sim, epsilon).min_dt = 0.1
     sim.extras = memory.ctypes.data
     sim.additional_forces = force.ctypes
@@ -106,7 +106,7 @@ def not_finite(t: float) -> NotConverged:
 
 
 class Flight:
-    """One asteroid under way in rebound.
+    """Integration of one asteroid by rebound.
 
     Parameters
     ----------
@@ -138,7 +138,7 @@ class Flight:
         return np.array([p.x, p.y, p.z, p.vx, p.vy, p.vz])
 
     def to(self, t: float) -> Array:
-        """Move to time `t`, s; the state there, shape (6,)."""
+        """Integrate to time `t`, s; returns the state there, shape (6,)."""
         self._sim.integrate(t)
         state = self.state
         if not np.isfinite(state).all():
@@ -146,7 +146,7 @@ class Flight:
         return state
 
     def log_to(self, t: float, rows: int = 4096) -> Array:
-        """Move to time `t`; every step on the way: time, position, velocity, acceleration, shape (n, 10), SI.
+        """Integrate to time `t`; returns all steps: time, position, velocity, acceleration, shape (n, 10), SI.
 
         Times increase along the motion and do not repeat.
         """

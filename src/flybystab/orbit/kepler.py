@@ -6,8 +6,8 @@ Universal variable ``x`` with ``dx/dt = sqrt(gm)/r``, starting at periapsis (``r
     sqrt(gm) t = q x + e x^3 c3,   r = q + e x^2 c2,
     X = q - x^2 c2,   Y = sqrt(q (1 + e)) x c1,
 
-X toward periapsis and Y along the velocity there. The shape is given by ``f = e - 1 = q v_inf^2/gm``, not by
-e, and each term has one sign for f >= 0: nothing cancels, also when v_inf -> 0. Lengths in m, times in s, gm
+X toward periapsis and Y along the velocity there. The shape is given by ``f = e - 1 = q v_inf^2/gm`` instead of e, and
+for f >= 0 all terms have the same sign: there is no cancellation, also for v_inf -> 0. Lengths in m, times in s, gm
 in m3/s2; any consistent units will do.
 """
 
@@ -23,7 +23,7 @@ from flybystab.typing import Array
 def stumpff(psi: float) -> tuple[float, float, float, float]:
     """Stumpff functions c0, c1, c2, c3 of ``psi`` (positive: ellipse), dimensionless."""
     if abs(psi) < 1.0:
-        # c2 and c3 by their series, nested from the far end; the 11th term is below 1e-21.
+        # c2 and c3 by their series in Horner form; the 11th term is below 1e-21.
         c2 = 1.0
         c3 = 1.0
         for k in range(10, 0, -1):
@@ -50,7 +50,7 @@ def time_at_anomaly(gm: float, q: float, f: float, x: float) -> float:
 
 @kernel
 def anomaly_at_distance(q: float, f: float, r: float) -> float:
-    """Universal variable (m^1/2) on the way out at distance ``r`` (m); nan where the orbit does not reach."""
+    """Universal variable (m^1/2) on the outbound leg at distance ``r`` (m); nan if the orbit does not reach it."""
     w = (r - q) / (1.0 + f)
     if w < 0.0:
         return np.nan
@@ -65,7 +65,7 @@ def anomaly_at_distance(q: float, f: float, r: float) -> float:
 
 @kernel
 def time_at_distance(gm: float, q: float, f: float, r: float) -> float:
-    """Time (s) from periapsis to distance ``r`` (m) on the way out; nan where the orbit does not reach it."""
+    """Time (s) from periapsis to distance ``r`` (m) on the outbound leg; nan if the orbit does not reach it."""
     return time_at_anomaly(gm, q, f, anomaly_at_distance(q, f, r))
 
 
@@ -149,8 +149,8 @@ def states_at_times(gm: float, q: float, f: float, t: Array) -> Array:
 def two_body(gm: float, state: Array, t: float) -> Array:
     """State, shape (6,), `t` s after a state (m, m/s) of any conic, by universal variables.
 
-    ``sqrt(gm) t = r0 x + (r0.v0/sqrt(gm)) x^2 c2 + (1 - alpha r0) x^3 c3`` rises with x (its slope is the
-    distance), so that Newton's steps can be held between bounds.
+    ``sqrt(gm) t = r0 x + (r0.v0/sqrt(gm)) x^2 c2 + (1 - alpha r0) x^3 c3`` increases with x (its derivative is the
+    distance), so that Newton's method is safeguarded by a bracket.
     """
     root = np.sqrt(gm)
     r0 = np.sqrt(state[0] ** 2 + state[1] ** 2 + state[2] ** 2)
@@ -161,7 +161,7 @@ def two_body(gm: float, state: Array, t: float) -> Array:
     step = sign * max(abs(s) * alpha, np.sqrt(r0)) if alpha > 0.0 else sign * np.sqrt(r0)
     near = 0.0
     far = step
-    for _ in range(400):  # bounds: twice as far until the time is passed
+    for _ in range(400):  # bracket: doubled until it contains the time
         _, _, c2, c3 = stumpff(alpha * far * far)
         if sign * (r0 * far + sigma * far**2 * c2 + (1.0 - alpha * r0) * far**3 * c3 - s) >= 0.0:
             break

@@ -22,7 +22,7 @@ from flybystab.orbit.planets import PLANETS
 from flybystab.typing import Array
 
 _GM_SUN = PLANETS["sun"].gm
-#: Laws ``g(r)`` by name: ALN, r0 (m), m, n, k. The comets' is that of water ice.
+#: Laws ``g(r)`` by name: ALN, r0 (m), m, n, k. That of comets is the sublimation of water ice.
 LAWS: Mapping[str, tuple[float, float, float, float, float]] = MappingProxyType(
     {
         "asteroid": (1.0, AU, 2.0, 5.093, 0.0),
@@ -95,7 +95,7 @@ class NonGravitational:
 
     @property
     def active(self) -> bool:
-        """Whether there is any acceleration."""
+        """True if there is any acceleration."""
         return any(self.a) or self.area_to_mass != 0.0
 
     @property
@@ -139,13 +139,13 @@ def parameters_of(row: Array) -> NonGravitationalParameters:
 
 @pasted_kernel
 def has_forces(law: NonGravitationalParameters) -> bool:
-    """Whether A1, A2 or A3 differs from zero."""
+    """True if A1, A2 or A3 differs from zero."""
     return law.a1 != 0.0 or law.a2 != 0.0 or law.a3 != 0.0
 
 
 @pasted_kernel
 def acts(law: NonGravitationalParameters) -> bool:
-    """Whether there is any acceleration."""
+    """True if there is any acceleration."""
     return has_forces(law) or law.pressure != 0.0
 
 
@@ -235,8 +235,8 @@ def nongravitational_by_parameters(
 ) -> None:
     """Write the derivatives of the acceleration by A1, A2, A3, DT and AMRAT (SI) into ``out[N_PARAMETERS, 3]``.
 
-    ``r`` (m) and ``v`` (m/s) are heliocentric. That by DT is a central difference, and left at zero unless `by_delay`;
-    the acceleration is linear in the others.
+    ``r`` (m) and ``v`` (m/s) are heliocentric. The derivative by DT is a central difference, and zero unless `by_delay`
+    is set; the acceleration is linear in the other parameters.
     """
     out[:] = 0.0
     for j in range(3):

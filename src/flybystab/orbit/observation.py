@@ -23,7 +23,7 @@ from flybystab.typing import Array
 
 #: Half of the interval over which the rate of motion is taken, d.
 _HALF = 30.0 / 86400.0
-#: Slope of the phase function where none is known.
+#: Default slope of the phase function.
 SLOPE = 0.15
 
 
@@ -34,7 +34,7 @@ def timescale() -> Any:
 
 
 def skyfield_times(time: Time, shift: float = 0.0) -> Any:
-    """Times as skyfield has them, `shift` days later; whole and fractional days stay apart."""
+    """Times in skyfield, `shift` days later; whole and fractional days are passed separately."""
     tt = time.tt
     return timescale().tt_jd(np.atleast_1d(tt.jd1), np.atleast_1d(tt.jd2) + shift)
 

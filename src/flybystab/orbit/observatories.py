@@ -1,7 +1,7 @@
-"""Places to observe from: the geocentre, a geodetic position, or one of some well-known MPC observatory codes.
+"""Observers: the geocentre, a geodetic position, or one of some well-known MPC observatory codes.
 
 Source of the codes: Minor Planet Center, list of observatory codes (longitude, rho cos phi', rho sin phi'). Only these
-are embedded: for any other give longitude, latitude and height.
+are included: for others give latitude, longitude and height.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ CODES = ("500", *_MPC)
 
 
 def observer(text: str) -> Observer | None:
-    """The place of that description; None for the geocentre.
+    """The observer described by a text; None for the geocentre.
 
     Parameters
     ----------
@@ -61,7 +61,7 @@ def observer(text: str) -> Observer | None:
     Raises
     ------
     UnknownName
-        A code that is not embedded.
+        A code that is not included.
     InvalidInput
         Numbers out of range.
     """

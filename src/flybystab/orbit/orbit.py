@@ -61,7 +61,7 @@ class Orbit(OsculatingState):
     def flight(
         self, window: Window, forces: tuple[str, ...] | None = None, epsilon: float = EPSILON
     ) -> Flight:
-        """The asteroid in rebound at the epoch of the orbit; times are seconds from ``window.epoch``."""
+        """An integration by rebound that starts at the epoch of the orbit; times are seconds from ``window.epoch``."""
         if forces is not None and not (
             isinstance(forces, list | tuple) and all(isinstance(f, str) for f in forces)
         ):
@@ -106,7 +106,7 @@ class Orbit(OsculatingState):
         Warns
         -----
         InaccurateOrbit
-            The two integrations differ by more than 1 km at `time`, as after a close passage that amplifies
+            The two integrations differ by more than 1 km at `time`, as after a close encounter that amplifies
             rounding errors. Errors of the elements and of the force model are not included.
         """
         where = checked_centre(centre)
@@ -190,7 +190,7 @@ class Orbit(OsculatingState):
     def covariance_at(self, time: Time, ephemeris: str | Ephemeris | None = None) -> Covariance:
         """Covariance of the heliocentric state at another time, to first order.
 
-        Right where one sigma is small against the scale on which the forces change; after a close encounter compare
+        Valid if one sigma is small compared with the scale on which the forces change; after a close encounter compare
         with :meth:`clones`.
 
         Parameters
@@ -302,7 +302,7 @@ class Orbit(OsculatingState):
         return tuple(zip(found[: len(ways)], found[len(ways) :], strict=True))
 
     def _known(self, what: str) -> Covariance:
-        """The covariance, which is needed for `what`."""
+        """The covariance; raises InvalidInput, which names `what`, if there is none."""
         if not isinstance(self.covariance, Covariance):
             raise InvalidInput("covariance", self.covariance, f"a Covariance: {what} are drawn from it")
         return self.covariance

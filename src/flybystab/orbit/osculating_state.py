@@ -106,7 +106,7 @@ class OsculatingState:
         frame : {"ecliptic", "ICRF"}
             Plane of the elements: ecliptic or equator, of J2000.
         gm : Quantity, optional
-            GM behind the elements; by default that of the centre, for ``"ssb"`` that of the solar system.
+            GM of the elements; by default that of the centre, for ``"ssb"`` that of the solar system.
         barycentre : str
             As in :meth:`from_state`.
         A1, A2, A3 : Quantity
@@ -163,7 +163,7 @@ class OsculatingState:
         name: str,
         covariance: Covariance | None,
     ) -> Self:
-        """Orbit from a, e, i, node, peri, M in m and rad, without units: this saves a minute for a whole catalogue."""
+        """Orbit from a, e, i, node, peri, M as floats in m and rad, which saves a minute for a whole catalogue."""
         a, e, i, node, peri, mean = elements
         if a == 0.0 or e < 0.0 or e == 1.0 or (a > 0.0) != (e < 1.0):
             raise InvalidInput("e", e, f"below 1 for a > 0, above 1 for a < 0 (a = {a:g} m)")

@@ -18,7 +18,7 @@ Mean orbits: Simon et al. 1994 (semi-major axes); Standish & Williams, "Approxim
 (eccentricities and inclinations at J2000, valid 1800-2050).
 Atmosphere: Earth: Karman line (FAI); Venus, Mars, Jupiter: entry interfaces of the Pioneer Venus
 probes (200 km), of the Mars landers (125 km) and of the Galileo probe (450 km above 1 bar). Saturn,
-Uranus and Neptune have none agreed: the 1-bar radius counts.
+Uranus and Neptune have no agreed interface: the 1-bar radius is used.
 """
 
 from __future__ import annotations
@@ -59,9 +59,9 @@ class Planet:
         Semi-major axis of the orbit around the Sun (Moon: that of the Earth), m; zero for the Sun.
     series : tuple of int, optional
         NAIF numbers (centre, target) of the series of its position in an ephemeris. Such a body attracts asteroids
-        and can be encountered on a real orbit; without (None) only hyperbolic encounters are possible.
+        and can be encountered on a real orbit; with None only hyperbolic encounters are possible.
     relativity : bool
-        Whether it is a source of the 1PN terms of its own (:mod:`flybystab.orbit.relativity`).
+        True if it is a source of 1PN terms (:mod:`flybystab.orbit.relativity`).
     j3, j4 : float
         Third and fourth zonal harmonic for `radius`, dimensionless; zero: not modelled.
     orbit_eccentricity, orbit_inclination : float
@@ -97,9 +97,9 @@ class Planet:
     def pole_at(self, time: Time) -> tuple[float, float, float]:
         """Unit vector of the rotation pole, ICRF.
 
-        The Earth's moves by 0.56 deg a century (IAU 2006 precession, Capitaine et al. 2003: X = 2004.19" T - 0.43" T^2,
-        Y = -22.41" T^2, nutation of 9" left out): after the 2029 passage of Apophis that is 3 km within a year. The
-        others are taken as fixed, which is good to 0.1 deg a century.
+        The pole of the Earth moves by 0.56 deg a century (IAU 2006 precession, Capitaine et al. 2003: X = 2004.19" T -
+        0.43" T^2, Y = -22.41" T^2, nutation of 9" left out): after the 2029 encounter of Apophis the effect is 3 km
+        within a year. The other poles are fixed, with errors of up to 0.1 deg a century.
         """
         if self.name != "earth":
             return self.pole

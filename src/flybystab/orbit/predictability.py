@@ -1,9 +1,10 @@
-"""How well an encounter is known: what the errors of an orbit and of the force model become until then.
+"""Predictability of an encounter: the errors of an orbit and of the force model, propagated to the encounter.
 
-After a close passage two tracks part by orders of magnitude (a metre before the 2029 passage of Apophis is 5 km a
-year later). The errors of the orbit are those of its covariance: plus and minus one sigma along its principal axes
-are followed to the encounter with all forces (:mod:`flybystab.orbit.search.neighbours`). The error of the force model
-(ephemeris, masses, tolerance, forces left out) is that of undisturbed orbits, grown past the passages on the way.
+A close encounter amplifies deviations by orders of magnitude (a metre before the 2029 encounter of Apophis becomes 5 km
+a year later). The errors of the orbit are those of its covariance: deviations of plus and minus one sigma along its
+principal axes are integrated to the encounter with all forces (:mod:`flybystab.orbit.search.neighbours`). The error of
+the force model (ephemeris, masses, tolerance, neglected forces) is that of orbits without close encounters, amplified
+by the encounters before the one in question.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from flybystab.orbit.orbit import Orbit
 from flybystab.typing import Array
 
 #: Error of the model before any encounter, m: the median against JPL's approaches of 2020 (``flybystab bench sky``),
-#: and the time, s, after which it grows in proportion: passages with DE421 and DE440 are 0.2 km apart after 0 to 5 yr,
+#: and the time, s, after which it grows linearly: encounters with DE421 and DE440 are 0.2 km apart after 0 to 5 yr,
 #: 0.5 km after 5 to 10, 0.8 km after 10 to 20, 1.4 km after 20 to 40 and 3.2 km after 40 to 80 yr (medians;
 #: ``python benchmarks/orbit_errors.py model``).
 MODEL_ERROR, _MODEL_TIME = 100.0, 2.0 * YEAR
@@ -31,12 +32,12 @@ _SHIFT = 1e3
 
 
 class Predictability(StrEnum):
-    """What the possible displacement of the asteroid says of an encounter.
+    """Class of an encounter by the ratio of the displacement of the asteroid to the closest distance ``d``.
 
-    ``determined``: below a tenth of the closest distance. ``uncertain``: below the distance itself: there is such an
-    encounter, but its digits are not reliable. ``one of many``: as large as the distance or larger, or the encounter
-    does not happen on the displaced orbit: it is one of many possible. ``unknown``: no error of the orbit is known,
-    and a shift of a metre (or that of its printed digits) and the error of the model are below a tenth of the distance.
+    ``determined``: displacement below ``d/10``. ``uncertain``: below ``d``; there is an encounter, but its distance is
+    not accurate. ``one of many``: ``d`` or larger, or there is no such encounter on the displaced orbit; it is one of
+    many possible encounters. ``unknown``: the error of the orbit is not known, and the displacements by the error of
+    the model and by an initial shift of a metre (or the rounding of the printed elements) are below ``d/10``.
     """
 
     DETERMINED = "determined"
@@ -48,7 +49,7 @@ class Predictability(StrEnum):
 def predictability(distance: float, *displacements: float, known: bool = True) -> Predictability:
     """Class of the largest of the displacements at closest approach (m; inf: no such encounter).
 
-    `known` is False for an orbit without errors: the best class is then ``unknown``.
+    `known` is False if the error of the orbit is not known: the best class is then ``unknown``.
     """
     worst = max(displacements)
     if worst < 0.1 * distance:
@@ -57,7 +58,7 @@ def predictability(distance: float, *displacements: float, known: bool = True) -
 
 
 def undisturbed_error(t: Array) -> Array:
-    """Error of the force model, m, `t` s from the epoch of an orbit without close passages on the way."""
+    """Error of the force model, m, `t` s from the epoch of an orbit without close encounters in between."""
     return MODEL_ERROR * np.maximum(1.0, np.abs(t) / _MODEL_TIME)
 
 

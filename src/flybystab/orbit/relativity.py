@@ -7,8 +7,8 @@ field g and potential U, and the barycentric velocity v,
 - 4 (r.v) u - 3 (r.u) (v - u)] + 3.5 GM a_j/r}``,
 
 r is relative to source j, which has velocity u, acceleration a_j and the potential U_j of the other bodies. For one
-source at rest this is the Schwarzschild term in harmonic coordinates. With the Sun as the only source it would not be
-more accurate than that: the terms of the planets and those of the Sun's motion cancel in part.
+source at rest this is the Schwarzschild term in harmonic coordinates. With the Sun as the only
+source it would not be more accurate than that, since the terms of the planets and of the Sun's motion cancel in part.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def of_source(
     vy: float,
     vz: float,
 ) -> tuple[float, float, float]:
-    """What motion and surroundings of one source add to ``c^2`` times the 1PN acceleration (the braces above), m3/s4.
+    """Terms of one source in ``c^2`` times the 1PN acceleration (the braces in the formula of the module), m3/s4.
 
     Parameters
     ----------

@@ -69,7 +69,7 @@ def acceleration_gradient(
 
 @lru_cache(maxsize=1)
 def _callback() -> CFunc:
-    """The force on an asteroid and its deviations for the rebound that is installed."""
+    """The callback of the force on an asteroid and its deviations for the installed version of rebound."""
     return _compile(layout())
 
 
@@ -122,7 +122,7 @@ def _carried(
     strength = GM_SUN / size[0] ** 2
     scale = np.ones(WAYS)
     scale[6:] = np.divide(strength, effects, out=np.ones(len(NONGRAV_PARAMETERS)), where=effects > 0.0)
-    # Position and velocity deviate together: a deviation without acceleration at the start would stop the first step.
+    # Position and velocity deviate together: with a zero initial acceleration of a deviation the first step would fail.
     eye = np.eye(3)
     ways = size[:, None] * np.block([[eye, eye], [eye, -eye]])
     begin = np.hstack([ways, np.zeros((6, len(NONGRAV_PARAMETERS)))])

@@ -1,8 +1,8 @@
-"""The target plane (B-plane) of a passage: where the incoming asymptote pierces it.
+"""The target plane (B-plane) of an encounter, and the point where the incoming asymptote intersects it.
 
 S is the direction of the incoming asymptote, ``T = S x N/|S x N|`` with a direction N ("north"), ``R = S x T``
-(Kizner 1961). B points from the planet's centre to the asymptote and is as long as the impact parameter; the
-focusing by the planet is taken out, so that errors of an orbit stay an ellipse where distances do not.
+(Kizner 1961). B points from the planet's centre to the asymptote, and ``|B|`` is the impact parameter. The
+focusing by the planet does not enter: the errors of an orbit form an ellipse in this plane, unlike those of distances.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def target_plane(states: Array, gm: float | Array, north: Sequence[float] = NORT
     Parameters
     ----------
     states : ndarray, shape (n, 6)
-        Position (m) and velocity (m/s), any point of the passage.
+        Position (m) and velocity (m/s), at any point of the encounter.
     gm : float or ndarray, shape (n,)
         Gravitational parameter of the planet, m3/s2.
     north : sequence of float
@@ -64,7 +64,7 @@ def capture_radius(gm: float, distance: float | Array, v_inf: float | Array) -> 
 
 
 def checked(b: Array, v_inf: float, north: Sequence[float]) -> Array:
-    """The coordinates, or why there are none."""
+    """The coordinates `b`; raises InvalidInput for a bound orbit, or if `north` is along the asymptote."""
     if not v_inf > 0.0:
         raise InvalidInput("v_inf", v_inf, "a speed above zero: a bound orbit has no target plane")
     if not np.isfinite(b).all():

@@ -1,4 +1,4 @@
-"""Orbits as vector functions of skyfield, which then observes them like any planet.
+"""Orbits as vector functions of skyfield, which can be observed like any planet.
 
 An orbit becomes a function of time relative to the Sun (NAIF 10) or to the barycentre of the solar system (0), ICRF.
 ``ephemeris_file(...)["sun"] + orbit.to_skyfield()`` is a target for ``observe``, as a comet of skyfield is. The path is
@@ -23,7 +23,7 @@ from flybystab.orbit.ias15 import TIGHT, Flight
 from flybystab.orbit.orbit import Orbit
 from flybystab.typing import Array
 
-#: NAIF numbers of the centres that a path can be given from.
+#: NAIF numbers of the possible centres of a path.
 CENTRES = {"sun": 10, "ssb": 0}
 #: The ephemeris is read this far beyond the requested times, s: light time and its iteration stay inside.
 _MARGIN = 10.0 * DAY
@@ -45,7 +45,7 @@ def ephemeris_file(name: str | Ephemeris | None = None) -> Any:
 
 
 def whole_and_fraction(t: Any) -> tuple[Array, Array]:
-    """TDB of skyfield times as whole and fractional Julian dates: no digit is lost."""
+    """TDB of skyfield times as whole and fractional Julian dates, without loss of digits."""
     return np.atleast_1d(np.asarray(t.whole, dtype=float)), np.atleast_1d(
         np.asarray(t.tdb_fraction, dtype=float)
     )

@@ -42,7 +42,7 @@ from flybystab.typing import Array
 
 
 class Ends(NamedTuple):
-    """Ends of motion without friction: contact of dispersed grains, and the limit of the model."""
+    """Events that end motion without friction: contact of dispersed grains, and the limit of the model."""
 
     regime: int
     contact: float  # squared volume at which dispersed grains touch
@@ -51,7 +51,7 @@ class Ends(NamedTuple):
 
 @kernel
 def _distance(reason: int, y: Array, ends: Ends, ws: Workspace) -> float:
-    """Distance of a state from the end CONTACT or BEYOND; negative past it."""
+    """Event function of CONTACT or BEYOND; negative past the event."""
     return determinant(y[0:6]) - ends.contact if reason == CONTACT else ends.limit2 - axis_ratio2(y, ws)
 
 
@@ -83,7 +83,7 @@ def _first_end(ends: Ends, ws: Workspace) -> tuple[float, int]:
         low = x
     if high > 1.0:
         return high, DONE
-    # Both ends may be passed between two samples: the root of the first of them.
+    # Both events may lie between two samples: the earlier root is returned.
     for _ in range(55):
         mid = 0.5 * (low + high)
         if _end_inside(mid, ends, ws) != DONE:
@@ -104,10 +104,10 @@ def _step_to_end(
     tide: TidePanels,
     ws: Workspace,
 ) -> float:
-    """Repeat a step up to an end near the fraction `x`; returns the fraction.
+    """Repeat a step up to an event near the fraction `x`; returns the fraction.
 
-    The interpolant of a long step has the root less precisely than the step itself: it is corrected twice with the
-    slope of the interpolant.
+    The step is more accurate than its interpolant: the root is corrected by two Newton iterations on the state at the
+    end of the repeated step, with the derivative of the interpolant.
     """
     high = x
     near = high * (1.0 - 1e-3)
@@ -165,7 +165,7 @@ def follow_free(
         explicit_dense(regime, t, N_FULL, h, par, tide, ws)
         if not touched:
             end_time = contact_time(Step(regime, True, t, h, par.rigid), ground, ws)
-            if end_time < np.inf:  # repeat the step up to the contact
+            if end_time < np.inf:  # repeat the step up to the contact with the ground
                 touched = True
                 t1 = end_time
                 drop_last_row(log)

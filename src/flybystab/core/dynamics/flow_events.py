@@ -1,8 +1,9 @@
 """Event functions of plastic flow, and the location of the first event in a step.
 
-The event functions are continuous, and positive while the flow goes on. They are sampled on the dense output of a step;
-where no sample is negative, a minimum between the samples is looked for. An explicit step at whose stages all of them
-remain far from zero has no event: it needs neither samples nor dense output.
+The event functions are continuous, and positive while the flow continues. They are sampled on the dense output of a
+step; if no sample is negative, minima between the samples are searched. An explicit step with
+``min g >= _CLEAR max g > 0`` over its stages, for every event function ``g``, counts as free of events: it is neither
+sampled nor given a dense output.
 """
 
 from __future__ import annotations
@@ -53,17 +54,19 @@ _RATIO, _DENOMINATOR, _STRENGTH, _PART = range(4)
 # Columns of `Workspace.stages`.
 _LEAST, _LARGEST = range(2)
 
-#: An event function that remains above this share of its largest value at the stages of a step has no zero in the step.
+#: An event function above this fraction of its largest value at all stages of a step counts as having no zero in it.
 _CLEAR = 0.5
 
 
 class Flow(NamedTuple):
-    """Parameters of a flow, and where it ends."""
+    """Parameters of a flow, and the limits at which it ends."""
 
     par: Parameters
     tide: TidePanels
-    limit2: float  # square of the axis ratio beyond which the model is left
-    fade_volume: float  # V/V0 at which the dilatancy begins to fade; infinite if it does not, or has begun
+    limit2: float  # square of the largest axis ratio of the model
+    fade_volume: (
+        float  # V/V0 at which the dilatancy begins to fade; infinite if it is constant or already fading
+    )
 
 
 class FlowStep(NamedTuple):
@@ -84,7 +87,7 @@ def axis_ratio2(y: Array, ws: Workspace) -> float:
 
 @kernel
 def _event_functions(denominator: float, y: Array, flow: Flow, ws: Workspace) -> None:
-    """Write the event functions of a state just after its rate, with the `denominator` of the pressure."""
+    """Write the event functions of a state to ``ws.ends[:, -1]``; `denominator` is that returned by its `rate`."""
     material = flow.par.material
     work, ends = ws.work, ws.ends
     s = work.s
@@ -95,7 +98,7 @@ def _event_functions(denominator: float, y: Array, flow: Flow, ws: Workspace) ->
     ratio = np.sqrt(flow.limit2)
     if invariant_ratio(y[0:6], work.m[W_SINV]) > (ratio + 1.0 + 1.0 / ratio) ** 2:
         below = flow.limit2 - axis_ratio2(y, ws)
-    # Past a vanishing denominator the sign of the strength is undefined.
+    # Where the denominator is not positive, the sign of the strength has no meaning.
     if not denominator > 0.0:
         strength = np.inf
     inside = np.inf
@@ -115,11 +118,12 @@ def _event_functions(denominator: float, y: Array, flow: Flow, ws: Workspace) ->
 
 @kernel
 def least_event(t: float, y: Array, dy: Array, flow: Flow, ws: Workspace) -> tuple[float, int]:
-    """Least of the event functions of flow, negative once the flow has ended, and its code. Sets the rate `dy`.
+    """Least of the event functions of flow, negative past an event, and the code of the event. Writes the rate `dy`.
 
-    The event functions are the strength ``k P + k c`` (the pressure of a fluid), the denominator of the pressure, the
-    distance from the axis ratio where the model is left, from the volume where the dilatancy begins to fade, and on
-    Mohr-Coulomb from the end of the face or of the fan of the corner where the stress is.
+    The event functions are the strength ``k P + k c`` (the pressure of a frictionless material without cohesion), the
+    denominator of the pressure, ``r_max^2 - r^2`` with the axis ratio ``r``, the volume at which the dilatancy begins
+    to fade less the volume, and for Mohr-Coulomb the distance from the end of the face or of the fan of the corner at
+    which the stress lies.
     """
     denominator = rate(FLOWING, t, y, dy, flow.par, flow.tide, ws.work)
     _event_functions(denominator, y, flow, ws)
@@ -146,11 +150,11 @@ def begin_stages(ws: Workspace) -> None:
 
 @kernel
 def add_stage(denominator: float, y: Array, flow: Flow, ws: Workspace) -> None:
-    """Extend the range by the state of a stage, just after its rate, with the `denominator` of the pressure."""
+    """Extend the range by the state `y` of a stage; `denominator` is that returned by its `rate`."""
     _event_functions(denominator, y, flow, ws)
     for i in range(4):
         value = ws.ends[i, -1]
-        # not min and max: a nan has to remain
+        # Not min and max: nan has to propagate.
         if not value >= ws.stages[i, _LEAST]:
             ws.stages[i, _LEAST] = value
         if not value <= ws.stages[i, _LARGEST]:
@@ -159,15 +163,15 @@ def add_stage(denominator: float, y: Array, flow: Flow, ws: Workspace) -> None:
 
 @kernel
 def clear_of_events(flow: Flow, ws: Workspace) -> bool:
-    """Whether no event function can vanish in the step just made, whose last stage is its end.
+    """True if ``min g >= _CLEAR max g > 0`` over the stages of the step just made, for every event function ``g``.
 
-    The event functions at the end become the first of the next step.
+    The event functions at its end, which is its last stage, are then stored as the first sample of the next step.
     """
     for i in range(4):
         least = ws.stages[i, _LEAST]
         if not (least > 0.0 and least >= _CLEAR * ws.stages[i, _LARGEST]):
             return False
-    # The volume of a flow only grows.
+    # The volume does not decrease in flow: its value at the end is the largest.
     if not ws.work.s[VOLUME] < flow.fade_volume:
         return False
     sample(-1, 0, ws)
@@ -200,7 +204,7 @@ def _least_inside(x: float, step: FlowStep, flow: Flow, ws: Workspace) -> float:
 
 @kernel
 def _lowest(xa: float, va: float, xb: float, vb: float, xc: float, vc: float) -> tuple[float, float]:
-    """Lowest point (place, value) of the parabola through three points; infinite if it has none between them."""
+    """Abscissa and value of the minimum of the parabola through three points; inf if it has none between them."""
     first, second = (vb - va) / (xb - xa), (vc - vb) / (xc - xb)
     bend = (second - first) / (xc - xa)
     if not bend > 0.0:
@@ -213,11 +217,14 @@ def _lowest(xa: float, va: float, xb: float, vb: float, xc: float, vc: float) ->
 
 @kernel
 def _minimum(step: FlowStep, points: int, flow: Flow, ws: Workspace) -> tuple[float, float, bool]:
-    """Fraction of a step at which an event function is negative between two samples, and of the sample before it.
+    """Search for a point between the samples at which an event function is negative.
 
-    ``ws.ends`` has the samples, none of them negative. Where a parabola through three of them falls towards zero, its
-    lowest point is evaluated: contact may be lost during a minimum of the pressure that is shorter than a step. The
-    fraction is 2 where there is none; the last value is whether any point was evaluated.
+    ``ws.ends`` has the samples, none of them negative. Where the minimum of the parabola through three consecutive ones
+    is below half of the least of them, or that is below a tenth of the largest, the event functions are evaluated
+    there, and the parabola is refined up to four times: a minimum of the pressure can be shorter than a step.
+
+    Returns the fraction of the step (2 if no such point was found), the fraction of the sample before it, and True if
+    any point was evaluated.
     """
     evaluated = False
     for i in range(4):

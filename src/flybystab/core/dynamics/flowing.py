@@ -1,4 +1,4 @@
-"""Plastic flow up to arrest, loss of contact, jam or the limit of the model."""
+"""Plastic flow up to arrest, loss of contact, jam or the limit of the model (docs/theory.md, section 3)."""
 
 from __future__ import annotations
 
@@ -52,59 +52,65 @@ from flybystab.core.numerics.jit import inlined, kernel
 from flybystab.core.numerics.tensors import determinant, deviator
 from flybystab.typing import Array
 
-#: Longest explicit step, times the rate of relaxation of ``D``: DOP853 is stable to 6 on the axis.
+#: Explicit steps obey ``h r <= _STABLE``, ``r`` the relaxation rate of ``D``; DOP853 is stable on the negative real
+#: axis up to ``h r = 6``.
 _STABLE = 5.0
 
-#: The same where stability, not the error, holds explicit steps back so much that implicit ones are better.
-_HELD = 4.0 * _STABLE
+#: Explicit steps are given up where the step ``h`` that the error alone would allow has ``h r > _IMPLICIT_BETTER``.
+_IMPLICIT_BETTER = 4.0 * _STABLE
 
-#: Longest step towards rest, over the time to it.
+#: Largest step while ``|D|`` falls, over the predicted time to rest ``-|D|/(d|D|/dt)``.
 _APPROACH = 0.45
 
-#: Implicit steps at least between explicit stretches.
-_BETWEEN = 3
+#: Least number of implicit steps after a change from explicit to implicit ones.
+_MIN_IMPLICIT_STEPS = 3
 
-#: Time to rest at which flow ends, dynamical times over the tolerance of a step, and the least tolerance that counts:
-#: at 1e-9 the body is drawn to rest by its rate, to the square of that.
-_BRIEF = 0.1
-_TIGHT = 1e-8
+#: Flow ends where ``-|D|/(d|D|/dt) < _REST_TIME max(tolerance, _MIN_REST_TOLERANCE)``, in dynamical times, that is at
+#: 1e-9 for the default tolerance. The state is then extrapolated linearly to rest, with an error of the order of the
+#: square of this time.
+_REST_TIME = 0.1
+_MIN_REST_TOLERANCE = 1e-8
 
 
 class Method(NamedTuple):
-    """Method of the next step, and what the choice between explicit and implicit steps needs to know.
+    """Method of the next step, and the quantities on which the choice between explicit and implicit steps depends.
 
-    Near onset and rest, where the direction of ``D`` relaxes as ``1/|D|``, the steps are implicit; in between, where
-    explicit ones of order 8 can be longer without losing stability, they are explicit.
+    The direction of ``D`` relaxes at a rate ``r`` proportional to ``1/|D|``. Near onset and rest the equations are
+    stiff and the steps implicit; where ``h r`` is below the limit of stability of the explicit method of order 8 for
+    the step ``h`` that the error allows, they are explicit.
     """
 
     explicit: bool
-    pull: float  # rate of relaxation times |D|, from the last Jacobian
-    slow: float  # |D| at which explicit steps end
-    implicit_ahead: int  # least number of implicit steps before an explicit one
+    stiffness: float  # r |D|, from the last Jacobian
+    explicit_floor: float  # |D| below which explicit steps end
+    implicit_ahead: int  # implicit steps still to be taken before an explicit one is allowed
 
 
 @kernel
-def _choose_part(t: float, near: float, par: Parameters, tide: TidePanels, ws: Workspace) -> Parameters:
+def _choose_part(
+    t: float, angle_tolerance: float, par: Parameters, tide: TidePanels, ws: Workspace
+) -> Parameters:
     """Parameters with the part of the yield section (face or corner) on which the stress of the flow ``ws.y`` lies.
 
-    The stress lies on a face if ``D`` is normal to the face, within the Lode angle `near`, and can stay normal to it;
-    otherwise in a corner.
+    The stress lies on a face if the Lode angle of ``D`` is within `angle_tolerance` (rad) of that of the normal of the
+    face, and a stress between the two corners keeps it there; otherwise at a corner.
     """
     if not on_hexagon(par.material):
         return Parameters(on_part(par.material, SMOOTH, par.material.fan_limit), par.rigid)
     par = Parameters(on_part(par.material, FACE, par.material.fan_limit), par.rigid)
     rate(FLOWING, t, ws.y, ws.inner_rate, par, tide, ws.work)
     s = ws.work.s
-    return Parameters(part_of_flow(s[BEYOND_FACE], s[PLACE], near, par.material), par.rigid)
+    return Parameters(part_of_flow(s[BEYOND_FACE], s[PLACE], angle_tolerance, par.material), par.rigid)
 
 
 @kernel
 def _begin_flow(
-    t: float, near: float, par: Parameters, tide: TidePanels, limits: Limits, ws: Workspace
+    t: float, angle_tolerance: float, par: Parameters, tide: TidePanels, limits: Limits, ws: Workspace
 ) -> Flow:
-    """The flow that starts in the state ``ws.y``."""
-    par = _choose_part(t, near, par, tide, ws)
-    # A step must not straddle the kink of the dilatancy: plastic flow only ever dilates, and passes it once.
+    """Parameters of the flow that starts in the state ``ws.y``; `angle_tolerance` (rad) as in `_choose_part`."""
+    par = _choose_part(t, angle_tolerance, par, tide, ws)
+    # The second derivative of beta(V) jumps where the fade begins (`fade_share`), so that a step has to end there. The
+    # volume does not decrease in plastic flow (tr D >= 0): it reaches this value at most once.
     fading = fade_start(par.material)
     if not (par.material.beta > 0.0 and np.sqrt(determinant(ws.y[0:6])) < fading):
         fading = np.inf
@@ -113,7 +119,7 @@ def _begin_flow(
 
 @kernel
 def _explicit_step(t: float, h: float, flow: Flow, ws: Workspace) -> float:
-    """`explicit_step` of flow, which leaves the range of the event functions over its stages in ``ws.stages``."""
+    """`explicit_step` of flow; writes the range of the event functions over its stages into ``ws.stages``."""
     begin_stages(ws)
     y1, k = ws.y1, ws.k
     for s in range(1, N_STAGES + 1):
@@ -134,7 +140,7 @@ def _step(explicit: bool, t: float, h: float, flow: Flow, ws: Workspace) -> floa
 
 @kernel
 def _stiffness(jac: Array, v: Array) -> float:
-    """Rate at which ``D`` relaxes: spectral radius of its block of the Jacobian, by power iteration in ``v[12]``."""
+    """Relaxation rate of ``D``: spectral radius of ``d(Ddot)/dD``, by power iteration; ``v[12]`` is scratch."""
     for i in range(6):
         v[i] = 0.0
         for j in range(6, 12):
@@ -162,26 +168,31 @@ def _stiffness(jac: Array, v: Array) -> float:
 def _choose_method(
     method: Method, t: float, h: float, d: float, f0: Array, flow: Flow, ws: Workspace
 ) -> Method:
-    """Method of the next step, of length `h` at first, from ``|D|``; an implicit one has its Jacobian in ``ws.jac``."""
-    explicit, pull, slow, ahead = method.explicit, method.pull, method.slow, method.implicit_ahead
-    if explicit and (d < slow or h * pull > _HELD * d):
-        explicit, ahead = False, _BETWEEN
+    """Method of the next step, for a trial length `h` and ``|D|`` = `d`; writes ``ws.jac`` if it is implicit."""
+    explicit, stiffness, explicit_floor, ahead = (
+        method.explicit,
+        method.stiffness,
+        method.explicit_floor,
+        method.implicit_ahead,
+    )
+    if explicit and (d < explicit_floor or h * stiffness > _IMPLICIT_BETTER * d):
+        explicit, ahead = False, _MIN_IMPLICIT_STEPS
     if not explicit:
         flow_jacobian(t, ws.y, f0, 1e-6, flow.par.material, flow.tide, ws.work, ws.jac, ws.lu)
-        pull = d * _stiffness(ws.jac, ws.inner_rate)
+        stiffness = d * _stiffness(ws.jac, ws.inner_rate)
         ahead -= 1
-        if ahead < 0 and 1.5 * h * pull < _STABLE * d:
-            explicit, slow = True, 0.5 * d
-    return Method(explicit, pull, slow, ahead)
+        if ahead < 0 and 1.5 * h * stiffness < _STABLE * d:
+            explicit, explicit_floor = True, 0.5 * d
+    return Method(explicit, stiffness, explicit_floor, ahead)
 
 
 @kernel
 def _step_length(method: Method, h: float, d: float, trend: float) -> float:
-    """Length `h` of the next step, shortened for stability and near rest, from ``|D|`` and its derivative."""
+    """`h`, shortened for stability and near rest; `d` and `trend` are ``|D|`` and its derivative in time."""
     if method.explicit:
-        h = min(h, _STABLE * d / method.pull)
+        h = min(h, _STABLE * d / method.stiffness)
     if trend < 0.0:
-        # |D| falls linearly to arrest, its direction relaxes as 1/|D|: approach it geometrically.
+        # |D| falls linearly to zero while the relaxation rate grows as 1/|D|: steps in proportion to the time to rest.
         h = min(h, _APPROACH * d / -trend)
     return h
 
@@ -190,9 +201,9 @@ def _step_length(method: Method, h: float, d: float, trend: float) -> float:
 def _accepted_step(
     explicit: bool, t: float, t1: float, h: float, flow: Flow, limits: Limits, ws: Workspace, log: Log
 ) -> tuple[FlowStep, float, float]:
-    """Make a step of at most `h` towards `t1`, shortened until its error is allowed.
+    """Make a step of at most `h`, not beyond `t1`, shortened until its error norm is at most 1.
 
-    Returns the step, its error (nan where none could be made), and the largest growth of the next one.
+    Returns the step, its error norm (nan if no step succeeded), and the largest allowed ratio of the next step to it.
     """
     growth = 6.0
     while True:
@@ -205,7 +216,7 @@ def _accepted_step(
         if error <= 1.0:
             return FlowStep(explicit, t, h), error, growth
         count_rejected(log)
-        # Near onset the error falls slower than the order says: a second rejection at least halves the step.
+        # Near onset the error falls more slowly than h^order: from the second rejection the step is at least halved.
         most = 0.9 if growth > 1.0 else 0.5
         growth = 1.0
         h *= min(most, max(0.1, 0.9 * error ** _exponent(explicit))) if np.isfinite(error) else 0.1
@@ -215,13 +226,13 @@ def _accepted_step(
 
 @kernel
 def _exponent(explicit: bool) -> float:
-    """Power of the error to which the length of a step is proportional: minus one over the order."""
+    """Exponent of the error norm in the step-size control: minus one over the order of the method."""
     return -0.125 if explicit else -0.2
 
 
 @kernel
 def _next_length(step: FlowStep, error: float, growth: float) -> float:
-    """Length of the step that follows an accepted one, from its error; it grows by `growth` at most."""
+    """Length of the step that follows an accepted one, from its error norm; at most `growth` times its length."""
     if error > 0.0:
         return step.h * min(growth, max(0.2, 0.9 * error ** _exponent(step.explicit)))
     return step.h * growth
@@ -249,19 +260,20 @@ def _strain_rate(y: Array, f0: Array, unit: Array) -> tuple[float, float]:
 
 @kernel
 def _near_rest(d: float, trend: float, fastest: float, tolerance: float) -> bool:
-    """Whether the time to rest is below the tolerance.
+    """True where the predicted time to rest ``-|D|/(d|D|/dt)`` is below ``_REST_TIME max(tolerance, 1e-8)``.
 
-    The direction of so small a ``D`` is noise, and on a sharp corner of the yield section, which turns the stress with
-    it, ``D`` would never come to rest.
+    For smaller ``|D|`` the computed direction of ``D`` is dominated by the error of the step. ``N`` has the principal
+    axes of ``D``: at a sharp corner of the yield section the error turns the stress by a finite angle, and the computed
+    ``|D|`` would not reach zero.
     """
-    return d < 1e-2 * fastest and d < _BRIEF * max(tolerance, _TIGHT) * -trend
+    return d < 1e-2 * fastest and d < _REST_TIME * max(tolerance, _MIN_REST_TOLERANCE) * -trend
 
 
 @kernel
 def _step_to_event(
     step: FlowStep, end: float, goes_on: bool, flow: Flow, ws: Workspace, log: Log
 ) -> FlowStep:
-    """Repeat a step up to the fraction `end`: with the order of the method in place of that of the interpolant."""
+    """Repeat a step up to its fraction `end`: the state has the order of the method, not that of the interpolant."""
     explicit, t, h = step.explicit, step.t, step.h * end
     _step(explicit, t, h, flow, ws)
     step = FlowStep(explicit, t, h)
@@ -274,11 +286,13 @@ def _step_to_event(
 
 
 @inlined
-def _after_event(reason: int, t: float, near: float, flow: Flow, ws: Workspace) -> Flow:
-    """The flow that goes on after SWITCH, on another part of the yield section, or FADE, with less dilatancy."""
+def _after_event(reason: int, t: float, angle_tolerance: float, flow: Flow, ws: Workspace) -> Flow:
+    """Parameters of the flow after SWITCH (another part of the yield section) or FADE (the dilatancy falls with V)."""
     if reason == FADE:
         return Flow(flow.par, flow.tide, flow.limit2, np.inf)
-    return Flow(_choose_part(t, near, flow.par, flow.tide, ws), flow.tide, flow.limit2, flow.fade_volume)
+    return Flow(
+        _choose_part(t, angle_tolerance, flow.par, flow.tide, ws), flow.tide, flow.limit2, flow.fade_volume
+    )
 
 
 @inlined
@@ -286,7 +300,7 @@ def _first_length(reason: int, step: FlowStep, end: float, method: Method) -> tu
     """Length and method of the first step after an event at the fraction `end` of a step, repeated as `step`."""
     if reason == FADE:
         return step.h / end, method
-    return max(step.h, 1e-4), Method(False, method.pull, method.slow, _BETWEEN)
+    return max(step.h, 1e-4), Method(False, method.stiffness, method.explicit_floor, _MIN_IMPLICIT_STEPS)
 
 
 @inlined
@@ -317,7 +331,7 @@ def _reach_rest(t: float, d: float, trend: float, f0: Array, y: Array) -> float:
 
 @kernel
 def _end_step(step: FlowStep, t1: float, flow: Flow, ws: Workspace, log: Log) -> float:
-    """Record a step without an event, go on to its end at `t1` and restore the flow rule there; returns ``|D'|``."""
+    """Record a step without an event, move ``ws.y`` to its end at `t1`, restore the flow rule; returns ``|D'|``."""
     y, f0 = ws.y, ws.start_rate
     if keeps_history(log):
         record_inside(step, ws.inner_rate, flow, ws, log)
@@ -343,19 +357,19 @@ def follow_flow(
     ws: Workspace,
     log: Log,
 ) -> tuple[int, float]:
-    """Plastic flow of ``ws.y`` up to one of its ends or `t1`; returns (reason, time)."""
+    """Plastic flow of ``ws.y`` up to `t1` or the first event that ends it; returns (reason, time)."""
     y, f0, tol = ws.y, ws.start_rate, limits.tolerance
-    near = 1e-6 + 10.0 * tol  # the direction of D is known no better
+    angle_tolerance = 1e-6 + 10.0 * tol  # rad: error of the direction of D
     h = 1e-4
     method = Method(False, 0.0, 0.0, 0)
     fastest = 0.0
-    flow = _begin_flow(t, near, par, tide, limits, ws)
+    flow = _begin_flow(t, angle_tolerance, par, tide, limits, ws)
     least, reason = _first_values(t, f0, flow, ws)
     if least < 0.0:
         return reason, t
     touched = False
     while t < t1:
-        # Here f0 and the stress in `ws.work` belong to (t, y).
+        # Invariant: f0 and the stress in `ws.work` are those of (t, y).
         record_flow(t, y, flow.par, ws, log)
         d, trend = _strain_rate(y, f0, ws.stress)
         fastest = max(fastest, d)
@@ -371,13 +385,13 @@ def follow_flow(
             return STUCK, t
         h = step.h
         last = h >= t1 - t
-        way = Step(FLOWING, step.explicit, t, h, par.rigid)
-        low = not touched and may_touch(way, ground, ws)
-        clear = step.explicit and not (low or keeps_history(log)) and clear_of_events(flow, ws)
+        ground_step = Step(FLOWING, step.explicit, t, h, par.rigid)
+        near_ground = not touched and may_touch(ground_step, ground, ws)
+        clear = step.explicit and not (near_ground or keeps_history(log)) and clear_of_events(flow, ws)
         if step.explicit and not clear:
             explicit_dense(FLOWING, t, N_FULL, h, flow.par, flow.tide, ws)
-        if low:
-            end_time = contact_time(way, ground, ws)
+        if near_ground:
+            end_time = contact_time(ground_step, ground, ws)
             if end_time < np.inf:  # repeat the step up to the contact
                 touched = True
                 t1 = end_time
@@ -392,7 +406,7 @@ def follow_flow(
             if not goes_on:
                 record_end(t, y, f0, flow, ws, log)
                 return reason, t
-            flow = _after_event(reason, t, near, flow, ws)
+            flow = _after_event(reason, t, angle_tolerance, flow, ws)
             h, method = _first_length(reason, step, end, method)
             least, reason = _first_values(t, f0, flow, ws)
             if least < 0.0:

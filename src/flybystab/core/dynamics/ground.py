@@ -1,11 +1,12 @@
 """Contact of the body with the surface of the planet.
 
-A body with the shape tensor ``S`` extends ``h = sqrt(n.S.n)`` from its centre towards the planet, ``n`` the unit vector
-to it: the support function of the ellipsoid. It touches once its centre is no higher than ``h``. The tangent plane
-stands for the sphere of the planet, of radius R: ``h`` is too large by at most ``a1^2/(2 R)``, 8 cm for 1 km at Earth.
+With ``n`` the unit vector to the planet, a body with the shape tensor ``S`` extends ``h = sqrt(n.S.n)`` from its centre
+along ``n`` (the support function of the ellipsoid). It touches the ground where the height of its centre is ``h``. The
+sphere of the planet, of radius R, is replaced by its tangent plane: ``h`` is too large by at most ``a1^2/(2 R)``, 8 cm
+for ``a1`` = 1 km at the Earth.
 
-The centre is that low for a few seconds, far less than a step of the dynamics. So the part of a step in which the
-centre is lower than the longest semi-axis is found first, and only that part is searched.
+The height of the centre is below the longest semi-axis for a few seconds, far less than a step of the dynamics. This
+part of a step is located first, and only this part is searched.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ from flybystab.core.numerics.jit import kernel
 from flybystab.typing import Array
 
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
-#: Samples per radian of rotation or unit of strain, and their least and largest number.
+#: Samples per radian of rotation or unit of strain, and the least and the largest number of samples.
 _DENSE, _LEAST, _MOST = 16, 8, 4000
 
 
@@ -34,13 +35,13 @@ class Ground(NamedTuple):
     tau, start, width : float
         As in :class:`flybystab.core.ellipsoid.tide.TidePanels`.
     floor : float
-        Distance from the planet's centre that counts as the ground, m.
+        Radius of the ground: distance from the planet's centre, m.
     least : float
-        Least height of the body's centre above it, reached at closest approach, m; negative where it gets below.
+        Least height of the body's centre above the ground, at closest approach, m; negative below the ground.
     unit : float
-        m in the unit of length of the states.
+        Unit of length of the states, m.
     coefficients : ndarray, shape (panels, degree + 1, 3)
-        Chebyshev coefficients of the position, m, frame of the tide. No panels: no ground.
+        Chebyshev coefficients of the position, m, frame of the tide; no ground if there are no panels.
     """
 
     tau: float
@@ -53,13 +54,13 @@ class Ground(NamedTuple):
 
 
 def no_ground() -> Ground:
-    """No ground to reach."""
+    """A `Ground` without panels, for a body that cannot reach a planet."""
     return Ground(1.0, 0.0, 1.0, 0.0, np.inf, 1.0, np.zeros((0, 1, 3)))
 
 
 @kernel
 def _direction(t: float, ground: Ground, n: Array) -> float:
-    """Height (m) of the centre above the ground at time `t`; writes the unit vector ``n[3]`` along its position."""
+    """Height (m) of the centre above the ground at time `t`; writes the unit vector ``n[3]`` along the position."""
     c = ground.coefficients
     i, x = panel_at(ground.tau, ground.start, ground.width, c.shape[0], t)
     r2 = 0.0
@@ -117,7 +118,7 @@ def _gap(when: float, step: Step, ground: Ground, ws: Workspace, n: Array) -> fl
 
 @kernel
 def _crossing(low: float, high: float, size: float, ground: Ground, n: Array) -> float:
-    """The time between `low` and `high` at which the centre passes the height `size` (m)."""
+    """The time between `low` and `high` at which the height of the centre is `size` (m), by bisection."""
     falling = _direction(high, ground, n) < size
     for _ in range(60):
         mid = 0.5 * (low + high)
@@ -132,7 +133,10 @@ def _crossing(low: float, high: float, size: float, ground: Ground, n: Array) ->
 
 @kernel
 def _extent(step: Step, ground: Ground, ws: Workspace) -> tuple[float, float]:
-    """Largest distance of a point of the body from its centre in a step (m), and the rate at which it turns."""
+    """Upper bound of the longest semi-axis in a step (m), and the norm of ``L`` (or spin) at its end.
+
+    For deformable bodies the bound is ``sqrt(1.1 tr S)``.
+    """
     y, y1 = ws.y, ws.y1
     if step.regime == RIGID:
         size = max(step.rigid.s1, step.rigid.s2, step.rigid.s3)
@@ -149,7 +153,7 @@ def _extent(step: Step, ground: Ground, ws: Workspace) -> tuple[float, float]:
 
 @kernel
 def may_touch(step: Step, ground: Ground, ws: Workspace) -> bool:
-    """Whether the centre of the body comes so low in a step that the body may touch the ground."""
+    """True where the least height of the centre in a step is below the bound on the longest semi-axis."""
     if ground.coefficients.shape[0] == 0:
         return False
     size, _ = _extent(step, ground, ws)
@@ -161,7 +165,7 @@ def may_touch(step: Step, ground: Ground, ws: Workspace) -> bool:
 def contact_time(step: Step, ground: Ground, ws: Workspace) -> float:
     """Time at which the body first touches the ground in a step; infinite if it does not.
 
-    Overwrites ``ws.ys``; reads the interpolant of the step only where it `may_touch` the ground.
+    Overwrites ``ws.ys``. The interpolant ``ws.dense`` is needed only where `may_touch` is true.
     """
     if not may_touch(step, ground, ws):
         return np.inf
@@ -196,7 +200,7 @@ def contact_time(step: Step, ground: Ground, ws: Workspace) -> float:
 
 @kernel
 def _root(low: float, high: float, step: Step, ground: Ground, ws: Workspace, n: Array) -> float:
-    """The time between `low`, where the body is clear of the ground, and `high` at which it has just reached it."""
+    """Zero of the gap between the times `low` (positive gap) and `high` (gap not positive), by bisection."""
     for _ in range(60):
         mid = 0.5 * (low + high)
         if _gap(mid, step, ground, ws, n) <= 0.0:
@@ -210,7 +214,7 @@ def _root(low: float, high: float, step: Step, ground: Ground, ws: Workspace, n:
 
 @kernel
 def _dip(a: float, b: float, step: Step, ground: Ground, ws: Workspace, n: Array) -> tuple[float, float]:
-    """Golden-section minimum of the gap between the times `a` and `b`: when, and how large."""
+    """Minimum of the gap between the times `a` and `b` by golden section: time and value (m)."""
     x1 = b - _GOLDEN * (b - a)
     x2 = a + _GOLDEN * (b - a)
     f1 = _gap(x1, step, ground, ws, n)

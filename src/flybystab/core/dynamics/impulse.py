@@ -1,13 +1,13 @@
 """Friction impulse: the effect of a set-valued yield law on a velocity gradient at one instant.
 
-``Delta L = -That S^-1`` with ``That = -Phat 1 + (k Phat + chat) Dhat``, ``Dhat`` along the deviatoric rate of
-strain *afterwards* (for the true normal on ``k(theta)``: the stress whose normal that is) and ``Phat`` such that
-``tr D`` obeys the flow rule then. If a ``That`` inside the yield surface
-brings the body to rest, it does so; if no pressure is needed, nothing happens. A symmetric ``That`` keeps the
-angular momentum, and it never raises the kinetic energy.
+``Delta L = -That S^-1`` with ``That = -Phat 1 + (k Phat + chat) Dhat``, where ``Dhat`` is the direction of the
+deviatoric rate of strain *after* the impulse (for associative flow on ``k(theta)``, ``That`` is the point of the yield
+surface with the normal ``Dhat``) and ``Phat`` is such that ``tr D`` after the impulse obeys the flow rule. Rest: the
+``That`` that makes ``D`` zero is inside the yield surface. Free: the flow rule is met or exceeded with ``Phat = 0``.
+``That`` is symmetric, so that the angular momentum is conserved; the kinetic energy does not increase.
 
-It is the impulse with which a dispersed body comes back into contact (theory, section 3), and one step of the
-time-stepping integrator of :mod:`flybystab.core.dynamics.moreau`.
+It is the impulse by which a dispersed body regains contact (theory, section 3), and one step of the time-stepping
+integrator of :mod:`flybystab.core.dynamics.moreau`.
 """
 
 from __future__ import annotations
@@ -58,7 +58,7 @@ FAILED = code(3)
 
 
 class RestImpulse(NamedTuple):
-    """Invariants of the impulse that rest would need, and its excess over the yield surface."""
+    """Invariants of the impulse required for rest, and its excess over the yield surface."""
 
     p: float
     norm: float  # of its deviator
@@ -67,7 +67,7 @@ class RestImpulse(NamedTuple):
 
 
 class Contact(NamedTuple):
-    """An impulse: what it does to the motion, and the part of the yield section on which its stress lies."""
+    """Outcome of an impulse, and the part of the yield section on which its stress lies."""
 
     outcome: int  # FREE, REST, SLIDING or FAILED
     part: int
@@ -196,7 +196,7 @@ def friction_impulse(
             before[j, i] -= offset[c]
     beta, _ = dilatancy(volume, material)
     cos_c = material.cos_phi * material.cohesion * volume * duration
-    # Rest needs the impulse That = (L - W) S; inside the yield surface it holds the body.
+    # The impulse required for rest is That = (L - W) S; the outcome is REST if it is inside the yield surface.
     that = work.c[TIDE]
     w = room.spin
     _impulse_to_rest(y, s, before, work, w, that)
@@ -261,10 +261,11 @@ def _sliding_impulse(
     material: MaterialParameters,
     problem: ImpulseProblem,
 ) -> tuple[bool, int]:
-    """Solve the equations of sliding for ``room.x``; whether a solution was found, and its part of the section.
+    """Solve the equations of sliding for ``room.x``; returns True if a solution was found, and its part of the section.
 
-    Near rest the strain starts along the deviator of the impulse that rest would need, in proportion to its excess;
-    far from it the motion before the impulse, of ``-tr/3`` `mean` and ``|D'|`` `start`, is the better guess.
+    Two guesses are tried, by Newton's method and then by continuation: near rest, ``D'`` along the deviator of the
+    impulse required for rest, of a size proportional to its excess; far from it, ``D`` before the impulse, with
+    ``-tr D/3`` = `mean` and ``|D'|`` = `start`.
     """
     work, d_star, x = problem.work, problem.d_star, problem.room.x
     sinv = work.m[W_SINV]
@@ -272,7 +273,7 @@ def _sliding_impulse(
     hexagon = on_hexagon(material)
     first = EXTENSION_CORNER if hexagon and material.part == SMOOTH else material.part
     part = first
-    # The continuation takes up to a hundred times as long as Newton's method from a guess: it comes last.
+    # The continuation takes up to a hundred times as long as Newton's method from a guess: it is tried last.
     for guess in range(4):
         for turn in range(3 if hexagon else 1):
             part = first if turn == 0 else part % 3 + 1
@@ -296,7 +297,7 @@ def _sliding_impulse(
 def _along_rest(
     that: Array, rest: RestImpulse, material: MaterialParameters, x: Array, work: Buffers
 ) -> None:
-    """First guess ``x[8]``: strain along the impulse that rest would need, in proportion to its excess."""
+    """First guess ``x[8]``: ``D'`` along the impulse required for rest, of a size proportional to its excess."""
     unit, n = work.c[UNIT], work.m[W_N]
     for i in range(6):
         unit[i] = (that[i] + (rest.p if i < 3 else 0.0)) / rest.norm
@@ -313,27 +314,27 @@ def _along_rest(
 
 @kernel
 def _by_weaker_friction(material: MaterialParameters, problem: ImpulseProblem) -> bool:
-    """`_newton` by continuation in the friction: at less of it the section is rounder and a solution is found."""
+    """`_newton` by continuation in ``sin(phi)`` up to its value, with steps that adapt; True if it is reached."""
     x, kept = problem.room.x, problem.room.kept
     copy(x, kept, 8)
-    share, more = 0.0, 0.5
+    fraction_reached, increment = 0.0, 0.5
     for _ in range(80):
-        ahead = min(1.0, share + more)
-        if _newton(with_friction(material, material.sin_phi * ahead), problem):
-            share = ahead
+        trial_fraction = min(1.0, fraction_reached + increment)
+        if _newton(with_friction(material, material.sin_phi * trial_fraction), problem):
+            fraction_reached = trial_fraction
             copy(x, kept, 8)
-            more *= 2.0
+            increment *= 2.0
         else:
             copy(kept, x, 8)
-            more *= 0.5
-        if share == 1.0 or more < 1e-6:
+            increment *= 0.5
+        if fraction_reached == 1.0 or increment < 1e-6:
             break
-    return share == 1.0
+    return fraction_reached == 1.0
 
 
 @kernel
 def _belongs(x: Array, material: MaterialParameters, work: Buffers) -> bool:
-    """Whether a solution lies where its part of the hexagon says: on the face, or in the fan of the corner."""
+    """True if a solution is consistent with its part of the hexagon: within the face, or in the fan of the corner."""
     part = material.part
     if part == FACE:
         return -1e-9 <= x[_PLACE] <= 1.0 + 1e-9
@@ -344,7 +345,7 @@ def _belongs(x: Array, material: MaterialParameters, work: Buffers) -> bool:
 
 @kernel
 def _newton(material: MaterialParameters, problem: ImpulseProblem) -> bool:
-    """Solve `_residual` for ``room.x`` from the guess in it; the place of the stress counts on a face only."""
+    """Solve `_residual` for ``room.x`` from the guess in it; the position of the stress is unknown on a face only."""
     room, scale = problem.room, problem.scale
     x, trial, f, moved, jac, pivots = room.x, room.step, room.residual, room.moved, room.jac, room.pivots
     m = 8 if material.part == FACE else 7
@@ -370,8 +371,8 @@ def _newton(material: MaterialParameters, problem: ImpulseProblem) -> bool:
                 jac[i, j] = (moved[i] - f[i]) / delta
             if turn < 8:
                 continue
-            # A strain that stays on the kink of k(theta) at a corner (a sphere without spin) has no derivative there:
-            # of one side alone the steps fall short by a part for ever.
+            # Where D stays at the kink of k(theta) at a corner (a sphere without spin), the residual has no derivative:
+            # with a one-sided quotient each step leaves a fixed fraction of the error. Central differences converge.
             x[j] = saved - delta
             _residual(x, material, problem, moved)
             x[j] = saved
@@ -391,7 +392,7 @@ def _newton(material: MaterialParameters, problem: ImpulseProblem) -> bool:
         step = np.sqrt(step)
         if not step < np.inf:
             return False
-        # The direction turns by half a radian at most, and the size falls by half at most, in one turn.
+        # Damping: one iteration turns the direction of x by at most half a radian and reduces |x| by at most half.
         across = np.sqrt(max(0.0, step * step - (along / size) ** 2))
         fraction = 1.0
         if along < -0.5 * size * size:
@@ -400,7 +401,7 @@ def _newton(material: MaterialParameters, problem: ImpulseProblem) -> bool:
             fraction = min(fraction, 0.5 * (size + max(0.0, along / size)) / across)
         for i in range(m):
             x[i] += fraction * trial[i]
-        # On the kink the Lode angle itself, from a determinant, is known to the root of the rounding.
+        # At the kink the error of the Lode angle, an arcsine near +-1, is the square root of the rounding error.
         if fraction == 1.0 and step <= max(1e-12 * size, (1e-15 if turn < 20 else 1e-9) * scale):
             return True
     return False

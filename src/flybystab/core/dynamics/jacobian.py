@@ -1,15 +1,15 @@
 """Jacobian of plastic flow in closed form, for the implicit steps.
 
-The motion is ``Ldot = R - T S^-1`` with ``R = K - L^2``, ``T = -P + F N + q X``, ``F = P sin(phi) + c cos(phi)``. Two
-multipliers ``P, q`` keep ``B:Ldot`` at the rate of the fading dilation and, on a face of Mohr-Coulomb, ``X:Ldot`` at
-zero (:func:`flybystab.core.dynamics.rates.deformation_rate`). The change ``dLdot`` along a change of the state
-obeys the same small system once more:
+The motion is ``Ldot = R - T S^-1`` with ``R = K - L^2``, ``T = -P + F N + q X``, ``F = P sin(phi) + c cos(phi)``. The
+multipliers ``P, q`` follow from two conditions: ``B:Ldot`` is the rate of the fading dilation and, on a face of
+Mohr-Coulomb, ``X:Ldot = 0`` (:func:`flybystab.core.dynamics.rates.deformation_rate`). For a change of the state, the
+change ``dLdot`` obeys the linearised system with the same coefficients:
 
     dLdot = M + dP (1 - sin N) S^-1 - dq X S^-1,    M = dR - T dS^-1 - (F dN + dC N + q dX) S^-1,
     B:dLdot = d(fading) - dB:Ldot,    X:dLdot = -dX:Ldot.
 
 ``N`` is an isotropic function of the direction ``u`` of ``D'``, ``a u + b (u^2 - 1/3)`` with ``a, b`` functions of
-``det u``: their slopes, that of ``d beta/dV`` and that of the tide in time are the only difference quotients.
+``det u``. Difference quotients are used only for the derivatives of ``a`` and ``b``, of ``d beta/dV`` and of the tide.
 """
 
 from __future__ import annotations
@@ -54,19 +54,19 @@ from flybystab.core.numerics.jit import inlined, kernel
 from flybystab.core.numerics.tensors import contract, deviator, multiply, unpack
 from flybystab.typing import Array
 
-#: Step of the difference quotients in ``det u``, over its largest value.
+#: Step of the difference quotients in ``det u``, over the largest value of ``det u`` (`_LARGEST`).
 _STEP = 1e-7
 _LARGEST = 1.0 / (3.0 * np.sqrt(6.0))
 
 
 class _Stress(NamedTuple):
-    """Stress of the flow at the state where the Jacobian is taken, and its slopes in ``det u``."""
+    """Stress of the flow at the state of the Jacobian, and its derivatives by ``det u``."""
 
     norm: float  # |D'|
     trace_d: float
     factor: float  # F
     cohesive: float  # c cos(phi)
-    a: float  # of N = a u + b (u^2 - 1/3), and slopes
+    a: float  # of N = a u + b (u^2 - 1/3); da, db by det u
     b: float
     da: float
     db: float
@@ -74,7 +74,7 @@ class _Stress(NamedTuple):
     xb: float
     dxa: float
     dxb: float
-    share: float  # q
+    multiplier: float  # q
     beta: float
     dbeta: float
     d2beta: float
@@ -84,7 +84,7 @@ class _Stress(NamedTuple):
 
 
 class _Conditions(NamedTuple):
-    """Coefficients of the conditions on ``dP, dq``; ``xx`` is zero where there is no face."""
+    """Coefficients of the conditions on ``dP, dq``; ``xx`` is zero unless the stress is on a face."""
 
     bv: float  # B:(1 - sin N) S^-1
     bx: float  # B:X S^-1
@@ -94,7 +94,7 @@ class _Conditions(NamedTuple):
 
 @kernel
 def _solve_column(j: int, fading: float, slip: float, system: _Conditions, work: Buffers, out: Array) -> None:
-    """Write column `j` of ``out[15, 16]`` from ``M`` and the right sides of the two conditions on ``dP, dq``."""
+    """Write column `j` of ``out[15, 16]`` from ``M`` and the right-hand sides of the two conditions on ``dP, dq``."""
     m, pull, across = work.m[J_CHANGE], work.m[J_SLIP], work.m[J_ACROSS]
     r = fading - contract(work.m[W_B], m)
     dp = r / system.bv
@@ -143,7 +143,7 @@ def _stress(y: Array, f0: Array, material: MaterialParameters, work: Buffers) ->
     sin = material.sin_phi
     cohesive = material.cos_phi * material.cohesion * volume
     factor = sin * work.s[PRESSURE] + cohesive
-    xa = xb = dxa = dxb = share = 0.0
+    xa = xb = dxa = dxb = multiplier = 0.0
     if material.part == FACE:
         xa, xb, _, _, _ = corner(sin, det, False)
         dxa, dxb, _, _, _ = corner(sin, det + shift, False)
@@ -151,14 +151,14 @@ def _stress(y: Array, f0: Array, material: MaterialParameters, work: Buffers) ->
         xa, xb = xa - a0, xb - b0
         isotropic(xa, xb, unit, x)
         multiply(x, sinv, work.m[J_ACROSS])
-        share = factor * work.s[PLACE] if factor != 0.0 else 0.0
+        multiplier = factor * work.s[PLACE] if factor != 0.0 else 0.0
     beta, dbeta = dilatancy(volume, material)
     _, next_dbeta = dilatancy(volume * (1.0 + 1e-7), material)
     d2beta = (next_dbeta - dbeta) / (1e-7 * volume)
     weight = support * sin if material.normal else 1.0
     u_rate = sin * contract(n, rate) if material.normal else contract(u, rate)
     return _Stress(
-        norm, y[6] + y[7] + y[8], factor, cohesive, a0, b0, da, db, xa, xb, dxa, dxb, share,
+        norm, y[6] + y[7] + y[8], factor, cohesive, a0, b0, da, db, xa, xb, dxa, dxb, multiplier,
         beta, dbeta, d2beta, weight, dsupport, u_rate,
     )  # fmt: skip
 
@@ -176,7 +176,7 @@ def _conditions(f: _Stress, material: MaterialParameters, work: Buffers) -> _Con
             slip[i, k] = sinv[i, k] - sin * ns[i, k]
             ts[i, k] = f.factor * ns[i, k] - pressure * sinv[i, k]
             if face:
-                ts[i, k] += f.share * across[i, k]
+                ts[i, k] += f.multiplier * across[i, k]
         b[i, i] += 1.0
     if not face:
         return _Conditions(contract(b, slip), 0.0, 0.0, 0.0)
@@ -228,10 +228,10 @@ def _strain_terms(
     product: Array,
     dn: Array,
 ) -> tuple[float, float]:
-    """Write ``dN' = F dN + q dX`` into ``dn[3, 3]`` for a change `turn` of ``D``, which becomes that of ``u``.
+    """Write ``F dN + q dX`` into ``dn[3, 3]`` for a change `turn` of ``D``, which is replaced by that of ``u``.
 
     `u`, `square` and `rate` are ``u``, ``u^2 - 1/3`` and the rate of the velocity gradient; `product` is scratch.
-    Returns the right sides of the two conditions.
+    Returns the right-hand sides of the two conditions.
     """
     x_rate = 0.0
     dnorm = contract(u, turn)
@@ -261,7 +261,7 @@ def _strain_terms(
                 sides = product[i, k] + product[k, i]
                 dx = ddet * (f.dxa * u[i, k] + f.dxb * square[i, k]) + f.xa * turn[i, k] + f.xb * sides
                 x_rate -= dx * rate[i, k]
-                dn[i, k] += f.share * dx
+                dn[i, k] += f.multiplier * dx
     return fading, x_rate
 
 
@@ -311,8 +311,8 @@ def flow_jacobian(
 ) -> None:
     """Jacobian of plastic flow ``jac[15, 16]``, the last column of which is the derivative in time.
 
-    To be called after ``rate(FLOWING, t, y, f0, ...)``, which leaves the gravity terms, the tide and the pressure in
-    `work`. `dt` is the step of the difference quotient of the tide; ``scratch[15, 15]``.
+    `work` must hold the gravity terms, the tide and the pressure of the preceding ``rate(FLOWING, t, y, f0, ...)``.
+    `dt` is the step of the difference quotient of the tide; ``scratch[15, 15]`` is overwritten.
     """
     stress = _stress(y, f0, material, work)
     system = _conditions(stress, material, work)

@@ -1,12 +1,12 @@
 """A second integrator, without event location: time stepping with a set-valued friction law (after Moreau 1999).
 
-Each step drifts for half its length (free motion, in closed form: ``x -> (1 + t L) x``), kicks, and drifts
-again. The kick adds ``h K`` and then the impulse of :mod:`flybystab.core.dynamics.impulse`, whose equations decide
-whether the body is rigid, flows or has no contact: rest, yield, arrest and contact need neither root-finding nor
-event logic. Angular momentum about the centre is kept to rounding, tides apart. The shape of a rigid body is
-kept to second order in the step; plastic flow is first order: runs with halved steps measure the error.
+Each step drifts for half its length (free motion, in closed form: ``x -> (1 + t L) x``), kicks, and drifts again. The
+kick adds ``h K`` to ``L`` and then the impulse of :mod:`flybystab.core.dynamics.impulse`, whose solution is rest,
+sliding or loss of contact: yield, arrest and contact need no event location. Without a tide the angular momentum about
+the centre is conserved to rounding. The shape of a rigid body is conserved to second order in the step; plastic flow is
+of first order, and its error is measured by halving the step.
 
-It shares the self-gravity, the tide and the yield surfaces with :mod:`flybystab.core.dynamics.regimes`, nothing else.
+Self-gravity, tide and yield surfaces are those of :mod:`flybystab.core.dynamics.regimes`; nothing else is shared.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ from flybystab.typing import Array
 
 @kernel
 def drift(h: float, y: Array, work: Buffers) -> bool:
-    """Free motion for a time `h`: ``S -> F S F^T``, ``L -> L F^-1``, ``F = 1 + h L``; False if it folds."""
+    """Free motion for a time `h`: ``S -> F S F^T``, ``L -> L F^-1``, ``F = 1 + h L``; False if ``det F <= 0``."""
     big_l, f, b, s = work.m[W_L], work.m[W_A], work.m[W_B], work.m[W_S]
     gradient(y, big_l)
     for i in range(3):
@@ -83,11 +83,13 @@ def drift(h: float, y: Array, work: Buffers) -> bool:
 
 
 @kernel
-def _dilation(y: Array, offset: Array, beta: float, material: MaterialParameters, less: Array) -> float:
+def _dilation(
+    y: Array, offset: Array, beta: float, material: MaterialParameters, relative_rate: Array
+) -> float:
     """``tr D`` of the flow rule for the deviator of ``D - offset``."""
     for i in range(6):
-        less[i] = y[6 + i] - offset[i]
-    _, norm, det = deviator(less, less)
+        relative_rate[i] = y[6 + i] - offset[i]
+    _, norm, det = deviator(relative_rate, relative_rate)
     _, _, support, _, _ = normal(material.surface, material.sin_phi, det)
     return dilation(beta, norm, support, material)
 
@@ -98,11 +100,11 @@ class Steps(NamedTuple):
     Attributes
     ----------
     done : bool
-        Whether `t1` was reached; False if an impulse could not be found or a drift turned the body inside out.
+        True if `t1` was reached; False if the solver of an impulse failed or a drift had ``det(1 + h L) <= 0``.
     first, last : float
-        Start of the first and end of the last step that flowed; -1 if none did.
+        Start of the first and end of the last step with plastic flow; -1 if there is none.
     flowing, free : int
-        Number of steps that flowed, and of those without contact.
+        Number of steps with plastic flow, and of those without contact.
     """
 
     done: bool
@@ -113,10 +115,10 @@ class Steps(NamedTuple):
 
 
 class _Grains(NamedTuple):
-    """What a step leaves of the contacts between the grains."""
+    """State of the contacts between the grains after a step."""
 
     material: MaterialParameters
-    volume: float  # V/V0 at which the grains touch
+    volume: float  # V/V0 at which the grains are in contact
     touching: bool
     outcome: int  # of the last impulse
 
@@ -142,7 +144,7 @@ def _scratch() -> _Scratch:
 
 @kernel
 def _kick(t: float, h: float, y: Array, tide: TidePanels, work: Buffers) -> None:
-    """Add to ``L`` what gravity and tide give in the time `h`."""
+    """Add ``h (K_g + K_t)`` to ``L``."""
     gravity_terms(t, y, tide, work)
     big_l = work.m[W_L]
     gradient(y, big_l)
@@ -156,13 +158,14 @@ def _kick(t: float, h: float, y: Array, tide: TidePanels, work: Buffers) -> None
 def _impulse(y: Array, h: float, grains: _Grains, scratch: _Scratch) -> _Grains:
     """Apply the impulse of friction to the state ``y[15]`` after a kick.
 
-    The drift to the next kick is ``1 + h L``, of mean gradient ``L - h L^2/2``: that is what must obey the law of
-    friction. ``L^2`` of the last step is close enough, except where the grains meet: there it is that of the impulse
-    itself, found by iteration. The remaining error of the volume is removed, again except where the grains meet: there
-    the removal of their overlap would throw them apart.
+    The drift to the next kick is ``1 + h L``, of mean velocity gradient ``L - h L^2/2`` to second order: the friction
+    law is imposed on its symmetric part. ``L^2`` is taken from the last step; at the step in which contact is regained
+    it is that of the impulse itself, by fixed-point iteration. The error ``ln(contact/volume)`` of the volume is
+    removed over the step, but not at the step in which contact is regained, where the correction would add kinetic
+    energy.
     """
     material, contact, touching, outcome = grains
-    work, _, offset, less, kicked, last = scratch
+    work, _, offset, relative_rate, kicked, last = scratch
     volume = np.sqrt(determinant(y[0:6]))
     beta, _ = dilatancy(contact, material)
     gap = 0.0
@@ -178,10 +181,10 @@ def _impulse(y: Array, h: float, grains: _Grains, scratch: _Scratch) -> _Grains:
             copy(kicked, y, N_FULL)
         for i in range(3):
             offset[i] += gap / 3.0
-        # Only grains that cohere bear a tension: the impulse decides whether it exceeds the strength.
+        # Opening ends the contact, unless there is cohesion: then the impulse tests the tensile strength.
         free = not (touching and material.cohesion > 0.0)
         opening = y[6] + y[7] + y[8] - offset[0] - offset[1] - offset[2]
-        if free and opening >= _dilation(y, offset, beta, material, less):
+        if free and opening >= _dilation(y, offset, beta, material, relative_rate):
             outcome = FREE
             break
         if not touching and turn == 0:
@@ -198,7 +201,7 @@ def _impulse(y: Array, h: float, grains: _Grains, scratch: _Scratch) -> _Grains:
         gradient(y, last)
     gradient(y, last)
     if outcome == SLIDING:
-        contact *= np.exp(h * _dilation(y, offset, beta, material, less))
+        contact *= np.exp(h * _dilation(y, offset, beta, material, relative_rate))
     return _Grains(material, contact, outcome != FREE, outcome)
 
 
@@ -206,7 +209,7 @@ def _impulse(y: Array, h: float, grains: _Grains, scratch: _Scratch) -> _Grains:
 def follow_steps(
     t0: float, t1: float, n: int, y: Array, material: MaterialParameters, tide: TidePanels, brittle: bool
 ) -> Steps:
-    """Carry the state ``y[15]`` from `t0` to `t1` in `n` equal steps."""
+    """Integrate the state ``y[15]`` from `t0` to `t1` in `n` equal steps."""
     scratch = _scratch()
     gradient(y, scratch.last)
     h = (t1 - t0) / n
@@ -218,7 +221,9 @@ def follow_steps(
         if not drift(0.5 * h, y, scratch.work):
             return Steps(False, first, last, flowing, free)
         _kick(t, h, y, tide, scratch.work)
-        if step == 0:  # volumes are compared at the kicks: the drift of a spinning body opens it a little
+        if (
+            step == 0
+        ):  # volumes are compared at the kicks: half a drift of a spinning body raises the volume to second order
             grains = _Grains(material, np.sqrt(determinant(y[0:6])), True, FREE)
         grains = _impulse(y, h, grains, scratch)
         if grains.outcome == FAILED:

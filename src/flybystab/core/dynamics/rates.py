@@ -75,7 +75,7 @@ def rigid_rate(t: float, y: Array, dy: Array, rigid: RigidShape, tide: TidePanel
 
 @kernel
 def yield_excess(p: float, norm: float, det: float, volume: float, material: MaterialParameters) -> float:
-    """``|s| - k (p + Y cot phi)`` in the form of ``T``: positive where the rigid stress is not admissible."""
+    """``|s| - k (p + Y cot phi)`` for the stress ``T = 5 sigma/rho``: positive where it is not admissible."""
     g = slope_over_sine(material.surface, material.sin_phi, det)
     return norm - g * (p * material.sin_phi + material.cohesion * volume * material.cos_phi)
 
@@ -93,7 +93,7 @@ def rigid_excess(
     s = (rigid.s1, rigid.s2, rigid.s3)
     rigid_load(kb, y[4:7], s, (rigid.g1, rigid.g2, rigid.g3), stress)
     p, norm, det = deviator(stress, kt)
-    # The rigid body keeps the volume that it has.
+    # The volume of a rigid body is constant.
     return yield_excess(p, norm, det, rigid_volume(rigid), par.material), p, norm, det
 
 
@@ -101,7 +101,7 @@ def rigid_excess(
 def gravity_terms(t: float, y: Array, tide: TidePanels, work: Buffers) -> None:
     """Compute the terms of the rates that depend on ``t`` and ``S`` only.
 
-    These are ``S``, ``S^-1``, ``K_g + K_t`` and the volume; the tide is left in ``work.c[TIDE]``.
+    These are ``S``, ``S^-1``, ``K_g + K_t`` and the volume; writes the tide to ``work.c[TIDE]``.
     """
     unpack(y[0:6], work.m[W_S])
     det = inverse(y[0:6], work.m[W_SINV])
@@ -147,9 +147,9 @@ def _face_stress(
 ) -> tuple[float, float, float]:
     """Pressure, its denominator and the norm of ``N`` of a flow on a face of Mohr-Coulomb.
 
-    ``N = N_e + w X`` with the step ``X`` between the corners and ``w`` such that ``D`` stays normal to the face:
-    ``X:Ddot = 0``, which eliminates ``F w`` (``F = P sin + c cos``) from the equation of the pressure. Subtracts the
-    acceleration of ``w X`` from ``R``.
+    ``N = N_e + w X``, where ``X`` is the difference of the stresses at the two corners and ``w`` follows from ``X:Ddot
+    = 0``, by which ``D`` stays normal to the face. This eliminates ``F w`` (``F = P sin + c cos``) from the equation of
+    the pressure. Subtracts the acceleration ``F w X S^-1`` from ``R``.
     """
     sinv, r, n, b = work.m[W_SINV], work.m[W_R], work.m[W_N], work.m[W_B]
     x, xs = work.m[W_FACE], work.m[W_A]
@@ -168,11 +168,11 @@ def _face_stress(
     numerator += bx * pull / across
     pressure = numerator / denominator
     factor = sin * pressure + cohesive
-    share = (pressure * (along - sin * nx_sinv) + pull) / across
+    multiplier = (pressure * (along - sin * nx_sinv) + pull) / across
     for i in range(3):
         for j in range(3):
-            r[i, j] -= share * xs[i, j]
-    place = share / factor if factor != 0.0 else np.inf
+            r[i, j] -= multiplier * xs[i, j]
+    place = multiplier / factor if factor != 0.0 else np.inf
     work.s[PLACE] = place
     size = 0.0
     third = 0.0
@@ -253,9 +253,10 @@ def deformation_rate(regime: int, y: Array, dy: Array, material: MaterialParamet
 
         P = [fdot m - B:R + c cos B:(N S^-1)] / [B:((1 - sin N) S^-1)],    B = 1 - E.
 
-    For the true normal with ``f = 1`` the denominator is a sum of squares: no jam. On a face of Mohr-Coulomb, where
-    the normal leaves the stress between two corners undetermined, the motion determines it: `D` stays normal to
-    the face (two of the planes of Koiter 1953 are active), as long as the stress is between the corners.
+    For the true normal with ``f = 1`` the denominator is a sum of squares, so that no jam occurs. On a face of
+    Mohr-Coulomb the normal does not determine the stress between the two corners; the equation of motion does, with the
+    condition that ``D`` stays normal to the face (two active planes, Koiter 1953), as long as the stress is between the
+    corners.
     """
     _kinematics(y, dy, work)
     denominator = 1.0
@@ -274,7 +275,7 @@ def deformation_rate(regime: int, y: Array, dy: Array, material: MaterialParamet
 def rate(
     regime: int, t: float, y: Array, dy: Array, par: Parameters, tide: TidePanels, work: Buffers
 ) -> float:
-    """Rate of the state in any regime; returns the denominator of the pressure where there is one."""
+    """Rate of the state in any regime; returns the denominator of the pressure (FLOWING), else 1."""
     if regime == RIGID:
         rigid_rate(t, y, dy, par.rigid, tide, work)
         return 1.0

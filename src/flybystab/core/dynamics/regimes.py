@@ -3,21 +3,21 @@
 =========  ============================================================  ==========================
 regime     ends when                                                     then
 =========  ============================================================  ==========================
-RIGID      the rigid stress leaves the yield surface, and a flow in its  FLOWING along the deviator
-           direction can relieve it (positive denominator of the
-           pressure: else the body is locked, a Painleve-type jam)
+RIGID      the rigid stress leaves the yield surface, and the            FLOWING along the deviator
+           denominator of the pressure is positive for a flow in its
+           direction (else the body is locked, a Painleve-type jam)
 FLOWING    ``|D|`` falls to `D_REST` (arrest)                            RIGID if admissible, else
                                                                          FLOWING anew
 FLOWING    the deviatoric strength ``k P + k c`` falls to zero           DISPERSED
 FLOWING    the denominator of the pressure falls to zero (jam)           RIGID, locked
-DISPERSED  the volume is back at its value at the loss of contact        inelastic impulse, then
+DISPERSED  the volume falls to its value at the loss of contact          inelastic impulse, then
                                                                          FLOWING or RIGID
 =========  ============================================================  ==========================
 
 A body that reaches the ground (:mod:`flybystab.core.dynamics.ground`) ends the run in any regime.
 
 Every end is located as a root on the dense output, and the step is then repeated up to the root. `D_REST`, the rate of
-strain at which flow starts and ends, is 1e-10 of the dynamical rate; its effect on any result is of that size.
+strain at which flow starts and ends, is 1e-10 of the dynamical rate; it changes results by about this fraction.
 """
 
 from __future__ import annotations
@@ -91,9 +91,10 @@ class Span(NamedTuple):
 
 @kernel
 def begin_flow(y: Array, par: Parameters, ws: Workspace) -> None:
-    """Turn the RIGID state ``y[:7]`` into one that flows infinitesimally under the stress ``ws.stress``.
+    """Turn the RIGID state ``y[:7]`` into a flowing one with ``|D'| = 2 D_REST`` under the stress ``ws.stress``.
 
-    The direction is the deviator of the stress, or the normal of the yield surface there.
+    ``D'`` is along the deviator of the stress (radial rule) or along the normal of the yield surface (associative
+    flow).
     """
     m = ws.work.m[0]
     out = ws.y1
@@ -176,7 +177,7 @@ def quaternion(m: Array, q: Array) -> None:
 
 @kernel
 def _contact(y: Array, par: Parameters, ws: Workspace) -> int:
-    """Apply the inelastic impulse of grains that meet to ``y[15]``; returns its outcome."""
+    """Apply the inelastic impulse at the end of DISPERSED to ``y[15]``; returns its outcome."""
     material = on_part(par.material, SMOOTH, par.material.fan_limit)
     return friction_impulse(y, material, 0.0, np.zeros(6), ws.work, impulse_room()).outcome
 
@@ -192,7 +193,7 @@ def _next_regime(
     ws: Workspace,
     log: Log,
 ) -> tuple[int, Parameters]:
-    """Regime that follows the end of one, with ``ws.y`` as its state; negative if the contact impulse fails."""
+    """Regime and parameters after the end `reason` of `regime`; converts ``ws.y``. -1 if the contact impulse fails."""
     if reason == ONSET:
         if brittle:
             par = Parameters(without_cohesion(par.material), par.rigid)
@@ -257,7 +258,7 @@ def follow(
     reason, time, regime, peak
         DONE, TOUCH, BEYOND or STUCK; the time reached; the regime there; the largest mobilised friction.
     """
-    # Reference counts at each use of a buffer would take longer than the sums.
+    # Counting references at each use of a buffer would take longer than the arithmetic.
     ws = borrowed_workspace(room)
     log = borrowed_log(log)
     y = borrowed(y)
@@ -315,9 +316,9 @@ def follow_rigidly(
     log: Log,
     room: Workspace,
 ) -> tuple[int, float, Peak]:
-    """`follow` for a body that starts rigid, up to yield (ONSET): without the kernels of flow.
+    """`follow` for a body that starts rigid, up to yield (ONSET); does not compile the kernels of flow.
 
-    Arguments as in `follow`; `y` is not written where the body yields.
+    Arguments as in `follow`; `y` is unchanged if the body yields.
 
     Returns
     -------

@@ -41,16 +41,18 @@ from flybystab.core.numerics.dop853 import N_STAGES
 from flybystab.core.numerics.jit import code, inlined, kernel
 from flybystab.typing import Array
 
-# Rows of `Workspace.sample`, and what `_rigid_values` returns.
+# Rows of `Workspace.sample`, and selector of the value of `_rigid_values`.
 _ONSET = code(0)  # the onset function
 _FRICTION = code(1)  # the mobilised friction angle, rad
 
 _GOLDEN = 0.5 * (np.sqrt(5.0) - 1.0)
 
-#: Fraction of a step at which the slope at its ends is probed: a maximum nearer than this is missed by its square.
+#: Distance from the ends of a step, as a fraction of it, at which the slope there is tested. A maximum closer to an end
+#: is not found; it exceeds the value at the end by a term of second order in this fraction.
 _BESIDE = 1e-4
 
-#: Largest excess of the mobilised friction over the parabola through three samples, in ranges of the samples of a step.
+#: Margin for the excess of the mobilised friction over the parabola through three samples, over the range (largest less
+#: least) of the samples of the step.
 _SLACK = 0.25
 
 # Columns of `Workspace.summits`.
@@ -68,10 +70,10 @@ class RigidStep(NamedTuple):
 
 @kernel
 def yields(t: float, y: Array, par: Parameters, tide: TidePanels, ws: Workspace) -> float:
-    """Onset function: positive where a RIGID state has yielded and can flow.
+    """Onset function: positive where the stress of a RIGID state exceeds the yield surface and plastic flow can begin.
 
-    It is the yield excess or, beyond yield, the smaller of that and the denominator of the pressure for flow along the
-    deviator of the rigid stress.
+    It is the yield excess ``f`` for ``f <= 0``, otherwise ``min(f, d)`` with the denominator ``d`` of the pressure for
+    flow along the deviator of the rigid stress.
     """
     excess, p, norm, det = rigid_excess(t, y, par, tide, ws.work, ws.stress)
     return _onset(excess, p, norm, det, par, ws.stress)
@@ -79,7 +81,7 @@ def yields(t: float, y: Array, par: Parameters, tide: TidePanels, ws: Workspace)
 
 @kernel
 def _onset(excess: float, p: float, norm: float, det: float, par: Parameters, stress: Array) -> float:
-    """The onset function from what `rigid_excess` gives."""
+    """The onset function from the results of `rigid_excess`."""
     return excess if excess <= 0.0 else min(excess, onset_denominator(p, norm, det, par, stress))
 
 
@@ -127,7 +129,7 @@ def _rigid_values(t: float, y: Array, par: Parameters, tide: TidePanels, ws: Wor
 def _largest(
     a: float, b: float, step: RigidStep, par: Parameters, tide: TidePanels, ws: Workspace, which: int
 ) -> tuple[float, float]:
-    """Golden-section maximum over the fractions [a, b] of a rigid step: where, and how large."""
+    """Maximum over the fractions [a, b] of a rigid step by golden section: fraction and value."""
     t, h, y, dense = step.t, step.h, step.y, step.dense
     x1 = b - _GOLDEN * (b - a)
     x2 = a + _GOLDEN * (b - a)
@@ -135,7 +137,7 @@ def _largest(
     f1 = _rigid_values(t + x1 * h, ws.ys, par, tide, ws, which)
     explicit_at(x2, y, N_RIGID, dense, ws.ys)
     f2 = _rigid_values(t + x2 * h, ws.ys, par, tide, ws, which)
-    for _ in range(20):  # the place to 1e-4 of the interval, the maximum to its square
+    for _ in range(20):  # 1e-4 of the interval; the error of the maximum is of second order in that
         if f1 < f2:
             a = x1
             x1, f1 = x2, f2
@@ -153,7 +155,7 @@ def _largest(
 
 @kernel
 def _vertex_inside(f0: float, f1: float, f2: float) -> bool:
-    """Whether the parabola through three equidistant values has its maximum between the outer two."""
+    """True if the parabola through three equidistant values has its maximum between the outer two."""
     bend = f0 - 2.0 * f1 + f2
     return bend < 0.0 and abs(f2 - f0) <= -2.0 * bend
 
@@ -170,10 +172,10 @@ def _summit(
     ws: Workspace,
     which: int,
 ) -> bool:
-    """Whether a maximum may lie next to sample `j` of ``f[: last + 1]``.
+    """True if a maximum may lie next to sample `j` of ``f[: last + 1]``.
 
-    Inside the step the parabola through the sample and its two neighbours decides. At an end of the step, which has
-    one neighbour only, the slope decides: a maximum is possible where a point close to the end is higher than the end.
+    Inside the step: if the parabola through the sample and its two neighbours has a maximum between these. At an end of
+    the step: if the function at the fraction `_BESIDE` from the end exceeds its value at the end.
     """
     if 0 < j < last:
         return _vertex_inside(f[j - 1], f[j], f[j + 1])
@@ -196,8 +198,8 @@ def _sample_step(
 ) -> tuple[float, int]:
     """Fraction of a step at which the body has yielded (2 if it has not), and the last sample before it.
 
-    ``ws.sample`` gets the onset function and the mobilised friction at the samples. Between samples near yield the
-    maximum of the onset function is located.
+    Writes the onset function and the mobilised friction at the samples to ``ws.sample``. Where the onset function is
+    close to zero its maxima between samples are located.
     """
     onset, friction = ws.sample[_ONSET], ws.sample[_FRICTION]
     onset[0], friction[0] = onset[N_SAMPLE], friction[N_SAMPLE]
@@ -236,10 +238,10 @@ def _record_samples(
 
 @kernel
 def _summit_bound(f: Array, j: int, last: int) -> float:
-    """Upper bound of the friction in the interval around sample `j` of ``f[: last + 1]``; infinite if a sample is.
+    """Estimated upper bound of the friction around sample `j` of ``f[: last + 1]``; infinite if a sample is.
 
-    It is the maximum of the parabola through the three samples nearest to `j`, with a margin for the difference between
-    the parabola and the function.
+    It is the maximum of the parabola through the three samples nearest to `j` plus `_SLACK` times the range of the
+    samples, and at most ``f[j]`` plus that range.
     """
     span = f[: last + 1].max() - f[: last + 1].min()
     if not span < np.inf:
@@ -255,7 +257,7 @@ def _summit_bound(f: Array, j: int, last: int) -> float:
 
 @kernel
 def _keep_summit(bound: float, a: float, b: float, step: RigidStep, least: float, ws: Workspace) -> bool:
-    """Store an interval to be searched at the end of the motion, if there is room; `least` is the peak so far."""
+    """Store an interval for `_search_summits`; False if there is no room. `least` is the peak so far."""
     for k in range(N_SUMMITS):
         row = ws.summits[k]
         if row[_BOUND] <= least:
@@ -269,7 +271,7 @@ def _keep_summit(bound: float, a: float, b: float, step: RigidStep, least: float
 
 @kernel
 def _search_summits(par: Parameters, tide: TidePanels, peak: Peak, ws: Workspace) -> Peak:
-    """The largest of `peak` and the friction in the stored intervals, those with the largest bounds first."""
+    """The largest of `peak` and the friction in the stored intervals, searched in the order of decreasing bounds."""
     while True:
         k = np.argmax(ws.summits[:, _BOUND])
         row = ws.summits[k]
@@ -287,8 +289,8 @@ def _friction_peak(
 ) -> Peak:
     """The larger of `peak` and the mobilised friction at the samples up to `n` of a step.
 
-    An interval between samples whose maximum may be larger is stored in ``ws.summits``: only those that still may hold
-    the largest friction at the end of the motion are searched.
+    An interval between samples whose bound exceeds the peak is stored in ``ws.summits``; at the end of the motion only
+    the intervals whose bounds exceed the final peak are searched.
     """
     f = ws.sample[_FRICTION]
     for j in range(1, n + 1):
@@ -313,7 +315,7 @@ def _step_to_yield(
 ) -> float:
     """Repeat a step up to the onset of yield between sample `n` and the fraction `end`; returns its time.
 
-    The root on the dense output is refined by a step of order 8 in place of the interpolant.
+    The root is located on the dense output; the state there is then computed by a step of order 8.
     """
     low, high = n / N_SAMPLE, end
     for _ in range(60):
@@ -335,9 +337,9 @@ def _step_to_yield(
 def _longest_step(t: float, tolerance: float, tide: TidePanels) -> float:
     """Longest step at a time.
 
-    A step never spans more of the variable ``asinh(t/tau)`` of the tide than the panels of the tide resolve, and less
-    for a smaller tolerance, in proportion to a step of order 8: otherwise a run and the run that measures its error
-    would share the error of the tide.
+    It is at most 0.4 in the variable ``asinh(t/tau)``, in which the panels of the tide have equal widths, and scales as
+    ``tolerance^(1/8)``: with a fixed limit, a run and the one with a smaller tolerance that measures its error would
+    have the same error from the tide.
     """
     if tide.coefficients.shape[0] == 0:
         return np.inf
@@ -384,7 +386,7 @@ def _follow(
     ws: Workspace,
     log: Log,
 ) -> tuple[int, float, float, Peak]:
-    """`follow_rigid` with the stored intervals of friction not searched yet."""
+    """`follow_rigid` without the search of the stored intervals of friction."""
     y, k, tol = ws.y, ws.k, limits.tolerance
     h = min(0.05 if first_step <= 0.0 else first_step, t1 - t, _longest_step(t, tol, tide))
     rate(RIGID, t, y, k[0], par, tide, ws.work)
@@ -448,7 +450,7 @@ def follow_rigid(
     first_step : float
         Length of the first step; 0 for a default.
     unyielding : bool
-        Do not stop at yield.
+        If true, the motion does not stop at yield.
     peak : Peak
         Largest mobilised friction up to `t`.
 

@@ -51,7 +51,7 @@ class BodyState(NamedTuple):
     surface : int
         Code of the yield surface.
     brittle : bool
-        Whether the cohesion is lost at first yield.
+        True if the cohesion is lost at first yield.
     expansion : float
         ``V/V0`` at which dilation ends.
     """
@@ -110,7 +110,7 @@ class Run(NamedTuple):
     Attributes
     ----------
     reason : str
-        "done", "ground" (reached), "beyond model" (axis ratio past the limit) or "stuck".
+        "done", "ground" (reached), "beyond model" (axis ratio above the limit) or "stuck" (too many steps or events).
     regime : str
         Regime at the end.
     time : float
@@ -172,7 +172,7 @@ def parameters(
 
 @kernel
 def _set_flowing(axes: Array, omega: Array, deformation: Array, attitude: Array, y: Array) -> None:
-    """State of a body that flows with its spin and the velocity gradient ``deformation[3, 3]``, along the body axes."""
+    """Write ``y[15]`` for the velocity gradient ``deformation[3, 3]`` plus that of the spin, along the body axes."""
     a, b, back = np.empty((3, 3)), np.zeros((3, 3)), attitude.T.copy()
     for i in range(3):
         b[i, i] = axes[i] ** 2
@@ -192,7 +192,7 @@ def _set_flowing(axes: Array, omega: Array, deformation: Array, attitude: Array,
 
 
 class Scaled(NamedTuple):
-    """A run in the units of the body: state, parameters, span, tide and ground, and the units of time and length."""
+    """A run in the units of the body, with its units of time ``t0`` (s) and of length ``a0`` (m)."""
 
     y: Array
     par: state.Parameters
@@ -256,7 +256,7 @@ def evolve_rigid(
     gradient: Array,
     log: Log,
 ) -> FinalState:
-    """`evolve` up to yield, where its reason is ONSET; `shape` and `gradient` are meaningless then."""
+    """`evolve` up to yield; if the reason is ONSET, `shape` and `gradient` are undefined."""
     run = scaled(body, span, tide, ground)
     reason, t, peak = regimes.follow_rigidly(
         run.span, run.y, run.par, run.tide, run.ground, limits, unyielding, log, workspace()
@@ -278,7 +278,7 @@ def evolve(
     gradient: Array,
     log: Log,
 ) -> FinalState:
-    """Follow a body through its regimes, in SI units.
+    """Integrate the motion of a body through its regimes, in SI units.
 
     `deformation` is a velocity gradient on top of the spin as in `integrate`; zero for a rigid start. Writes ``S``
     (m2) and ``L`` (1/s) at the end; history (in the units of the body, but with the stresses in Pa and times in s),
@@ -296,7 +296,7 @@ def evolve(
     return FinalState(reason, t * run.t0, regime, Peak(peak.friction, peak.time * run.t0))
 
 
-# Outside of a kernel the plain functions, which call the compiled `follow`; as kernels they would be compiled anew.
+# The plain Python functions, which call the compiled `follow`: as kernels they would have to be compiled, too.
 _evolve: Any = getattr(evolve, "py_func", evolve)
 _evolve_rigid: Any = getattr(evolve_rigid, "py_func", evolve_rigid)
 
@@ -312,23 +312,23 @@ def integrate(
     deformation: Array | None = None,
     ground: Ground | None = None,
 ) -> Run:
-    """Follow a body that starts rigid, or in flow, through a tide.
+    """Integrate the motion of a body that starts rigid, or in plastic flow, in a tide.
 
     Parameters
     ----------
     body : BodyState
         Made by :func:`body_state`.
     span : Span or (float, float)
-        Start and end, s, on the clock of the tide; a :class:`Span` also has the time from which a body at rest ends the
-        run.
+        Start and end, s, on the clock of the tide; a :class:`Span` also has the time after which the run ends as soon
+        as the body is rigid.
     tide : TidePanels
         SI.
     limits : Limits
-        Relative error allowed in a step, axis ratio beyond which the model is left, number of steps.
+        Relative error allowed in a step, largest axis ratio of the model, largest number of steps.
     unyielding : bool
-        Stay rigid whatever the stress, for the friction that would be needed.
+        If true, the body stays rigid at any stress, for the friction that would be required.
     keep : int
-        Rows of history to keep at most; 0 for none.
+        Largest number of rows of the history; 0 for none.
     deformation : ndarray (3, 3), optional
         Velocity gradient along the body axes, 1/s, on top of the spin: the body starts in flow.
     ground : Ground, optional

@@ -73,7 +73,7 @@ W_A = 6
 W_B = 7
 W_VECTORS = 8
 W_SCRATCH = 9
-W_FACE = 10  # step from the extension to the compression corner
+W_FACE = 10  # difference of N at the compression and at the extension corner
 # Scratch of `flybystab.core.dynamics.jacobian`.
 J_RATE = 11
 J_UNIT = 12

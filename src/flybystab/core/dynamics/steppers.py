@@ -2,8 +2,8 @@
 
 ``explicit_step``  DOP853 (:mod:`flybystab.core.numerics.dop853`): rigid, dispersed and fluid motion.
 ``implicit_step``  Rodas5P (:mod:`flybystab.core.numerics.rodas5p`): plastic flow. The direction of flow relaxes at the
-                   rate ``k P/(a^2 |D|)``, which is unbounded at onset and arrest; one linear solve a stage
-                   and no Newton iteration follow it.
+                   rate ``k P/(a^2 |D|)``, unbounded at onset and arrest, so that the equations are stiff there; a
+                   Rosenbrock method needs one linear solve a stage and no Newton iteration.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def explicit_step(
 
 @kernel
 def explicit_growth(error: float) -> float:
-    """Factor by which the step after an accepted one of `explicit_step` may be longer, from its error."""
+    """Ratio of the next step to an accepted one of `explicit_step` with this error norm."""
     return min(5.0, max(0.3, 0.9 * error ** (-0.125))) if error > 0.0 else 5.0
 
 

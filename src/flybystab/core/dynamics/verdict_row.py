@@ -1,8 +1,8 @@
-"""A body through an encounter and its verdict, for many rows, without Python objects.
+"""Dynamics of many bodies in encounters and their verdicts, one row each, without Python objects.
 
-`rigid_rows` follows bodies up to yield only: it does not contain the kernels of flow, whose compilation takes several
-times as long. The rows that it leaves with the verdict YIELDS are for `verdict_rows`, which gives the same outcomes for
-the others.
+`rigid_rows` integrates bodies up to yield only: it does not contain the kernels of flow, whose compilation takes
+several times as long. Bodies that yield get the verdict YIELDS and have to be passed to `verdict_rows`; for the others
+both functions give the same outcome.
 """
 
 from __future__ import annotations
@@ -76,7 +76,7 @@ OUTCOME = np.dtype(
         ("friction_time", "f8"),  # s
         ("spin_ratio", "f8"),
         ("pole_change", "f8"),  # rad
-        ("lacking", "f8"),  # cohesion that a body lacks which cannot exist on its own, Pa
+        ("lacking", "f8"),  # cohesion that a body out of equilibrium without a tide lacks, Pa
         ("time", "f8"),  # end of the run, s
         ("reason", "i8"),
         ("regime", "i8"),
@@ -84,10 +84,10 @@ OUTCOME = np.dtype(
     ]
 )
 
-#: A body whose centre stays higher than this many long semi-axes is not tested for contact with the ground.
+#: Contact with the ground is not tested if the height of the centre is always above this many longest semi-axes.
 NEAR_GROUND = 100.0
 
-#: Verdict of a body that `rigid_rows` does not follow any further.
+#: Verdict of `rigid_rows` for a body that yields.
 YIELDS = code(-2)
 # Typed constants: numba compiles a kernel anew for each literal argument.
 _UNYIELDING: Any = np.bool_(True)
@@ -131,7 +131,7 @@ class Output(NamedTuple):
 
 @kernel
 def _equilibrium(body: BodyState, stress: Array) -> bool:
-    """Whether the body can exist on its own; writes its stress without a tide, Pa."""
+    """True if the body is in equilibrium without a tide; writes its stress there, Pa."""
     s1, s2, s3 = body.axes[0] ** 2, body.axes[1] ** 2, body.axes[2] ** 2
     rigid_stress(s1, s2, s3, body.rho, np.pi * G * body.rho, body.omega, np.zeros(6), stress)
     size = 0.0
@@ -151,7 +151,7 @@ def _write_end(
     gradient: Array,
     log: Log,
 ) -> None:
-    """Write what does not depend on flow: the end of the run, friction, lacking cohesion, axes and spin."""
+    """Write the fields of the outcome that do not depend on flow: end, friction, lacking cohesion, axes and spin."""
     out["time"], out["reason"], out["regime"] = end.time, end.reason, end.regime
     out["steps"] = log.counts[0]["steps"]
     out["friction"], out["friction_time"] = end.peak.friction, end.peak.time
@@ -187,7 +187,7 @@ def _rigid_row(
     gradient: Array,
     log: Log,
 ) -> None:
-    """`verdict_row` for a body that does not yield; the verdict of one that does is YIELDS and the rest not written."""
+    """`verdict_row` up to yield; for a body that yields only the verdict YIELDS is written."""
     stress = np.empty(6)
     holds = _equilibrium(body, stress)
     end = evolve_rigid(body, span, tide, ground, limits, not holds, shape, gradient, log)
@@ -210,7 +210,7 @@ def verdict_row(
     gradient: Array,
     log: Log,
 ) -> None:
-    """Follow a body through an encounter and classify the outcome.
+    """Integrate the motion of a body in an encounter and classify the outcome.
 
     Parameters
     ----------
@@ -220,13 +220,13 @@ def verdict_row(
     tide : TidePanels
         SI.
     ground : Ground
-        A body that reaches it ends there.
+        The run of a body that reaches it ends there.
     limits : Limits
-        The axis ratio is never below that of the body.
+        An axis ratio below that of the body is raised to it.
     required : bool
-        Whether to follow a body that yields once more without yielding, for the friction that it would need.
+        If true, a body that yields is integrated once more as a rigid one, for the friction that it would require.
     out : record of OUTCOME
-        The verdict FAILED: the integrator could not go on.
+        The verdict is FAILED if the integrator stopped early.
     shape, gradient : ndarray (3, 3)
         ``S`` (m2) and ``L`` (1/s) at the end.
     log : Log
@@ -237,7 +237,7 @@ def verdict_row(
     limits = Limits(
         limits.tolerance, max(limits.axis_ratio, 1.001 * body.axes[0] / body.axes[2]), limits.max_steps
     )
-    # A body that cannot exist on its own does not yield in the run: its demand at the start is the answer.
+    # A body out of equilibrium is integrated as a rigid one: its demand at the start is the result.
     end = evolve(body, span, tide, ground, limits, not holds, np.zeros((3, 3)), shape, gradient, log)
     reason = end.reason
     yielded = log.counts[0]["events"] > 0 and log.events[0]["code"] == ONSET

@@ -1,4 +1,4 @@
-"""Buffers and codes that the regimes share, limits of a run, and its record: history, events, counts."""
+"""Buffers and codes common to the regimes, limits of a run, and its record: history, events, counts."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from flybystab.core.numerics.dop853 import N_EXTENDED
 from flybystab.core.numerics.jit import borrowed, code, kernel
 from flybystab.typing import Array
 
-# Why a regime (or the run) ended; the same codes head the rows of the event log.
+# Reasons for the end of a regime or of the run; also the codes of the rows of the event log.
 DONE = code(0)
 ONSET = code(1)
 ARREST = code(2)
@@ -21,7 +21,7 @@ CONTACT = code(4)
 BEYOND = code(5)
 JAM = code(6)
 STUCK = code(7)  # more steps or switches than allowed
-SWITCH = code(8)  # flow passes from one part of the yield section to another (not logged)
+SWITCH = code(8)  # the stress moves to another part of the yield section (not logged)
 TOUCH = code(9)  # the body has reached the ground
 FADE = code(10)  # the dilatancy of a flow begins to fade (not logged)
 
@@ -42,13 +42,13 @@ HISTORY = np.dtype(
 EVENT = np.dtype([("code", "i8"), ("time", "f8"), ("determinant", "f8"), ("volume", "f8")])
 #: Rows of the history, events, steps tried and steps rejected.
 COUNTS = np.dtype([("rows", "i8"), ("events", "i8"), ("steps", "i8"), ("rejected", "i8")])
-#: Samples in a step: history rows, and the grid on which extrema of the yield function are looked for while rigid.
+#: Samples in a step: rows of the history, and the grid of the search for extrema of the yield function in rigid motion.
 N_SAMPLE = 4
 
 #: Intervals of rigid motion that may hold the largest mobilised friction, kept until the end of the motion.
 N_SUMMITS = 8
 
-#: Rate of strain, in dynamical units, below which the body is at rest.
+#: Rate of strain, in dynamical units, below which the body counts as at rest.
 D_REST = 1e-10
 
 
@@ -60,9 +60,9 @@ class Limits(NamedTuple):
     tolerance : float
         Relative error allowed in a step.
     axis_ratio : float
-        Axis ratio beyond which the homogeneous model is left.
+        Largest axis ratio of the homogeneous model; the run ends there.
     max_steps : int
-        Steps after which the run is given up.
+        Largest number of steps; the run then ends with STUCK.
     """
 
     tolerance: float
@@ -71,8 +71,9 @@ class Limits(NamedTuple):
 
 
 class Log(NamedTuple):
-    """Record of a run: ``history[n]`` of `HISTORY` (one row or less: none is kept), ``events[m]`` of `EVENT`, and
-    ``counts[1]`` of `COUNTS`.
+    """Record of a run: ``history[n]`` of `HISTORY`, ``events[m]`` of `EVENT` and ``counts[1]`` of `COUNTS`.
+
+    With ``n < 2`` no history is kept.
     """
 
     history: NDArray[np.void]
@@ -191,31 +192,31 @@ def reset(log: Log) -> None:
 
 @kernel
 def keeps_history(log: Log) -> bool:
-    """Whether a history is kept."""
+    """True if a history is kept."""
     return log.history.shape[0] > 1
 
 
 @kernel
 def count_step(log: Log) -> None:
-    """Count a step that was tried."""
+    """Count an attempted step."""
     log.counts[0]["steps"] += 1
 
 
 @kernel
 def count_rejected(log: Log) -> None:
-    """Count a step that was rejected."""
+    """Count a rejected step."""
     log.counts[0]["rejected"] += 1
 
 
 @kernel
 def exhausted(log: Log, limits: Limits) -> bool:
-    """Whether no further step is allowed."""
+    """True if no further step is allowed."""
     return log.counts[0]["steps"] >= limits.max_steps
 
 
 @kernel
 def drop_last_row(log: Log) -> None:
-    """Remove the last row of the history, of a step that is to be made again."""
+    """Remove the last row of the history, at the start of a step that will be repeated."""
     log.counts[0]["rows"] = max(log.counts[0]["rows"] - 1, 0)
 
 
@@ -223,7 +224,7 @@ def drop_last_row(log: Log) -> None:
 def record(
     t: float, regime: int, y: Array, par: Parameters, p: float, s: float, det: float, ws: Workspace, log: Log
 ) -> None:
-    """Append a row to the history; when it is full every second row is dropped first."""
+    """Append a row to the history; in a full history every second row is dropped first."""
     history = log.history
     if history.shape[0] < 2:
         return
@@ -257,7 +258,7 @@ def record(
 
 @kernel
 def log_event(what: int, t: float, det: float, volume: float, log: Log) -> None:
-    """Append a row to the event log; a full log keeps its first rows and counts on."""
+    """Append a row to the event log; events beyond its size are counted but not stored."""
     n = log.counts[0]["events"]
     if n < log.events.shape[0]:
         row = log.events[n]

@@ -14,16 +14,16 @@ from flybystab.typing import Array
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(128)
 _LONGITUDES = 256
 
-# The same for the iterated share, on half of the sphere.
+# The same for the iterated bound fraction, on half of the sphere.
 _HALF_NODES, _HALF_WEIGHTS = (x[24:].copy() for x in np.polynomial.legendre.leggauss(48))
 _HALF_LONGITUDES = 48
 _COSINES = np.cos((np.arange(_HALF_LONGITUDES) + 0.5) * 2.0 * np.pi / _HALF_LONGITUDES)
 _SINES = np.sin((np.arange(_HALF_LONGITUDES) + 0.5) * 2.0 * np.pi / _HALF_LONGITUDES)
 
-#: The iteration ends where a pass removes less than this share of the mass, or after that many passes.
+#: The iteration ends when a pass removes less than this fraction of the mass, or after this number of passes.
 CONVERGED = 1e-7
 PASSES = 500
-#: Below this fraction the body counts as lost.
+#: A bound fraction below this value counts as zero.
 NOTHING = 1e-3
 
 
@@ -56,7 +56,7 @@ def spin_vector(gradient: Array, w: Array) -> None:
 
 @kernel
 def momentum(shape: Array, gradient: Array, h: Array) -> float:
-    """Angular momentum ``h[3]`` per ``m/5``; returns the effective spin rate ``2 E/H`` of rigid rotation with it."""
+    """Write the angular momentum ``h[3]`` per ``m/5``; returns ``2 E/H`` of the rigid rotation with this ``H``."""
     flow = np.empty((3, 3))
     multiply(gradient, shape, flow)
     spin_vector(flow, h)
@@ -91,14 +91,14 @@ def angle_between(a: Array, b: Array) -> float:
 
 @kernel
 def one_pass_share(shape: Array, gradient: Array, rho: float) -> float:
-    """Fraction of the mass bound in the potential of the whole ellipsoid, with velocity ``L x``: an upper bound.
+    """Upper bound of the bound fraction of the mass: bound in the potential of the whole ellipsoid, velocity ``L x``.
 
     See :func:`flybystab.flybys.verdict.bound_fraction_upper`.
 
     Parameters
     ----------
     shape, gradient : ndarray (3, 3)
-        ``S = 5 I/m`` (m2) and ``L`` (1/s) in one frame that does not turn.
+        ``S = 5 I/m`` (m2) and ``L`` (1/s) in a common non-rotating frame.
     rho : float
         kg/m3.
     """
@@ -109,7 +109,7 @@ def one_pass_share(shape: Array, gradient: Array, rho: float) -> float:
     s1, s2, s3 = axes[0] ** 2, axes[1] ** 2, axes[2] ** 2
     coefficients = gravity_coefficients(s1, s2, s3)
     bound = potential * potential_coefficient(s1, s2, s3)
-    # L F with F = (axes) diag(a): the frame on the left does not matter for its square
+    # L F with F = (axes) diag(a): (L F)^T (L F) does not depend on the orthogonal factor on the left
     flow = np.empty((3, 3))
     multiply(gradient, vectors, flow)
     form = np.empty((3, 3))
@@ -124,7 +124,7 @@ def one_pass_share(shape: Array, gradient: Array, rho: float) -> float:
     pack(form, c)
     values = np.empty(3)
     eigensystem(c, values, vectors)
-    # the polar axis is the one that escapes most
+    # polar axis: the eigenvector of the largest eigenvalue of the energy form
     for i in range(2):
         if values[i] > values[2]:
             values[i], values[2] = values[2], values[i]
@@ -155,7 +155,7 @@ def _kinetic_form(gradient: Array, f: Array, out: Array) -> None:
 
 @kernel
 def _escape_basis(form: Array, basis: Array) -> None:
-    """Write the principal axes of a form of the energy as columns, that of the largest value last."""
+    """Write the eigenvectors of an energy form as columns, that of the largest eigenvalue last."""
     c = np.empty(6)
     values = np.empty(3)
     pack(form, c)
@@ -169,10 +169,10 @@ def _escape_basis(form: Array, basis: Array) -> None:
 def _remainder_energy(
     to_space: Array, moments: Array, density: float, volume: float, kinetic: Array, form: Array
 ) -> float:
-    """Write the form ``form[3, 3]`` of the energy per unit mass in the field of a remainder; the depth of its well.
+    """Write the quadratic form of the energy per unit mass in the field of a remainder; returns the depth of its well.
 
-    The remainder counts as the homogeneous ellipsoid with its mass and its second moments. A point of the unit ball is
-    bound where the form is below the depth (m2/s2).
+    The remainder is replaced by the homogeneous ellipsoid with its mass and its second moments. A point ``z`` of the
+    unit ball is bound where ``z.form z < depth`` (m2/s2).
 
     Parameters
     ----------
@@ -252,10 +252,10 @@ def _bound_part(form: Array, depth: float, moments: Array) -> float:
 def bound_share(shape: Array, gradient: Array, rho: float) -> float:
     """Fraction of the mass that stays bound, for a homogeneous ellipsoid with velocity ``L x``.
 
-    The part that is unbound in the potential of the whole ellipsoid is removed, the potential is computed for the
-    remainder, and so on until nothing more is unbound. The remainder is at each pass the part of the ellipsoid in which
-    one quadratic form is below a constant; its potential is that of the homogeneous ellipsoid with its mass and its
-    second moments. Arguments as of `one_pass_share`, which is the first pass.
+    The part that is unbound in the potential of the whole ellipsoid is removed, the potential of the remainder is
+    computed, and so on until no more mass is unbound. In each pass the remainder is the part of the ellipsoid in which
+    a quadratic form is below a constant; its potential is approximated by that of the homogeneous ellipsoid with its
+    mass and its second moments. Arguments as in `one_pass_share`, which is the first pass.
     """
     first = one_pass_share(shape, gradient, rho)
     if first >= 1.0:

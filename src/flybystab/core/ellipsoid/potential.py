@@ -27,7 +27,7 @@ def carlson_fd(x: float, y: float, z: float) -> tuple[float, float, float, float
 
     Carlson's duplication theorem (DLMF 19.26.18, 19.36.1-2): all four share one sequence
     ``lambda = sqrt(xy) + sqrt(yz) + sqrt(zx)``, ``x -> (x + lambda)/4``, and the series in the last,
-    nearly equal arguments is kept through degree 7. Relative error a few 1e-16, also for ratios of 1e-12.
+    nearly equal arguments is taken to degree 7. Relative error a few 1e-16, also for ratios of 1e-12.
     """
     sx = 0.0
     sy = 0.0
@@ -107,7 +107,7 @@ def _rd_series(x: float, y: float, z: float) -> float:
 @kernel
 def gravity_coefficients(s1: float, s2: float, s3: float) -> tuple[float, float, float]:
     """``A_1, A_2, A_3`` (no unit, sum 2) from squared semi-axes ``s_i = a_i^2``, in any order and unit."""
-    # A_i does not depend on the scale: dividing by s1 keeps 1 m and 1000 km bodies alike to the last bit.
+    # A_i does not depend on the scale: dividing by s1 makes results for 1 m and 1000 km bodies equal to the last bit.
     y = s2 / s1
     z = s3 / s1
     _, d1, d2, d3 = carlson_fd(1.0, y, z)

@@ -1,8 +1,8 @@
 """Stress of a rigidly rotating ellipsoid, and the loads that a granular material can bear.
 
-The volume-averaged stress that rigidity needs is ``sigma V = (K - Omegadot - Omega^2) I`` with ``K`` the
-sum of self-gravity ``-2 pi G rho A`` and any tide. It is symmetric once ``Omegadot`` obeys Euler's equations;
-in principal axes, with ``S = 5 I/m``,
+The volume-averaged stress of rigid rotation is ``sigma V = (K - Omegadot - Omega^2) I`` with ``K`` the sum of
+self-gravity ``-2 pi G rho A`` and any tide. It is symmetric if ``Omegadot`` obeys Euler's equations; in principal axes,
+with ``S = 5 I/m``,
 
     sigma_ij = (rho/5) (K - Omega^2)_ij 2 S_i S_j/(S_i + S_j)
 
@@ -28,7 +28,7 @@ def rigid_load(
     gravity: tuple[float, float, float],
     out: Array,
 ) -> None:
-    """Write ``out[6] = 5 sigma/rho`` that rigidity needs, along the body axes.
+    """Write the stress ``out[6] = 5 sigma/rho`` of rigid rotation, along the body axes.
 
     ``(K - Omega^2)_ij 2 S_i S_j/(S_i + S_j)`` with the tide ``tide[6]``, the spin ``omega[3]``, squared semi-axes
     `s` and self-gravity ``K_g,i`` in `gravity`, in any consistent units.
@@ -47,7 +47,7 @@ def rigid_load(
 def rigid_stress(
     s1: float, s2: float, s3: float, rho: float, pi_g_rho: float, omega: Array, tide: Array, out: Array
 ) -> None:
-    """Write the stress ``out[6]`` (Pa) that rigidity needs at a spin ``omega[3]`` in a tide ``tide[6]``.
+    """Write the stress ``out[6]`` (Pa) of rigid rotation at a spin ``omega[3]`` in a tide ``tide[6]``.
 
     Everything is in principal axes: ``s_i`` squared semi-axes (m2), spin (rad/s), tide (s^-2), density `rho`
     (kg/m3) and `pi_g_rho` is ``pi G rho`` (s^-2). Any other consistent units do as well.
@@ -63,7 +63,7 @@ def rigid_stress(
 def invariants(stress: Array) -> tuple[float, float, float]:
     """Pressure ``p``, norm of the deviator ``|s|`` and determinant of ``s/|s|`` (0 where ``s = 0``)."""
     p, s, det = deviator(stress, np.empty(6))
-    # Rounding leaves a deviator of a few ulp in a hydrostatic state; its direction means nothing.
+    # A hydrostatic stress has a deviator of a few ulp by rounding, whose direction has no meaning.
     if s <= 4e-16 * abs(p):
         return p, 0.0, 0.0
     return p, s, det
@@ -99,7 +99,7 @@ def _at(base: Array, load: Array, x: float, code: int, phi: float, cohesion: flo
 def _crossing(
     base: Array, load: Array, inside: float, outside: float, code: int, phi: float, cohesion: float
 ) -> float:
-    """Last ``x`` from `inside` towards `outside` at which the stress is borne, to the last bit."""
+    """Last ``x`` from `inside` towards `outside` at which the stress is admissible, by bisection to the last bit."""
     for _ in range(200):
         mid = 0.5 * (inside + outside)
         if mid in (inside, outside):
@@ -115,7 +115,7 @@ def _crossing(
 def _bracketed_minimum(
     base: Array, load: Array, g0: float, scale: float, code: int, phi: float, cohesion: float
 ) -> tuple[float, float]:
-    """Interval of ``x >= 0`` with the least overload of ``base + x load``, by doubling; `g0` is that at zero."""
+    """Interval of ``x >= 0`` with the least overload of ``base + x load``, by doubling; `g0` is the value at zero."""
     left = 0.0
     mid = 1e-3 * scale
     g_mid = _at(base, load, mid, code, phi, cohesion)
@@ -136,7 +136,7 @@ def _bracketed_minimum(
 def _least_overload(
     base: Array, load: Array, g0: float, a: float, b: float, code: int, phi: float, cohesion: float
 ) -> tuple[float, float]:
-    """``x`` of the least overload, at zero (where it is `g0`) or between `a` and `b`, and its value: golden section."""
+    """``x`` and value of the least overload, at zero (value `g0`) or between `a` and `b`, by golden section."""
     golden = 0.3819660112501051
     best = 0.0
     g_best = g0
@@ -166,10 +166,10 @@ def _least_overload(
 
 @kernel
 def load_interval(base: Array, load: Array, code: int, phi: float, cohesion: float) -> tuple[float, float]:
-    """Least and largest ``x >= 0`` for which the stress ``base + x load`` is borne; (nan, nan) where none is.
+    """Least and largest ``x >= 0`` for which the stress ``base + x load`` is admissible; (nan, nan) if there is none.
 
     The overload is convex along the line, so that the admissible loads form one interval: its minimum is bracketed by
-    doubling and found by golden section, its ends by bisection. The upper end is inf where any load is borne.
+    doubling and found by golden section, its ends by bisection. The upper end is inf if it is unbounded.
     """
     size_load = 0.0
     size_base = 0.0
@@ -199,7 +199,7 @@ def load_interval(base: Array, load: Array, code: int, phi: float, cohesion: flo
 def spin_interval(
     s1: float, s2: float, s3: float, code: int, phi: float, cohesion: float
 ) -> tuple[float, float]:
-    """Lower and upper spin limit ``w2 = omega^2/(pi G rho)`` about ``a3``; (nan, nan) where no spin is borne.
+    """Lower and upper spin limit ``w2 = omega^2/(pi G rho)`` about ``a3``; (nan, nan) if no spin is admissible.
 
     `cohesion` is in units of ``pi G rho^2 s1`` with ``s1 = a1^2``, so that only the axis ratios matter.
     """

@@ -10,14 +10,14 @@ a polynomial:
     adj(S + u) = adj S + u (tr S - S) + u^2,    Delta^2 = I3 + I2 u + I1 u^2 + u^3.
 
 So ``Gamma = M_0 adj S + M_1 (tr S - S) + M_2`` with three integrals ``M_k = int u^k du/Delta^3`` that depend on the
-invariants ``I_n`` alone. Every term is positive: nothing cancels, for spheres and spheroids either.
+invariants ``I_n`` alone. All terms are positive: there is no cancellation, also for spheres and spheroids.
 
 The integrals are Gauss sums. ``t = sqrt(m/(m + u))`` makes them polynomials for a sphere,
 
     M_k = 2 m^(k - 7/2) int_0^1 t^(6-2k) (1 - t^2)^k dt / Q^(3/2),    Q = prod (1 - t^2 + s_i t^2/m),
 
-and with ``m^2 = I1 I3/I2`` the singularities of discs and of needles are equally far. How many nodes give all digits
-depends on ``I1 I2/I3`` alone, to a few per cent (9 for a sphere).
+and with ``m^2 = I1 I3/I2`` the singularities of the integrand are equally far for discs and needles. The number of
+nodes for full precision depends on ``I1 I2/I3`` (9 for a sphere) alone, to a few per cent.
 """
 
 from __future__ import annotations
@@ -107,7 +107,7 @@ def gravity_tensor(s: Array, sinv: Array, det: float, values: Array, vectors: Ar
     s, sinv, det : ndarray (6,), ndarray (3, 3), float
         Shape tensor in any unit, its inverse and determinant (:func:`flybystab.core.numerics.tensors.inverse`).
     values, vectors : ndarray (3,), ndarray (3, 3)
-        Scratch for the principal axes, which are taken beyond the reach of the Gauss rules only.
+        Scratch for the principal axes, which are used only beyond the range of the Gauss rules.
     """
     ratio = invariant_ratio(s, sinv)
     if ratio > REACH[-1]:
@@ -140,8 +140,8 @@ def gravity_tensor(s: Array, sinv: Array, det: float, values: Array, vectors: Ar
 def gravity_derivative(s: Array, sinv: Array, det: float, out: Array) -> None:
     """Write ``out[6, :6]``: components (columns) of the derivative of ``Gamma`` along each of those of ``s`` (rows).
 
-    A component off the diagonal moves both elements of ``S``. From ``dM_k = -3/2 (N_(k+2) dI1 + N_(k+1) dI2 + N_k
-    dI3)``. Beyond the reach of the rules an approximation: to 2e-5 of the largest element at an axis ratio of 100.
+    An off-diagonal component changes both elements of ``S``. With ``dM_k = -3/2 (N_(k+2) dI1 + N_(k+1) dI2 + N_k
+    dI3)``. Beyond the range of the rules the error is up to 2e-5 of the largest element (axis ratio of 100).
     """
     i1, i2, m = _invariants(s, sinv, det)
     r = 1.0 / m

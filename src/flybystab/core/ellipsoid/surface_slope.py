@@ -1,6 +1,6 @@
 """Slope of the surface of an ellipsoid under gravity, spin and tide.
 
-At a point ``x`` of the surface, in the body frame, loose material feels
+At a point ``x`` of the surface, in the body frame, the effective gravity on loose material is
 
     g = (K - Omega^2 - Omegadot) x,    K = -2 pi G rho A + K_t
 
@@ -56,7 +56,8 @@ def effective_field(s: Array, pi_g_rho: float, omega: Array, tide: Array, out: A
 def slopes(s: Array, field: Array, points: Array, out: Array) -> None:
     """Write the slope ``out[n]`` (rad) at surface ``points[n, 3]`` (m) of the ellipsoid, in ``[0, pi]``.
 
-    Above ``pi/2`` material is lifted off. The normal is along ``x_i/S_i``; ``atan2`` keeps small slopes exact.
+    Above ``pi/2`` the effective gravity points outwards. The normal is along ``x_i/S_i``; ``atan2`` keeps small slopes
+    exact.
     """
     for i in range(points.shape[0]):
         x = points[i, 0]

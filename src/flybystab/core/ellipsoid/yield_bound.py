@@ -10,8 +10,9 @@ tide of norm ``|K|`` changes ``T`` by at most ``S_1 |K|`` in any direction. It a
 - ``X = sum J_i (J_3 - J_i) w_i^2 = 2 E J_3 - L^2``, zero for spin about the short axis, obeys
   ``d sqrt(X)/dt <= tau sqrt((J_3 - J_1)/J_1)``, which bounds the wobble.
 
-Both bound the change of ``w w``. Where ``J_2`` is close to ``J_3`` the axis may turn far in the plane of the
-two short axes; then the stress turns with it, but for terms in ``S_2 - S_3``, and the smaller bound counts.
+Both bound the change of ``w w``. Where ``J_2`` is close to ``J_3`` the spin axis may turn by a large angle in the plane
+of the two short axes; up to terms in ``S_2 - S_3`` the stress then turns with it, which gives a second bound. The
+smaller of the two is used.
 
 If every stress within that distance ``d`` of the undisturbed one is inside the yield surface the body cannot yield:
 INTACT is proved without integrating anything. With the gauge ``gamma = sin(phi)/k`` the yield function::
@@ -20,14 +21,13 @@ INTACT is proved without integrating anything. With the gauge ``gamma = sin(phi)
 
 is convex and isotropic, and its slope is at most ``G = sqrt(max(gamma^2 + gamma'^2) + sin^2(phi)/3)``. For a convex
 section ``gamma^2 + gamma'^2`` is largest where ``gamma`` is, at the least slope ``k`` (its derivative is ``2 gamma'
-(gamma + gamma'')``); on Mohr-Coulomb it is the same everywhere. So the test is ``f + G d <= 0``: on cones and on
-Mohr-Coulomb, where the slope of ``f`` is ``G`` at every stress, no weaker one would do for a change of the stress of
-norm ``d`` in any direction. Where the test fails nothing is said; the dynamics decides. The attitude, the phase of the
-spin, the sources of the tide and the material beyond first yield do not enter: the body is rigid until then.
-``python benchmarks/honesty.py`` tests the bound with random bodies and passages.
+(gamma + gamma'')``); for Mohr-Coulomb it is constant. The test is therefore ``f + G d <= 0``. For cones and
+Mohr-Coulomb the slope of ``f`` is ``G`` at every stress, so that the test is sharp for a change of the stress of norm
+``d`` in any direction. If the test fails, the dynamics has to be integrated. The result does not depend on the
+attitude, the phase of the spin, the source of the tide or the material beyond first yield, since the body is rigid
+until then. ``python benchmarks/honesty.py`` tests the bound with random bodies and encounters.
 
-A body whose stress is outside the yield surface far from any planet is not in equilibrium: that needs no
-dynamics either.
+A body whose stress is outside the yield surface without a tide is not in equilibrium; this needs no dynamics either.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ _LARGEST = 0.5 * np.pi * (1.0 - 1e-6)
 
 @kernel
 def _holds(code: int, phi: float, cohesion: float, s: float, p: float, det: float, d: float) -> bool:
-    """Whether every stress within `d` of one with the deviator norm `s`, its unit determinant and `p` is admissible."""
+    """True if every stress within `d` of that with the invariants `s` (norm), `p` and `det` is admissible."""
     sin = np.sin(phi)
     gamma = 1.0 / slope_over_sine(code, sin, det)
     least_sin = max(sin, 1e-12)  # sin(phi)/k has a limit at phi = 0
@@ -63,10 +63,10 @@ def _holds(code: int, phi: float, cohesion: float, s: float, p: float, det: floa
 def _friction_bound(
     code: int, phi: float, cohesion: float, s: float, p: float, det: float, d: float
 ) -> float:
-    """A friction angle (rad) at which `_holds`, at most `phi` if it holds there; inf where none was found."""
+    """A friction angle (rad) at which `_holds` is true, at most `phi` if it is true there; inf if none was found."""
     if _holds(code, 0.0, cohesion, s, p, det, d):
         return 0.0
-    # In tension a larger angle is not better: cohesion counts for less.
+    # In tension a larger angle does not help: Y cos(phi) falls.
     high = phi if _holds(code, phi, cohesion, s, p, det, d) else _LARGEST
     if not _holds(code, high, cohesion, s, p, det, d):
         return np.inf
@@ -84,10 +84,10 @@ def _friction_bound(
 def disturbance(
     axes: Array, pi_g_rho: float, omega: Array, peak: float, impulse: float
 ) -> tuple[float, float]:
-    """Bound on the change of ``T = 5 sigma/rho`` (m2/s2), and the squared spin about a3 it is counted from.
+    """Bound on the change of ``T = 5 sigma/rho`` (m2/s2), and the squared spin about a3 of the reference stress.
 
     `axes` (m) and `omega` (rad/s) along the principal axes; `pi_g_rho` is ``pi G rho`` (s^-2), `peak` the
-    largest norm of the tide (s^-2), `impulse` its time integral (1/s). Turns of the stress do not count.
+    largest norm of the tide (s^-2), `impulse` its time integral (1/s). Rotations of the stress are not included.
     """
     s1, s2, s3 = axes[0] ** 2, axes[1] ** 2, axes[2] ** 2
     j1, j2, j3 = s2 + s3, s1 + s3, s1 + s2
@@ -97,7 +97,8 @@ def disturbance(
     least = max(0.0, momentum - turn)
     wobble = j1 * (j3 - j1) * omega[0] ** 2 + j2 * (j3 - j2) * omega[1] ** 2
     wobble = (np.sqrt(wobble) + turn * np.sqrt((j3 - j1) / j1)) ** 2
-    # Squares of the largest transverse rates; where two moments are equal only the momentum bounds them.
+    # Squares of the largest transverse rates; if two moments of inertia are equal, only the angular momentum bounds
+    # them.
     w1 = (most / j1) ** 2
     w2 = (most / j2) ** 2
     side = most * most  # largest (J_1 w_1)^2 + (J_2 w_2)^2
@@ -156,10 +157,10 @@ def quick_margins(
     code : int
         Yield surface.
     peak, impulse : float
-        Largest norm of the tide, s^-2, and its time integral, 1/s; infinite where nothing is known of it.
+        Largest norm of the tide, s^-2, and its time integral, 1/s; infinite if unknown.
     friction : ndarray (n, 2)
         Out: friction angle mobilised by the free body at the start, and a bound on the largest one during the
-        passage, rad; inf where there is none.
+        encounter, rad; inf if there is none.
     verdict : ndarray (n,) of int
         Out: `INTACT`, `NOT_IN_EQUILIBRIUM` or `UNDECIDED`.
     """
@@ -201,8 +202,8 @@ def _norms(tau: float, start: float, width: float, coefficients: Array, t: Array
 def tide_size(tide: TidePanels, t_start: float, t_stop: float, points: int = 4001) -> tuple[float, float]:
     """Bounds on the norm of a tide: largest (s^-2) and time integral (1/s).
 
-    The norm varies on a scale of one in ``u = asinh(t/tau)``; the steps in u are a few 1e-3, and the
-    bounds are raised by 0.1 percent to cover what lies between them.
+    The norm is sampled in ``u = asinh(t/tau)``, in which it varies on a scale of one, at steps of a few 1e-3; the
+    bounds are raised by 0.1 percent for values between the samples.
     """
     u = np.linspace(np.arcsinh(t_start / tide.tau), np.arcsinh(t_stop / tide.tau), points)
     norm = np.empty(points)

@@ -1,6 +1,6 @@
 """Least critical energy and strain over all directions by descent from many starts.
 
-For what :mod:`flybystab.core.energy.trust_region` cannot do in closed form: third order, barrier, and any order on
+For the cases without a closed form (:mod:`flybystab.core.energy.trust_region`): third order, barrier, and any order on
 a yield surface that is not circular.
 """
 
@@ -29,21 +29,21 @@ from flybystab.typing import Array
 
 # Flags are numpy's (:func:`flybystab.core.numerics.jit.code`): one compilation serves all orders.
 
-#: What is minimised: ``-P1`` (twice), the series, the barrier (see :func:`level`); its energy or its strain.
+#: Order of the critical energy or strain to be minimised (:func:`level`): barrier, ``-P1/V``, second and third order.
 BARRIER, YIELD, SECOND, THIRD = (code(i) for i in range(4))
 ENERGY, STRAIN = code(0), code(1)
 
-#: Angles of a lattice of starts, and how many of them start a descent.
+#: Angles of a lattice of starting points, and number of starting points from which a descent begins.
 COARSE, MEDIUM, DENSE = code(6), code(12), code(24)
 THREE, FOUR = code(3), code(4)
 
-#: A minimum that needs no polish.
+#: The minimum is not refined by `polish`.
 ROUGH: bool = np.bool_(False)  # type: ignore[assignment]
 
-#: Sweeps over the coordinates after which a descent ends where it is.
+#: Largest number of sweeps over the coordinates in a descent.
 MOST_SWEEPS = 60
 
-#: Moves of one simplex.
+#: Largest number of moves of one simplex.
 MOST_TURNS = 200
 
 
@@ -82,7 +82,7 @@ def descent(b: Ellipsoid, x: Array, order: int, which: int, step: float, smalles
         if step <= smallest or best <= 0.0:
             break
         before = best
-        # the strain at a barrier does not bound the energy
+        # A bound on the strain at the barrier is no bound on the energy.
         limit = np.inf if which == STRAIN else best
         start = x.copy()
         for i in range(5):
@@ -95,7 +95,7 @@ def descent(b: Ellipsoid, x: Array, order: int, which: int, step: float, smalles
                     best = value
                     x[:] = trial
                     break
-        if best < before:  # go on in the direction that the sweep has found
+        if best < before:  # pattern move: continue along the displacement of the sweep
             last[:] = x - start
             for _ in range(4):
                 trial[:] = x + last
@@ -152,10 +152,10 @@ def _principal(x: Array, axes: Array) -> None:
 
 
 class Simplex(NamedTuple):
-    """Corners ``[n + 1, n]`` of a simplex and the values there, and what is minimised.
+    """Corners ``[n + 1, n]`` of a simplex, the values there, and the objective.
 
-    With three coordinates they are turns of the principal `axes` in which the Mohr-Coulomb face is normal
-    (:func:`_on_face`), with five the direction itself.
+    Three coordinates are rotations of the principal `axes` of the normal to a Mohr-Coulomb face (:func:`_on_face`);
+    five are the direction itself.
     """
 
     corners: Array
@@ -167,7 +167,7 @@ class Simplex(NamedTuple):
 
 @kernel
 def _corner(b: Ellipsoid, v: Array, s: Simplex, y: Array) -> float:
-    """Value at the point ``v`` of a simplex, which it brings into the ball; writes its direction ``y[5]``."""
+    """Value at the point ``v`` of a simplex, projected into the ball; writes its direction ``y[5]``."""
     if v.size == 3:
         _on_face(b, v, s.axes, y)
     else:
@@ -201,9 +201,9 @@ def _contract(b: Ellipsoid, s: Simplex, low: int, y: Array) -> None:
 
 @kernel
 def _turn(b: Ellipsoid, s: Simplex, centre: Array, trial: Array, other: Array, y: Array) -> bool:
-    """One step of Nelder & Mead (1965): reflection, expansion, contraction; whether the simplex is still steep.
+    """One step of Nelder & Mead (1965): reflection, expansion, contraction; False once the simplex has converged.
 
-    `centre`, `trial`, `other` and ``y[5]`` are work space.
+    `centre`, `trial`, `other` and ``y[5]`` are scratch.
     """
     n = centre.size
     rank = np.argsort(s.values)
@@ -238,12 +238,12 @@ def _turn(b: Ellipsoid, s: Simplex, centre: Array, trial: Array, other: Array, y
 def polish(
     b: Ellipsoid, x: Array, order: int, which: int, size: float, smallest: float, on_face: bool
 ) -> float:
-    """Lower the critical energy (or strain) from ``x[5]``, which it moves, by simplices (Nelder & Mead 1965).
+    """Minimise the critical energy (or strain) from ``x[5]``, which is overwritten, by simplices (Nelder & Mead 1965).
 
-    A simplex follows the narrow, curved valleys along which no coordinate leads down; it is set up anew and
-    smaller until a round gains nothing. `on_face` moves along the normals of the Mohr-Coulomb faces, where the
-    dissipation of associative flow, the greater of two linear functions of the greatest and the least principal
-    rate, has a kink: the bottom of a sharp valley.
+    A simplex can follow narrow, curved valleys that are not along a coordinate, where a pattern search stops. It is
+    restarted with a smaller size until a round no longer lowers the value. With `on_face` the search is restricted to
+    the normals of the Mohr-Coulomb faces: there the dissipation of associative flow, the maximum of two linear
+    functions of the largest and the least principal rate, has a kink, at which minima lie.
     """
     n = 3 if on_face else 5
     s = Simplex(np.empty((n + 1, n)), np.empty(n + 1), np.empty((3, 3)), order, which)
@@ -268,7 +268,7 @@ def polish(
 
 @kernel
 def starts(n_angles: int, ball: bool) -> Array:
-    """Directions that cover the deviators: circles through the diagonal ones and each shear; and inside the ball."""
+    """Starting directions: circles through the diagonal deviators and each shear; with `ball` also points inside it."""
     out = np.zeros((n_angles * 7 + 7, 5))
     n = 0
     for i in range(n_angles):
@@ -305,7 +305,8 @@ def least(
 ) -> tuple[float, float]:
     """Least critical energy (or strain) at an order, with its strain (or energy); writes the direction ``x[5]``.
 
-    The best `tries` of the `seeds` and of a lattice of directions each start a descent; `fine` polishes the best.
+    A descent starts from each of the best `tries` points of the `seeds` and of a lattice of directions; with `fine` the
+    best result is refined by `polish`.
     """
     ball = b.associative and b.sin > 0.0
     edged = ball and is_hexagon(b.code)

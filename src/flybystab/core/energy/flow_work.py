@@ -1,19 +1,18 @@
-"""Power of the stress of a flow along a path of constant strain direction, with the pressure that the flow needs.
+"""Power of the stress of a flow along a path of constant strain direction, with the reaction pressure of the flow.
 
 While a granular body flows with the unit rate of strain ``u`` its stress is ``T = -P 1 + (P sin + C) N`` (``T = 5
 sigma V/(V0 rho0)``, ``C = 5 Y cos(phi) V/V0``, ``N`` the unit yield section at ``u``) and its dilation is ``tr D = e
-N:u``. The pressure is a reaction: it keeps ``tr D`` at that value (theory, section 3). With ``R = K_g - Omega^2`` and
+N:u``. The pressure is the reaction to this constraint on ``tr D`` (theory, section 3). With ``R = K_g - Omega^2`` and
 ``B = 1 - e N``, to first order in ``D``,
 
     P = [-B:R + C B:(N S^-1)] / [B:((1 - sin N) S^-1)],    power = (M/5) [(sin - e) (N:u) P + C N:u].
 
-The terms of second order add ``|D'|^2 [B:L^2 + d(tr D)/dt]/[...]`` to ``P``, the last where the dilation fades: they
-vanish for small perturbations and count along a path whose kinetic energy is large.
+The terms of second order add ``|D'|^2 [B:L^2 + d(tr D)/dt]/[...]`` to ``P``, the last only where the dilation fades.
+They are negligible for small perturbations, but not along a path whose kinetic energy is large.
 
-Associative flow has ``e = sin``: the pressure drops out of the power. The dilation fades at ``V/V0`` = 1.5 by the same
-law as in the dynamics. Two other closures: a plastic bulk modulus ``kappa``, with which the pressure starts at that
-of equilibrium and falls as ``p = p_eq - kappa ln(V/V0)``; and where the pressure would fall below that of the apex,
-``-Y cot(phi)``, contact is lost and it stays there.
+In associative flow ``e = sin`` and the power does not depend on the pressure. The dilation ends at ``V/V0`` = 1.5, with
+the same fade as in the dynamics. Alternatively, a plastic bulk modulus ``kappa`` gives the pressure
+``p = p_eq - kappa ln(V/V0)``. The pressure is never below that of the apex, ``-Y cot(phi)``, at which contact is lost.
 
 Units as in :mod:`flybystab.core.energy.potential`.
 """
@@ -34,7 +33,7 @@ from flybystab.typing import Array
 LARGEST_VOLUME = 1.5
 FADE_BEGINS = LARGEST_VOLUME - 0.1 * (LARGEST_VOLUME - 1.0)
 
-# Partial fractions of 1/((1 - x)^2 (1 + 2x) (b + d x)), the time that the fade takes up to x = (V/V0 - b)/d
+# Partial fractions of 1/((1 - x)^2 (1 + 2x) (b + d x)); its integral is the strain of the fade up to x = (V/V0 - b)/d
 _D = LARGEST_VOLUME - FADE_BEGINS
 _SQUARE = 1.0 / (3.0 * LARGEST_VOLUME)
 _PLUS = 4.0 / 9.0 / (FADE_BEGINS - 0.5 * _D)
@@ -55,7 +54,7 @@ _COLLOCATION = np.array(
 
 
 class Flow(NamedTuple):
-    """One direction of flow: what the power of the stress along its path depends on."""
+    """A direction of flow: the quantities on which the power of the stress along its path depends."""
 
     section: Array  # N[3, 3]
     support: float  # N:u
@@ -70,7 +69,7 @@ class Flow(NamedTuple):
 
 @kernel
 def volume_at(trace: float, t: float) -> float:
-    """``V/V0`` at strain `t`: ``dV/dt = trace V`` up to the fade, then with the faded share, in closed form."""
+    """``V/V0`` at strain `t` in closed form: ``dV/dt = trace f(V) V`` with ``f`` = `fade_share`."""
     if trace <= 0.0:
         return 1.0
     begin = np.log(FADE_BEGINS)
@@ -105,7 +104,7 @@ def growth_at(trace: float, volume: float) -> float:
 
 @kernel
 def depends_on_pressure(flow: Flow, volume: float) -> bool:
-    """Whether the power at ``V/V0`` depends on the pressure."""
+    """True if the power at ``V/V0`` depends on the pressure."""
     return flow.sin > 0.0 and (flow.share < flow.sin or volume > FADE_BEGINS)
 
 
@@ -113,10 +112,10 @@ def depends_on_pressure(flow: Flow, volume: float) -> bool:
 def power(
     flow: Flow, volume: float, gradient: Array, axes: PrincipalAxes, tide: Array
 ) -> tuple[float, float]:
-    """Power of the stress at ``V/V0`` per unit rate of strain, and what the square of that rate adds to it.
+    """Power of the stress at ``V/V0`` per unit rate of strain, and the coefficient of the square of that rate in it.
 
-    ``gradient[3, 3]`` is the part of ``L`` that keeps the volume, ``tide[6]`` a tidal tensor in the frame of the
-    path. They and the body `axes` are used where the pressure matters only.
+    ``gradient[3, 3]`` is the traceless part of ``L``, ``tide[6]`` a tidal tensor in the frame of the path. They and the
+    body `axes` are used only where the power depends on the pressure.
     """
     cohesive = 5.0 * flow.cohesion * volume
     m = flow.support
@@ -280,8 +279,8 @@ def power_derivatives(
     """Power of the stress and its first two derivatives at the start of the path with rate of strain ``d[6]``.
 
     ``s[3]`` with ``s1 s2 s3 = 1`` and its index symbols. The derivatives of the reaction pressure follow from those of
-    its equation, numerator and denominator of :func:`power`, with ``S' = 2 L S``. The power is infinite where the flow
-    jams.
+    its equation, numerator and denominator of :func:`power`, with ``S' = 2 L S``. The power is infinite in a jam, where
+    the denominator is not positive.
     """
     tr = flow.trace
     cohesive = 5.0 * flow.cohesion

@@ -1,7 +1,7 @@
-"""Deformation of a body that a passing tide drives beyond its friction, along one direction of strain.
+"""Deformation of a body by a tide that exceeds its friction for some time, along one direction of strain.
 
-Newmark's sliding block (1965), made for dams under earthquakes, on the path of one direction of strain ``D``: the
-strain ``e`` follows
+Newmark's sliding block (1965), developed for dams in earthquakes, is applied to the path of one direction of strain
+``D``. The strain ``e`` obeys
 
     (1/2 M edot^2)' = edot [F(t, e) - y(e)]    while edot > 0 or F > y,    M = tr(L S L^T) m/5
 
@@ -10,9 +10,9 @@ angular momentum and power of the stress with its reaction pressure) and the for
 
     F = (m/5) K_t:(L S) - [y(e; H(t), K_t) - y(e; H_0, 0)].
 
-Shape, pressure and potential are those of the deformed body; its attitude and its angular momentum ``H(t)`` are those
-of the rigid course, and the direction of strain stays. The work ``int F de`` is the energy that a barrier has to be
-held against. Units as in :mod:`flybystab.core.energy.potential`.
+Shape, pressure and potential are those of the deformed body; attitude and angular momentum ``H(t)`` are those of the
+rigid motion, and the direction of strain is constant. The work ``int F de`` is the energy to be compared with a
+barrier. Units as in :mod:`flybystab.core.energy.potential`.
 """
 
 from __future__ import annotations
@@ -53,7 +53,7 @@ def driving_stress(
     pressure: Array,
     excess: Array,
 ) -> None:
-    """Write the stress of rigidity at ``spin[n, 3]``, ``tide[n, 6]``: ``deviator[n, 5]``, pressure, overload."""
+    """Write the stress of rigid rotation at ``spin[n, 3]``, ``tide[n, 6]``: ``deviator[n, 5]``, pressure, overload."""
     stress = np.empty(6)
     for i in range(spin.shape[0]):
         rigid_stress(s[0], s[1], s[2], 1.0, 1.0, spin[i], tide[i], stress)
@@ -66,7 +66,7 @@ def driving_stress(
 def tidal_power(gradient: Array, growth: float, shape: Array, tide: Array) -> float:
     """``(M/5) K:(L S)`` per unit rate of strain: the power of a tidal tensor ``tide[6]`` on a deformation.
 
-    ``gradient[3, 3]`` is the part of ``L`` that keeps the volume, `growth` its trace; ``shape[6]`` is ``S``.
+    ``gradient[3, 3]`` is the traceless part of ``L``, `growth` the trace of ``L``; ``shape[6]`` is ``S``.
     """
     s = np.empty((3, 3))
     k = np.empty((3, 3))
@@ -102,10 +102,10 @@ def forces_at(
 def slide(
     b: Ellipsoid, x: Array, time: Array, momentum: Array, tide: Array
 ) -> tuple[float, float, float, float]:
-    """Energy given, largest kinetic energy, strain and duration of the deformation along the path of ``x[5]``.
+    """Work of ``F``, largest kinetic energy, strain and duration of the deformation along the path of ``x[5]``.
 
-    ``momentum[n, 3]`` and ``tide[n, 6]`` are those of the rigid course at ``time[n]``, body axes, linear in between.
-    It ends at the axis ratio where the homogeneous model does, or at the strain `LONGEST`.
+    ``momentum[n, 3]`` and ``tide[n, 6]`` are those of the rigid motion at ``time[n]``, body axes, interpolated
+    linearly. The deformation ends at the largest axis ratio of the homogeneous model, or at the strain `LONGEST`.
     """
     path = path_along(b, x)
     edge = max(LARGEST_AXIS_RATIO * LARGEST_AXIS_RATIO, LARGER_AXIS_RATIO2 * (np.max(b.s) / np.min(b.s)))

@@ -5,14 +5,14 @@ A perturbation is a rate of strain ``D = sum_a x_a E_a + (beta/3) 1`` held for a
 
     K(t) - K(0) = t P1 + t^2/2 P2 + t^3/6 P3 + ...,    P_n = -(d/dt)^n Phi - (d/dt)^(n-1) (V sigma*:D)   at t = 0
 
-with the power of the stress ``V sigma*:D`` of :mod:`flybystab.core.energy.flow_work`, that is with the pressure that
-the flow needs, not that of the equilibrium. At the start ``-Phi' = V sigma_eq:D``.
+with the power of the stress ``V sigma*:D`` of :mod:`flybystab.core.energy.flow_work`, that is with the reaction
+pressure of the flow, not that of the equilibrium. At the start ``-Phi' = V sigma_eq:D``.
 
 Associative flow (``beta = k``, for a slope ``k(theta)`` the support function of the yield section) also admits the
 apex of the yield surface, ``tr D > k |D'|``: that is ``|x| < 1`` at ``tr D = k``, the same formulas on the ball
 instead of the sphere.
 
-Holding ``D`` is a constraint: the least barrier over such paths is an upper bound of the least over all paths.
+A constant ``D`` is a constraint: the least barrier over these paths is an upper bound of the least over all paths.
 
 Units as in :mod:`flybystab.core.energy.potential`.
 """
@@ -61,7 +61,7 @@ SQRT2 = np.sqrt(2.0)
 #: Tidal tensor of a free body.
 NO_TIDE = np.zeros(6)
 
-#: Longest strain along which a barrier is looked for.
+#: Largest strain up to which a barrier is searched.
 LONGEST = 3.0
 
 #: Steps of strain in which its maximum is bracketed.
@@ -198,7 +198,7 @@ def slope_of_flow(b: Ellipsoid, x: Array) -> tuple[float, float]:
 
 @kernel
 def flow_along(b: Ellipsoid, x: Array) -> Flow:
-    """What the power of the stress depends on in a direction ``x[5]``, ``|x| <= 1``."""
+    """Quantities on which the power of the stress depends in a direction ``x[5]``, ``|x| <= 1``."""
     r = np.sqrt(np.sum(x * x))
     det = _unit_determinant(x, r) if r > 0.0 else 0.0
     size, trace = slope_of_flow(b, x)
@@ -222,7 +222,7 @@ def flow_along(b: Ellipsoid, x: Array) -> Flow:
 
 @kernel
 def powers(b: Ellipsoid, x: Array) -> tuple[float, float, float]:
-    """``P1, P2, P3`` of a direction ``x[5]``, ``|x| <= 1``; minus infinity, 0, 0 where the flow jams."""
+    """``P1, P2, P3`` of a direction ``x[5]``, ``|x| <= 1``; minus infinity, 0, 0 in a jam."""
     flow = flow_along(b, x)
     d = np.empty(6)
     rate_of_strain(x, flow.trace, d)
@@ -260,10 +260,10 @@ def third_order(p1: float, p2: float, p3: float) -> tuple[float, float]:
 
 
 class Path(NamedTuple):
-    """A path of constant direction: the flow along it, the deformation, and the body at the last instant asked for."""
+    """A path of constant direction: flow, deformation, and the body at the last instant that was evaluated."""
 
     flow: Flow
-    gradient: Array  # the part of L that keeps the volume
+    gradient: Array  # the traceless part of L
     rates: Array
     frame: Array
     axes: PrincipalAxes
@@ -285,7 +285,7 @@ def path_along(b: Ellipsoid, x: Array) -> Path:
 
 @kernel
 def state_at(b: Ellipsoid, path: Path, t: float) -> tuple[float, float, float]:
-    """``Phi``, the rate at which kinetic energy is lost in slow flow, and the squared axis ratio at strain `t`."""
+    """``Phi``, the loss of kinetic energy per strain in slow flow, and the squared axis ratio at strain `t`."""
     volume = volume_at(path.flow.trace, t)
     growth = growth_at(path.flow.trace, volume)
     phi, slope, ratio2 = energy_along(path.rates, path.frame, b.momentum, t, volume, growth, path.axes)
@@ -307,14 +307,15 @@ def mobility(path: Path, t: float, volume: float, growth: float) -> float:
 def _work(b: Ellipsoid, path: Path, start: float, end: float, inertia: float) -> tuple[float, float]:
     """Work of the stress between two strains, by Gauss' rule between the kinks of its power.
 
-    The kinetic energy ``K`` that is needed at the start to reach a strain at rest obeys ``dK/dt = -y - w K`` with the
-    loss ``y`` of slow flow and what inertia adds to the pressure, ``w``: it is ``int y exp(int w dt) dt``. `inertia`
-    is ``int w dt`` up to the start, or negative to leave it out; returns its value at the end too.
+    Along the path the kinetic energy obeys ``dK/dt = -y - w K`` with the loss ``y`` of slow flow and the contribution
+    ``w`` of inertia to the pressure. The energy at the start with which a strain is reached at rest is therefore
+    ``int y exp(int w dt) dt``. `inertia` is ``int w dt`` up to `start`; negative: ``w`` is neglected. Its value at the
+    end is also returned.
     """
     flow = path.flow
     trace = flow.trace
     fading = np.log(FADE_BEGINS) / trace if trace > 0.0 else np.inf
-    loose = np.inf  # strain at which a softening material has lost its pressure
+    loose = np.inf  # strain at which the pressure of a softening material is zero
     if flow.kappa > 0.0 and trace > 0.0 and flow.sin > 0.0:
         loose = (flow.pressure + flow.cohesion / flow.sin) / (flow.kappa * trace)
     work = 0.0
@@ -373,7 +374,7 @@ def loss_at(b: Ellipsoid, x: Array, t: float, slow: bool) -> float:
 
 @kernel
 def loss_rate(b: Ellipsoid, x: Array, t: float) -> float:
-    """Rate at which slow flow loses kinetic energy at strain `t`, per strain."""
+    """Loss of kinetic energy per strain in slow flow at strain `t`."""
     return state_at(b, path_along(b, x), t)[1]
 
 
@@ -408,7 +409,7 @@ def _strain_at_ratio(
 def _strain_at_maximum(
     b: Ellipsoid, path: Path, a: float, z: float, rate_a: float, rate_z: float
 ) -> tuple[float, float]:
-    """Strain between `a` and `z` at which slow flow ceases to lose energy (Illinois rule), and ``Phi`` there."""
+    """Zero of the loss rate of slow flow between the strains `a` and `z` (Illinois rule), and ``Phi`` there."""
     side = 0
     t = z
     phi = 0.0
@@ -448,9 +449,9 @@ def overload_at(b: Ellipsoid, path: Path, t: float) -> float:
 
 @kernel
 def _flows_on(b: Ellipsoid, path: Path, t0: float, t1: float, y0: float, y1: float) -> bool:
-    """Whether slow flow goes on by itself where it gains energy between two strains; `y` is the loss there.
+    """True if slow flow continues without supply of energy between two strains with the loss rates `y0` and `y1`.
 
-    With a plastic bulk modulus, whose pressure is that of the flow at rest too, it does.
+    With a plastic bulk modulus, for which the pressure at rest is that of the flow, this is always so.
     """
     if path.flow.kappa > 0.0:
         return True
@@ -463,18 +464,18 @@ def _flows_on(b: Ellipsoid, path: Path, t0: float, t1: float, y0: float, y1: flo
 
 @kernel
 def barrier(b: Ellipsoid, x: Array, longest: float, enough: float) -> tuple[float, float]:
-    """Energy needed to pass, along ``F = exp(L t)``, the strain from which slow flow goes on by itself; that strain.
+    """Energy and strain of the barrier along ``F = exp(L t)``: beyond it slow flow continues without supply of energy.
 
-    Up to the inertia of the flow (see `_work`) it is a maximum of ``Phi(t) - Phi(0) + int V sigma*:D dt``, a zero of
-    its exact slope that is bracketed by steps of :data:`STEP`. Beyond it a flow with the direction held gains energy.
-    A slow flow turns to the deviator of the stress and stops where the body at rest is not overloaded. For associative
-    flow it always is; otherwise the pressure of the flow may be lower than at rest. A maximum, or a gain from the
-    start, counts only if the body at rest is overloaded before the flow loses energy again; if it is not, the path
-    goes on and the highest maximum counts.
+    Apart from the inertia of the flow (see `_work`) the barrier is a maximum of the loss ``Phi(t) - Phi(0) + int V
+    sigma*:D dt``, located as a zero of its exact derivative in steps of :data:`STEP`. Beyond it a flow of constant
+    direction gains energy. A slow flow, however, turns to the deviator of the stress and stops where the body at rest
+    is not overloaded. In associative flow it is always overloaded there; otherwise the pressure of the flow may be
+    lower than at rest. Therefore a maximum, or a gain from the start, counts only if the body at rest is overloaded at
+    some strain before the loss rises again; else the path is followed further, and the highest maximum counts.
 
-    The path ends where the axis ratio passes :data:`LARGEST_AXIS_RATIO`, at which the homogeneous model is left: the
-    loss there counts as a maximum. Infinite where the loss grows up to the strain `longest` without either. A loss
-    above `enough` is returned as soon as it is found: the barrier is at least that high.
+    The path ends where the axis ratio exceeds :data:`LARGEST_AXIS_RATIO`, the limit of the homogeneous model: the loss
+    there counts as a maximum. The energy is infinite if the loss grows up to the strain `longest` without either. A
+    loss above `enough` is returned as soon as it is found, as a lower bound of the barrier.
     """
     path = path_along(b, x)
     phi0, y1, ratio0 = state_at(b, path, 0.0)

@@ -13,8 +13,8 @@ at fixed angular momentum ``H`` (theory, section 5). A rate of strain ``D`` in t
 
 Units of this module: mean radius ``(a1 a2 a3)^(1/3)``, density and ``pi G rho`` of the undeformed body are one:
 mass ``M = 4 pi/3``, ``G = 1/pi``, energies in ``pi G rho^2 a^5``, stresses in ``pi G rho^2 a^2``, ``H`` in
-``rho a^5 sqrt(pi G rho)``. ``H`` keeps its components: a perturbation is fast compared with the precession that it
-starts (for steady spin this makes no difference to the first two derivatives).
+``rho a^5 sqrt(pi G rho)``. The components of ``H`` are constant: a perturbation is fast compared with the precession
+that it causes (for steady spin the first two derivatives do not depend on this).
 
 The six components of ``D`` are ``xx, yy, zz, xy, xz, yz``.
 """
@@ -237,8 +237,8 @@ def energy_along(
 ) -> tuple[float, float, float]:
     """``Phi``, ``dPhi/dt`` and the squared axis ratio at time `t` on a path of :func:`path_frame`; writes `axes`.
 
-    On top of that path the body swells evenly: to `volume` times its volume by now, at the rate ``d ln V/dt`` =
-    `growth`.
+    In addition to that path the body expands isotropically, to `volume` times its volume at time `t`, at the rate
+    ``d ln V/dt`` = `growth`.
     """
     shape, rate = axes.shape, axes.rate
     _shape_along(rates, frame, t, volume, growth, shape, rate)

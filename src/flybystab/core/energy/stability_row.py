@@ -61,21 +61,21 @@ COLUMNS = 14
 #: Rows of the directions: second order by energy and by strain, third order by energy and by strain, barrier.
 DIRECTIONS = 5
 
-#: A stress this close to the yield surface, relative to the pressure, counts as being on it.
+#: A stress counts as on the yield surface within this distance from it, relative to the pressure.
 ON_YIELD = 1e-9
 
 
 @kernel
 def _certified(b: Ellipsoid) -> bool:
-    """Whether ``P1`` is linear and ``P2`` quadratic in the direction: not with a reaction pressure."""
+    """True if ``P1`` is linear and ``P2`` quadratic in the direction, that is without a reaction pressure."""
     return is_circular(b.code) and (b.associative or b.kappa > 0.0 or b.sin <= 0.0)
 
 
 @kernel
 def first_to_flow(b: Ellipsoid, x: Array) -> float:
-    """``P1/V`` in the direction ``x[5]`` in which the body flows first: the greatest of all for associative flow.
+    """``P1/V`` in the direction in which the body flows at first yield, which is written to ``x[5]``.
 
-    With less dilatancy it flows along the stress deviator.
+    For associative flow this is the direction of the greatest ``P1/V``, otherwise that of the stress deviator.
     """
     size = np.sqrt(np.sum(b.stress * b.stress))
     if is_circular(b.code) or not b.associative:
@@ -100,11 +100,11 @@ def first_to_flow(b: Ellipsoid, x: Array) -> float:
 def overload_rate(b: Ellipsoid, x: Array) -> float:
     """Rate at which the overload of the rigid body grows along the flow ``x[5]``, at fixed angular momentum.
 
-    For a body at yield whose flow is not associative this decides on stability to infinitesimal perturbations, not
-    ``P2``. The direction of a slow flow relaxes at once to the one that goes on without a jump of the stress, along
-    the deviator of the rigid stress, and turns with it as the shape changes; for associative flow the power is
-    stationary in the direction and the turn does not count, for ``beta < k`` it does. Slow flow goes on where the
-    changed body is overloaded at rest, and stops where it is not.
+    Stability criterion against infinitesimal perturbations of a body at yield whose flow is not associative (in place
+    of ``P2``): unstable if positive. The direction of a slow flow relaxes to that of the deviator of the rigid stress,
+    for which the stress is continuous, and turns with it as the shape changes. For associative flow the power is
+    stationary in the direction, so that this rotation has no effect at second order; for ``beta < k`` it has. Slow flow
+    continues if the deformed body is overloaded at rest, and stops otherwise.
     """
     h = 1e-4
     path = path_along(b, x)
@@ -113,9 +113,9 @@ def overload_rate(b: Ellipsoid, x: Array) -> float:
 
 @kernel
 def _face_normal(b: Ellipsoid, x: Array) -> None:
-    """Unit deviator ``x[5]`` of the normal to the Mohr-Coulomb face that the stress is under.
+    """Unit deviator ``x[5]`` of the normal to the Mohr-Coulomb face in the sector of the stress.
 
-    ``f = (sigma_1 - sigma_3) + (sigma_1 + sigma_3) sin(phi)``: ``P1`` has a kink there, which a descent misses.
+    ``f = (sigma_1 - sigma_3) + (sigma_1 + sigma_3) sin(phi)``: ``P1`` has a kink there, at which a descent stalls.
     """
     stress = np.empty(6)
     rate_of_strain(b.stress, 0.0, stress)
@@ -140,10 +140,10 @@ def _face_normal(b: Ellipsoid, x: Array) -> None:
 def mobilised_curvature(
     s: Array, spin: Array, code: int, friction: float, cohesion: float, pressure: float
 ) -> float:
-    """``Phi''/(p V)`` along the associative ``D*`` when exactly the `friction` that is required is there.
+    """``Phi''/(p V)`` along the associative ``D*`` for a friction angle equal to the required one, `friction`.
 
-    Positive: the body is stable to infinitesimal perturbations even with its friction fully mobilised. nan where
-    there is no deviator (``D*`` is undefined), no pressure or no sufficient friction.
+    Positive: the body is stable to infinitesimal perturbations even with its friction fully mobilised. nan if the
+    deviator is zero (``D*`` is undefined), the pressure is not positive or no friction is sufficient.
     """
     b = ellipsoid(s[0], s[1], s[2], spin, code, friction, cohesion, 1.0, 0.0)
     if not friction < np.inf or pressure <= 0.0 or np.sum(b.stress * b.stress) <= 1e-28 * pressure * pressure:
@@ -159,7 +159,7 @@ def mobilised_curvature(
 
 @kernel
 def _critical_kappa(b: Ellipsoid, stress: Array, p: float, beta: float) -> float:
-    """Plastic bulk modulus below which the body is unstable along its stress deviator; nan where none is."""
+    """Plastic bulk modulus below which the body is unstable along its stress deviator; nan if there is none."""
     y = np.empty(5)
     direction(stress, y)
     y /= np.sqrt(np.sum(y * y))
@@ -172,7 +172,7 @@ def _critical_kappa(b: Ellipsoid, stress: Array, p: float, beta: float) -> float
 
 @kernel
 def _stable(b: Ellipsoid, x: Array, p1: float, p: float, size: float, tolerance: float) -> bool:
-    """Whether the body is stable to infinitesimal perturbations.
+    """True if the body is stable to infinitesimal perturbations.
 
     ``P1/V`` is the largest, in the direction ``x[5]``; `p` and `size` are the pressure and the norm of the deviator.
     """
@@ -180,7 +180,7 @@ def _stable(b: Ellipsoid, x: Array, p1: float, p: float, size: float, tolerance:
     if p1 < -tolerance:
         return True
     if size <= ON_YIELD * abs(p) and g * b.sin * p <= tolerance:
-        # neither deviator nor friction: a fluid, to be tested in every direction that keeps the volume
+        # neither deviator nor friction: a fluid, tested in all directions of constant volume
         f = np.empty((6, 6))
         curvature_form(b, f)
         return trust_region(f[:5, :5].copy(), np.zeros(5), False, np.zeros(5)) > 0.0
@@ -210,7 +210,8 @@ def _finite_perturbations(
         row[ENERGY_2], _ = least(b, SECOND, ENERGY, seeds, DENSE, FOUR, 1e-6, depth > 4, xe)
         row[STRAIN_2], _ = least(b, SECOND, STRAIN, seeds, DENSE, FOUR, 1e-6, depth > 4, xs)
     directions[0], directions[1] = xe, xs
-    # A direction in which friction does not stop a stable body: it turns, and the series along it say nothing.
+    # A critical energy <= 0 of a stable body: the flow does not keep this direction, the series along it has no
+    # meaning.
     undefined = stable and not b.associative and row[ENERGY_2] <= 0.0
     if undefined:
         row[ENERGY_2] = row[STRAIN_2] = np.nan
@@ -256,7 +257,7 @@ def classify(
     """Write ``row[COLUMNS]`` and ``directions[DIRECTIONS, 5]``.
 
     `depth` 0 stops at the required friction, 1 at infinitesimal stability, 2 at the second order, 3 at the third,
-    4 goes on to the barrier, 5 also minimises the strains of third order on their own. What is not reached is nan.
+    4 at the barrier; 5 also minimises the strain at third order separately. Results beyond `depth` are nan.
     `flow_cohesion` is the cohesion while the body flows: zero where it is brittle, since a deforming body is at yield.
     """
     row[:] = np.nan
@@ -308,7 +309,7 @@ def classify_many(
 ) -> None:
     """:func:`classify` for every row of ``s[n, 3]``, ``spin[n, 3]``, ``phi[n]``, ...; writes ``out[n, COLUMNS]``.
 
-    Rows whose squared axes are not positive numbers stay nan.
+    Rows whose squared axes are not all positive are nan.
     """
     directions = np.empty((DIRECTIONS, 5))
     for i in range(s.shape[0]):

@@ -21,7 +21,7 @@ from flybystab.typing import Array
 
 @kernel
 def _inside_ball(values: Array, g: Array, y: Array) -> bool:
-    """Whether the free minimum ``g/values`` lies in the unit ball; writes it into ``y[n]``."""
+    """True if the free minimum ``g/values`` lies in the unit ball; writes it into ``y[n]``."""
     if values[0] <= 0.0:
         return False
     inside = 0.0
@@ -70,7 +70,7 @@ def _secular_root(values: Array, g: Array, low: float, y: Array) -> None:
 def _on_sphere(values: Array, g: Array, size: float, y: Array) -> None:
     """Write the minimum ``y[n]`` on the unit sphere in the basis of the eigenvectors.
 
-    `size` is the scale of what counts as zero. The lowest eigenvalue may be repeated: in the hard case ``g`` is
+    Values are compared with zero relative to `size`. The lowest eigenvalue may be repeated: in the hard case ``g`` is
     negligible along all of its eigenvectors.
     """
     n = g.size
@@ -96,7 +96,7 @@ def trust_region(a: Array, b: Array, ball: bool, x: Array) -> float:
     """Global minimum of ``x.a x + b.x`` on the unit sphere, or in the unit ball; writes ``x[n]``.
 
     ``(a + mu 1) x = -b/2`` with ``a + mu 1`` positive semidefinite is necessary and sufficient (Moré & Sorensen
-    1983). In the hard case (``b`` normal to the lowest eigenvector) the missing length goes along that vector.
+    1983). In the hard case (``b`` normal to the lowest eigenvector) a component along that vector makes ``|x| = 1``.
     """
     n = b.size
     values, vectors = np.linalg.eigh(a)
@@ -174,7 +174,7 @@ def _powers(form: SecondOrder, x: Array) -> tuple[float, float]:
 
 @kernel
 def _least_energy(form: SecondOrder, best: float, x_least: Array) -> float:
-    """Least ``P1^2/(2 P2)``, from a value of it; writes the direction if another one is lower."""
+    """Least ``P1^2/(2 P2)``, starting from the value `best`; writes the direction if a lower one is found."""
     m2 = MASS * MASS
     a, b, x = np.empty((5, 5)), np.empty(5), np.empty(5)
     for _ in range(60):
@@ -197,7 +197,7 @@ def _least_energy(form: SecondOrder, best: float, x_least: Array) -> float:
 
 @kernel
 def _least_strain(form: SecondOrder, best: float, x_least: Array) -> float:
-    """Least ``-P1/P2``, from a value of it; writes the direction if another one is lower."""
+    """Least ``-P1/P2``, starting from the value `best`; writes the direction if a lower one is found."""
     a, b, x = np.empty((5, 5)), np.empty(5), np.empty(5)
     for _ in range(60):
         for i in range(5):
@@ -222,7 +222,7 @@ def least_second_order(b: Ellipsoid, x_energy: Array, x_strain: Array) -> tuple[
     """Least critical energy and least critical strain at second order on a circular cone, and greatest ``P2``.
 
     Writes the directions that give them. Dinkelbach's iteration ``E <- P1^2/(2 P2)`` at the minimiser of
-    ``P1^2 - 2 E P2`` falls monotonically and superlinearly to the global least value.
+    ``P1^2 - 2 E P2`` converges monotonically and superlinearly to the global minimum.
     """
     form = _second_order_form(b, x_energy)
     x = np.empty(5)

@@ -10,7 +10,7 @@ from flybystab.core.grains.state import Grains
 from flybystab.core.numerics.jit import kernel
 from flybystab.typing import Array
 
-#: Grains nearer than this many sums of their radii belong to one clump.
+#: Grains closer than this times the sum of their radii belong to one clump.
 LINK = 1.15
 
 
@@ -46,11 +46,11 @@ def friends_of_friends(g: Grains, link: float, label: NDArray[np.int64]) -> int:
 
 
 def bound_clumps(g: Grains, label: NDArray[np.int64], largest: int) -> NDArray[np.bool_]:
-    """Whether each clump is bound to the largest one (True for that itself); shape (clumps,).
+    """True for each clump bound to the largest one, and for that itself; shape (clumps,).
 
-    A clump, or a loose grain, is bound if its centre of mass has a negative energy as a two-body problem with the bound
-    ones together, whose potential is that of their grains. Repeated until no more join. Its own rotation keeps a clump
-    together and does not count: tested grain by grain, an escaping clump that spins would be bound in part.
+    A clump (or a single grain) is bound if the two-body energy of its centre of mass relative to all bound clumps is
+    negative, with the potential of their grains. The test is repeated until no clump is added. The rotation of a clump
+    is not included: in a test grain by grain, part of a spinning clump that escapes would count as bound.
     """
     held = label >= 0
     count = int(label.max()) + 1
@@ -79,7 +79,7 @@ def bound_clumps(g: Grains, label: NDArray[np.int64], largest: int) -> NDArray[n
 def moments(g: Grains, member: NDArray[np.bool_]) -> tuple[float, Array, Array, Array, Array]:
     """Mass, centre, velocity, inertia tensor and angular momentum of some grains about their centre.
 
-    Inertia and angular momentum contain the grains' own.
+    Inertia and angular momentum include those of each grain about its own centre.
     """
     m, x, v, w, r = g.mass[member], g.x[member], g.v[member], g.w[member], g.radius[member]
     total = float(m.sum())

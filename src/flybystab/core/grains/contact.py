@@ -11,7 +11,7 @@ radius ``beta R``: Zhang et al. 2017). With ``n`` the unit vector from grain i t
 - rolling moment: stiffness ``k_n (beta R)^2``, at most ``mu_r beta R N``;
 - twisting moment: stiffness ``2 k_s (beta R)^2``, at most ``mu_t mu_s beta R N``.
 
-The springs turn with the pair: about ``n`` at the mean spin of the two grains, otherwise with ``n``.
+The springs rotate with the pair: about ``n`` at the mean spin of the two grains, and with the direction of ``n``.
 """
 
 from __future__ import annotations
@@ -59,9 +59,9 @@ def _elongated(spring: Vector, rate: Vector, n: Vector, turn: float, dt: float) 
 def _resistance(
     spring: Vector, rate: Vector, stiffness: float, damping: float, most: float
 ) -> tuple[Vector, Vector]:
-    """Force (or moment) of a spring and a dashpot of at most the size `most`, and the spring.
+    """Force (or moment) of a spring and a dashpot, limited to the norm `most`, and the spring.
 
-    Where the limit is exceeded the contact slides (or rolls), and the spring is shortened to the limit.
+    If the limit is exceeded the contact slides (or rolls), and the spring is shortened to the limit.
     """
     force = (
         stiffness * spring[0] + damping * rate[0],
@@ -80,7 +80,7 @@ def _resistance(
 def _twisting(
     twist: float, rate: float, stiffness: float, damping: float, most: float, dt: float
 ) -> tuple[float, float]:
-    """Moment about the normal of at most `most`, and the angle of the spring after a step."""
+    """Moment about the normal, limited to `most`, and the angle of the spring after a step."""
     angle = twist + dt * rate
     moment = stiffness * angle + damping * rate
     if abs(moment) > most:
@@ -91,7 +91,7 @@ def _twisting(
 
 @inlined
 def _slip(u: Vector, un: float, n: Vector, arm: Vector) -> Vector:
-    """Relative velocity of the contact points across the normal.
+    """Tangential part of the relative velocity of the contact points.
 
     `u` is that of the centres, `un` its part along the normal `n`, `arm` the sum ``l_i w_i + l_j w_j``.
     """

@@ -12,7 +12,7 @@ from flybystab.typing import Array
 def _row(
     i: int, px: Array, py: Array, pz: Array, m: Array, ax: Array, ay: Array, az: Array
 ) -> tuple[float, float, float]:
-    """Pull of the grains after `i` on it; their pull by it is added to ``ax, ay, az``."""
+    """Acceleration of grain `i` by the grains after it; those of these by `i` are added to ``ax, ay, az``."""
     x, y, z, mi = px[i], py[i], pz[i], m[i]
     sx = sy = sz = 0.0
     for j in range(np.uint64(i + 1), np.uint64(px.shape[0])):
@@ -31,7 +31,7 @@ def _row(
 
 @kernel
 def direct_sum(p: Array, mass: Array, out: Array) -> None:
-    """Accelerations ``out[3, n]`` of point masses at ``p[3, n]``, G = 1; no two of them at one place."""
+    """Accelerations ``out[3, n]`` of point masses at ``p[3, n]``, G = 1; no two of them at the same point."""
     out[:] = 0.0
     for i in range(mass.shape[0]):
         x, y, z = _row(i, p[0], p[1], p[2], mass, out[0], out[1], out[2])
@@ -42,7 +42,7 @@ def direct_sum(p: Array, mass: Array, out: Array) -> None:
 
 @kernel
 def potential_energy(x: Array, mass: Array) -> float:
-    """Energy of self-gravity of point masses at ``x[n, 3]``, G = 1; lost ones have no mass."""
+    """Energy of self-gravity of point masses at ``x[n, 3]``, G = 1; removed grains have zero mass."""
     total = 0.0
     n = mass.shape[0]
     for i in range(n):

@@ -2,8 +2,8 @@
 
 Velocities are those of half a step before the positions. Contact forces use velocities predicted to the time of the
 positions, so that the dissipation is of second order in the step. Gravity is evaluated every few steps, at positions
-predicted to the middle of that interval (otherwise its lag exerts a torque), and kept constant in between; the tide is
-evaluated at every step.
+predicted to the middle of that interval (a delay would cause a spurious torque), and kept constant in between; the tide
+is evaluated at every step.
 """
 
 from __future__ import annotations
@@ -28,13 +28,13 @@ DONE, NO_ROOM, NOT_FINITE = 0, 1, 2
 
 
 class Loads(NamedTuple):
-    """What acts on the grains besides their contacts and their gravity.
+    """External forces on the grains, besides contacts and mutual gravity.
 
     Attributes
     ----------
     tide : TidePanels
     ground : Ground
-        Surface of the planet, which takes grains out; no panels for none.
+        Surface of the planet, at which grains are removed; without panels there is none.
     pull : ndarray (4,)
         Strength of a central field and ``1/a_i^2`` of its level surfaces; strength zero for none.
     drag : float
@@ -59,9 +59,9 @@ class Scheme(NamedTuple):
     skin : float
         Skin of the neighbour list.
     gravity : bool
-        Whether the grains attract each other.
+        True if the grains attract each other.
     theta : float
-        Opening of the tree that sums gravity (:mod:`flybystab.core.grains.tree`); zero for the direct sum.
+        Opening angle of the tree that sums gravity (:mod:`flybystab.core.grains.tree`); zero for the direct sum.
     """
 
     dt: float
@@ -114,7 +114,7 @@ def _mean_spin(g: Grains, out: Array) -> None:
 
 @kernel
 def _moved(g: Grains, p: Pairs, spin: Array, since: float, limit: float) -> bool:
-    """Whether a grain is further than `limit` from where the rotation `spin` would have taken it."""
+    """True if a grain is further than `limit` from its position in the list, rotated at `spin` for the time `since`."""
     rate = np.sqrt(spin[0] ** 2 + spin[1] ** 2 + spin[2] ** 2)
     q = np.eye(3)
     if rate > 0.0:
@@ -152,7 +152,7 @@ def _planet(t: float, ground: Ground, out: Array) -> None:
 
 @kernel
 def _land(g: Grains, t: float, ground: Ground, where: Array) -> int:
-    """Take out the grains that have reached the ground at the time `t`; returns how many."""
+    """Remove the grains that have reached the ground at the time `t`; returns their number."""
     _planet(t, ground, where)
     count = 0
     for i in range(g.mass.shape[0]):
@@ -242,7 +242,7 @@ def advance(
     ledger : ndarray (2,) or (0,)
         See :func:`flybystab.core.grains.contact.contact_forces`.
     count : ndarray (2,)
-        Added to: neighbour lists made, grains lost on the ground.
+        Added to: number of neighbour lists built, of grains removed at the ground.
 
     Returns
     -------

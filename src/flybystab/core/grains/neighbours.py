@@ -1,8 +1,8 @@
 """Neighbour lists: pairs of grains that may touch, with the history of their contacts.
 
-The list holds every pair closer than the sum of the radii plus a skin. It is made anew, from a hashed grid of cells,
-when a grain has moved by a share of the skin relative to the rotation that the pile had when the list was made: a
-rigid rotation changes no distance. History goes over to the new list.
+The list holds every pair closer than the sum of the radii plus a skin. It is rebuilt, from a hashed grid of cells, when
+a grain has moved by a given fraction of the skin relative to a rigid rotation, which changes no distance, at the spin
+of the pile when the list was built. The contact history is copied to the new list.
 """
 
 from __future__ import annotations
@@ -22,27 +22,27 @@ Index = NDArray[np.int64]
 N_SPRING = 7
 #: Skin, in mean radii.
 SKIN = 0.15
-#: Share of the skin that a grain may move before the list is made anew; two grains use up to twice this.
+#: Fraction of the skin that a grain may move before the list is rebuilt; a pair approaches by up to twice this.
 MOVED = 0.45
 
 
 class Pairs(NamedTuple):
-    """Half neighbour list in compressed rows, and scratch to make it anew.
+    """Half neighbour list in compressed rows, and scratch to rebuild it.
 
     Attributes
     ----------
     first : ndarray (n + 1,)
-        Where the neighbours ``j > i`` of grain ``i`` begin in `other`.
+        Index in `other` of the first neighbour ``j > i`` of grain ``i``.
     other : ndarray (capacity,)
         Neighbours.
     spring : ndarray (capacity, 7)
         History; zero for pairs apart.
     touching : ndarray (capacity,)
-        Whether a pair was in contact at the last step.
+        True for a pair in contact at the last step.
     constant : ndarray (capacity, 2)
         Patch radius ``beta R`` and square root of the reduced mass.
     origin : ndarray (n, 3)
-        Positions when the list was made.
+        Positions when the list was built.
     """
 
     first: Index
@@ -89,7 +89,7 @@ def _slot(a: int, b: int, c: int, size: int) -> int:
 
 @kernel
 def find_pairs(g: Grains, beta: float, skin: float, p: Pairs) -> bool:
-    """Make the list anew, keeping the history of pairs that stay; False if there is no room for them."""
+    """Rebuild the list, with the history of pairs that were in it before; False if its capacity is exceeded."""
     n = g.radius.shape[0]
     last = p.first[n]
     p.old_first[:] = p.first
@@ -141,7 +141,7 @@ def find_pairs(g: Grains, beta: float, skin: float, p: Pairs) -> bool:
 
 @kernel
 def _add(g: Grains, beta: float, p: Pairs, i: int, j: int, at: int) -> None:
-    """Write a pair at a place of the list, with its history if it has one."""
+    """Write a pair at the position `at` of the list, with its history if it has one."""
     p.other[at] = j
     p.constant[at, 0] = beta * g.radius[i] * g.radius[j] / (g.radius[i] + g.radius[j])
     p.constant[at, 1] = np.sqrt(g.mass[i] * g.mass[j] / (g.mass[i] + g.mass[j]))

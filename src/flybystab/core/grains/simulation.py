@@ -82,7 +82,7 @@ class Simulation:
         Raises
         ------
         NotConverged
-            A value is not finite, or the neighbours of a grain are too many.
+            A value is not finite, or a grain has too many neighbours.
         """
         steps = max(1, round(duration / self.dt))
         every = max(1, round(self.gravity_interval / self.dt))
@@ -125,11 +125,11 @@ class Simulation:
             a[:] -= m @ a
 
     def kinetic_energy(self) -> float:
-        """Of translation and rotation, with the velocities at the time of the positions."""
+        """Kinetic energy of translation and rotation, with the velocities at the time of the positions."""
         g = self.grains
         spin = 0.4 * g.mass * g.radius**2
         return float(0.5 * (g.mass @ (self.u**2).sum(axis=1) + spin @ (self.s**2).sum(axis=1)))
 
     def potential_energy(self) -> float:
-        """Of self-gravity."""
+        """Potential energy of self-gravity."""
         return float(potential_energy(self.grains.x, self.grains.mass))

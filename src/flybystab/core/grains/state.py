@@ -1,9 +1,8 @@
 """Grains and contact parameters, as passed to the kernels.
 
-Units are scaled: the gravitational constant, the mass of the pile and its volume-equivalent radius
-``R = (a1 a2 a3)^(1/3)`` are one, so that the unit of time is ``sqrt(R^3/(G M)) = (4/3 pi G rho)^(-1/2)``. A pile
-without cohesion then has neither size nor density. Velocities are those of the leapfrog, half a step behind the
-positions.
+Units are scaled: the gravitational constant, the mass of the pile and its volume-equivalent radius ``R = (a1 a2
+a3)^(1/3)`` are one, so that the unit of time is ``sqrt(R^3/(G M)) = (4/3 pi G rho)^(-1/2)``. A pile without cohesion
+then has no further scale (size or density). Velocities are those of the leapfrog, half a step behind the positions.
 """
 
 from __future__ import annotations
@@ -32,7 +31,7 @@ class Grains(NamedTuple):
     x, v, w : ndarray (n, 3)
         Positions, and velocities and angular velocities half a step earlier.
     radius, mass : ndarray (n,)
-        A grain of mass zero is lost: it takes part in nothing.
+        A grain of mass zero has been removed: it has no contacts, no gravity and no motion.
     """
 
     x: Array
@@ -78,7 +77,7 @@ def damping(restitution: float, stiffness: float) -> float:
     """Damping coefficient over ``sqrt(reduced mass)`` of a linear contact with a coefficient of restitution.
 
     A contact that ends with zero overlap separates at ``exp(-pi zeta/sqrt(1 - zeta^2))`` of the speed of approach,
-    ``zeta`` the damping ratio (Cundall & Strack 1979); zero restitution is not reached by a linear spring.
+    ``zeta`` the damping ratio (Cundall & Strack 1979). A linear spring cannot have zero restitution.
     """
     logarithm = np.log(restitution)
     return float(-2.0 * logarithm * np.sqrt(stiffness) / np.hypot(np.pi, logarithm))

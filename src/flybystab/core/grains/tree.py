@@ -1,11 +1,11 @@
 """Self-gravity of many grains by a tree (Barnes & Hut 1986) with quadrupoles.
 
-Grains are halved along the longest extent until a leaf has at most :data:`LEAF`. A leaf walks the tree as a group: a
-node of size ``b`` (largest distance of a grain from its centre of mass) acts as a multipole where
-``b < theta (d - b_leaf)``, ``d`` the distance of the centres of mass; otherwise it is opened, leaves grain by grain.
-The truncation leaves an octupole, so that the error goes about as ``theta^4``. The sum does not obey action and
-reaction; what it adds to the momentum and to the angular momentum of all grains is taken out by a small change of the
-accelerations (without that a pile slowly spins up).
+The grains of a node are halved along its longest extent until a leaf has at most :data:`LEAF`. The tree is traversed
+once for each leaf: a node of size ``b`` (largest distance of a grain from its centre of mass) acts as a multipole if
+``b < theta (d - b_leaf)``, ``d`` the distance of the centres of mass; otherwise its children, or the grains of a leaf,
+are used. The first neglected term is the octupole, so that the error scales about as ``theta^4``. The sum violates
+Newton's third law; the resulting net force and torque are removed by a small change of the accelerations (otherwise a
+pile slowly spins up).
 """
 
 from __future__ import annotations
@@ -136,7 +136,7 @@ def _moments(s: Array, first: int, last: int, out: Array) -> None:
 
 @summing_kernel
 def _pull_of_grains(x: float, y: float, z: float, q: Array, count: int) -> tuple[float, float, float]:
-    """Acceleration at a place by the grains ``q[:4, :count]``; one at that place does not count."""
+    """Acceleration at a point by the grains ``q[:4, :count]``; a grain at that point is left out."""
     ax = ay = az = 0.0
     qx, qy, qz, qm = q[0], q[1], q[2], q[3]
     for j in range(np.uint64(count)):
@@ -153,7 +153,7 @@ def _pull_of_grains(x: float, y: float, z: float, q: Array, count: int) -> tuple
 
 @summing_kernel
 def _pull_of_nodes(x: float, y: float, z: float, q: Array, count: int) -> tuple[float, float, float]:
-    """Acceleration at a place by the multipoles ``q[:10, :count]``: mass, centre, quadrupole."""
+    """Acceleration at a point by the multipoles ``q[:10, :count]``: mass, centre, quadrupole."""
     ax = ay = az = 0.0
     qm, qx, qy, qz = q[0], q[1], q[2], q[3]
     q0, q1, q2, q3, q4, q5 = q[4], q[5], q[6], q[7], q[8], q[9]
@@ -174,11 +174,11 @@ def _pull_of_nodes(x: float, y: float, z: float, q: Array, count: int) -> tuple[
 
 @kernel
 def _balance(p: Array, mass: Array, out: Array) -> None:
-    """Change the accelerations `out` so that no force and no torque is left over.
+    """Change the accelerations `out` so that the net force and torque vanish.
 
-    The change is ``w (f + c x r)`` with ``w = 1/(1 + (r/s)^4)``, ``s`` the mean distance from the centre of mass: small
-    beside the acceleration itself for far debris too. With ``r`` from the centre of the masses weighted by ``w`` force
-    and torque are decoupled.
+    The change is ``w (f + c x r)`` with ``w = 1/(1 + (r/s)^4)``, ``s`` the mean distance from the centre of mass, so
+    that it is small compared with the acceleration itself, also far away. With ``r`` from the centre of the masses
+    weighted by ``w``, force and torque are decoupled.
     """
     n = mass.shape[0]
     total = 0.0
@@ -243,7 +243,7 @@ def _balance(p: Array, mass: Array, out: Array) -> None:
 
 @kernel
 def tree_sum(p: Array, mass: Array, theta: float, out: Array) -> None:
-    """Accelerations ``out[3, n]`` of point masses at ``p[3, n]``, G = 1, by a tree with the opening `theta`.
+    """Accelerations ``out[3, n]`` of point masses at ``p[3, n]``, G = 1, by a tree with the opening angle `theta`.
 
     Those without mass neither attract nor are attracted.
     """

@@ -22,9 +22,10 @@ def fade_start(material: MaterialParameters) -> float:
 
 @kernel
 def fade_share(volume: float, end: float) -> tuple[float, float]:
-    """Fraction of the dilatancy left at ``V/V0``, and its derivative: a cubic over the last tenth of the expansion.
+    """Fraction of the dilatancy that remains at ``V/V0``, and its derivative.
 
-    `end` is the ``V/V0`` at which dilation has ended: a critical state reached smoothly.
+    It falls from 1 to 0 as the cubic ``1 - x^2 (3 - 2 x)`` over the last tenth of the expansion up to `end`, the
+    ``V/V0`` of the critical state. Its first derivative is continuous.
     """
     begin = end - 0.1 * (end - 1.0)
     if volume <= begin:
@@ -37,9 +38,9 @@ def fade_share(volume: float, end: float) -> tuple[float, float]:
 
 @kernel
 def dilatancy(volume: float, material: MaterialParameters) -> tuple[float, float]:
-    """``beta`` and ``d beta/dV`` at ``V/V0``: constant, then faded to zero (:func:`fade_share`).
+    """``beta`` and ``d beta/dV`` at ``V/V0``: constant up to `fade_start`, then falling to zero (`fade_share`).
 
-    For flow along the normal, the fraction of the associative dilation ``m(D')``.
+    For associative flow ``beta`` is the fraction of the associative dilation ``m(D')``.
     """
     share, slope = fade_share(volume, material.expansion)
     return material.beta * share, material.beta * slope
@@ -92,5 +93,5 @@ def isotropic(a: float, b: float, u: Array, n: Array) -> None:
 
 @kernel
 def dilation(beta: float, norm: float, support: float, material: MaterialParameters) -> float:
-    """``tr D`` of the flow rule: ``beta |D'|``, or for flow along the normal the fraction `beta` of ``m(D')``."""
+    """``tr D`` of the flow rule: ``beta |D'|``, or for associative flow the fraction `beta` of ``m(D')``."""
     return beta * norm * (support * material.sin_phi if material.normal else 1.0)

@@ -15,20 +15,20 @@ from flybystab.core.numerics.jit import kernel
 from flybystab.core.numerics.tensors import deviator, pack
 from flybystab.typing import Array
 
-#: Lode angle, rad, by which ``D`` may lie beyond the fan of a corner, and fraction of a face that counts as its end:
-#: switches are located no better, and it is far below any other error.
+#: Lode angle, rad, by which ``D`` may lie outside the fan of a corner, and fraction of a face that counts as its end.
+#: Switches are located to about this accuracy; other errors are much larger.
 SLACK = 1e-9
 
 
 @kernel
 def on_hexagon(material: MaterialParameters) -> bool:
-    """Whether the stress of a flow lies on a face or at a corner."""
+    """True for associative flow on a hexagon, whose stress lies on a face or at a corner."""
     return material.normal and is_hexagon(material.surface)
 
 
 @kernel
 def part_of_flow(
-    beyond: float, place: float, near: float, material: MaterialParameters
+    beyond: float, place: float, angle_tolerance: float, material: MaterialParameters
 ) -> MaterialParameters:
     """The material with the stress on the part of the hexagon (face or corner) where the flow rule puts it.
 
@@ -37,19 +37,19 @@ def part_of_flow(
     beyond : float
         Lode angle of ``D`` beyond the normal of the face, rad.
     place : float
-        Place on the face, from 0 (extension corner) to 1, of the stress that keeps ``D`` normal to it.
-    near : float
-        Angle, rad, within which ``D`` counts as normal to the face.
+        Position on the face, from 0 (extension corner) to 1, of the stress that keeps ``D`` normal to it.
+    angle_tolerance : float
+        Lode angle, rad, within which ``D`` counts as normal to the face.
     """
-    if abs(beyond) <= near:
-        # A stress at the very end of the face belongs to the corner: it may have just come there along the face, and
-        # chosen again the face would end in a step of no length.
+    if abs(beyond) <= angle_tolerance:
+        # A stress within SLACK of the end of the face counts as at the corner: after a switch from the face to the
+        # corner, the face would otherwise be chosen again and end after a step of zero length.
         if SLACK <= place <= 1.0 - SLACK:
             return on_part(material, FACE, material.fan_limit)
         compression = place > 0.5
     else:
         compression = beyond > 0.0
-    # The stress stays at a corner while D is in its fan, or no further out of it than now and the slack.
+    # The stress stays at a corner while D is outside its fan by at most the present angle plus SLACK.
     fan_limit = SLACK + max(0.0, -beyond if compression else beyond)
     return on_part(material, COMPRESSION_CORNER if compression else EXTENSION_CORNER, fan_limit)
 
@@ -66,9 +66,9 @@ def restore_flow_rule(
 ) -> bool:
     """Remove the deviation from the flow rule that integration errors leave in a rate of strain ``d[6]``.
 
-    ``tr D`` is reset where it is off by more than `slack`, and on a face ``D`` is turned onto the normal: the motion
-    keeps both deviations constant while ``|D'|`` falls. Returns whether `d` was changed; ``unit[6]`` and ``n[3, 3]``
-    are scratch.
+    ``tr D`` is reset where its error exceeds `slack`, and on a face ``D'`` is rotated onto the normal: the equations of
+    motion keep both errors constant, so that relative to ``|D'|`` they would grow towards rest. Returns True if `d` was
+    changed; ``unit[6]`` and ``n[3, 3]`` are scratch.
     """
     turned = material.part == FACE and abs(beyond) > SLACK
     if turned:

@@ -40,7 +40,8 @@ class MaterialParameters(NamedTuple):
     part : int
         Part of the yield section on which the stress lies.
     fan_limit : float
-        Angle beyond the normal of a Mohr-Coulomb face, rad, up to which the stress stays at a corner.
+        Lode angle, rad, by which ``D`` may lie beyond the normal of the face, outside the fan of the corner, while the
+        stress stays at the corner.
     """
 
     surface: int
@@ -61,8 +62,8 @@ def material_parameters(
 ) -> MaterialParameters:
     """Parameters from the friction angle (rad), `cohesion` and `viscosity` in the units of the body.
 
-    `dilatancy` is ``beta/min k``. Associative flow on a slope ``k(theta)`` follows the normal of the yield surface;
-    less dilatant flow the stress deviator.
+    `dilatancy` is ``beta/min k``. Associative flow on a slope ``k(theta)`` is along the normal of the yield surface;
+    for a smaller dilatancy ``D'`` is along the stress deviator.
     """
     normal = dilatancy >= 1.0 and not is_circular(surface)
     beta = 1.0 if normal else dilatancy * least_slope(surface, np.sin(phi))
@@ -81,7 +82,7 @@ def without_cohesion(m: MaterialParameters) -> MaterialParameters:
 
 @kernel
 def with_friction(m: MaterialParameters, sin_phi: float) -> MaterialParameters:
-    """The material with another slope ``sin(phi)``; its strength at zero pressure stays."""
+    """The material with another ``sin(phi)`` and the same strength ``c cos(phi)`` at zero pressure."""
     return MaterialParameters(
         m.surface, sin_phi, m.cos_phi, m.beta, m.normal, m.cohesion, m.viscosity, m.expansion, m.part,
         m.fan_limit,

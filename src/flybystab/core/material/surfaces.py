@@ -56,7 +56,7 @@ SURFACES = (
 #: Names in the order of their codes.
 NAMES = tuple(surface.name for surface in SURFACES)
 
-#: Yield surface of a material by default: the one that discrete elements confirm.
+#: Default yield surface of a material: the one that agrees with discrete-element simulations.
 DEFAULT = "mohr-coulomb"
 
 

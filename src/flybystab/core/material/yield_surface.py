@@ -14,9 +14,9 @@ The surfaces are the rows of one table, :mod:`flybystab.core.material.surfaces`,
 
 An unknown code is an error in every kernel.
 
-Associative flow needs the yield section from the side of the rate of strain: the stress deviator whose normal a
-given ``D'`` is (`normal`), and the dilation ``tr D = m(D')`` that goes with it, ``m`` the support function of the
-section. Both are written with the gauge ``gamma = sin(phi)/k``: the section is ``|s| gamma(theta) <= p sin(phi)``
+Associative flow needs the inverse of the normal map: the stress deviator at which ``D'`` is the normal of the section
+(`normal`), and the dilation ``tr D = m(D')`` of the flow rule, ``m`` the support function of the section. Both are
+expressed by the gauge ``gamma = sin(phi)/k``: the section is ``|s| gamma(theta) <= p sin(phi)``
 (+ ``Y cos(phi)``), its normal at ``theta`` is turned by ``atan(gamma'/gamma)`` from the radius, and convexity is
 ``gamma + gamma'' >= 0``.
 """
@@ -80,13 +80,13 @@ def family(surface: int) -> int:
 
 @kernel
 def is_hexagon(surface: int) -> bool:
-    """Whether the yield section is a hexagon, whose associative flow has faces and corners."""
+    """True if the yield section is a hexagon, with faces and corners."""
     return family(surface) == HEXAGON
 
 
 @kernel
 def is_circular(surface: int) -> bool:
-    """Whether the slope of a surface does not depend on the Lode angle."""
+    """True if the slope of a surface does not depend on the Lode angle."""
     return family(surface) == CONE
 
 
@@ -169,10 +169,10 @@ def _turned(theta: float, s3: float, c3: float, angle: float) -> tuple[float, fl
 
 @kernel
 def corner(sin_phi: float, det: float, extension: bool) -> tuple[float, float, float, float, float]:
-    """As `normal`, with the stress at one of the corners of Mohr-Coulomb whatever the direction of ``u``.
+    """As `normal`, with the stress at a given corner of Mohr-Coulomb for any direction ``u``.
 
-    Right in the fan of normals of that corner (for extension: Lode angles of ``u`` below that of the face); its
-    smooth continuation beyond.
+    Correct within the fan of normals of that corner (for extension: Lode angles of ``u`` below that of the normal of
+    the face); outside it the formulas are continued smoothly.
     """
     s3 = min(1.0 - 5e-13, max(5e-13 - 1.0, -3.0 * SQRT6 * det))
     c3 = np.sqrt(1.0 - s3 * s3)
@@ -185,18 +185,18 @@ def corner(sin_phi: float, det: float, extension: bool) -> tuple[float, float, f
 
 @kernel
 def beyond_face(sin_phi: float, det: float) -> float:
-    """Lode angle, rad, of a rate of strain less that of the normal of a Mohr-Coulomb face.
+    """Lode angle, rad, of a rate of strain minus that of the normal of a Mohr-Coulomb face.
 
-    Positive in the fan of the compression corner, negative in that of the extension corner.
+    It is positive in the fan of the compression corner, negative in that of the extension corner.
     """
     return lode_angle(det) + np.arctan(sin_phi / SQRT3)
 
 
 @kernel
 def onto_face(sin_phi: float, det: float) -> tuple[float, float, float]:
-    """Coefficients of ``u`` and ``u^2 - 1/3`` in the normal of a Mohr-Coulomb face nearest to a unit deviator ``u``.
+    """Coefficients of ``u`` and ``u^2 - 1/3`` in the normal of the Mohr-Coulomb face closest to a unit deviator ``u``.
 
-    With the determinant of that normal.
+    The third number is the determinant of that normal.
     """
     s3 = min(1.0 - 5e-13, max(5e-13 - 1.0, -3.0 * SQRT6 * det))
     a, b = _turned(np.arcsin(s3) / 3.0, s3, np.sqrt(1.0 - s3 * s3), -beyond_face(sin_phi, det))
@@ -212,9 +212,9 @@ def normal(surface: int, sin_phi: float, det: float) -> tuple[float, float, floa
     of that stress.
 
     Smooth sections: the root of ``gamma' cos(y) - gamma sin(y) = 0`` with ``y`` = (Lode angle of u) - theta is unique,
-    since this grows with theta for a convex section. Mohr-Coulomb: a corner, see `corner`; in the one direction
-    that is normal to a face, ``theta = -atan(sin(phi)/sqrt3)``, the support is right and the stress is one end
-    of the face.
+    since the left-hand side increases with theta for a convex section. Mohr-Coulomb: a corner (`corner`). For ``u``
+    normal to a face, at the Lode angle ``-atan(sin(phi)/sqrt3)``, the stress is not unique: its value at one end of the
+    face is returned; the support is the same for all.
     """
     if family(surface) == HEXAGON:
         return corner(sin_phi, det, beyond_face(sin_phi, det) <= 0.0)
@@ -252,8 +252,8 @@ def normal(surface: int, sin_phi: float, det: float) -> tuple[float, float, floa
 def flow_direction(surface: int, sin_phi: float, det: float) -> tuple[float, float, float]:
     """Normal of the yield section at a stress whose unit deviator ``u`` has determinant `det`.
 
-    Returns ``a, b, m/sin(phi)``: the unit normal is ``a u + b (u^2 - 1/3)``, ``m`` the support. At a corner the
-    middle of the fan, which is ``u`` itself.
+    Returns ``a, b, m/sin(phi)``: the unit normal is ``a u + b (u^2 - 1/3)``, ``m`` the support. At a corner
+    the normal is the middle of the fan, which is ``u`` itself.
     """
     s3 = min(1.0, max(-1.0, -3.0 * SQRT6 * det))
     c3 = np.sqrt(1.0 - s3 * s3)
@@ -268,7 +268,7 @@ def flow_direction(surface: int, sin_phi: float, det: float) -> tuple[float, flo
 
 @kernel
 def least_slope(surface: int, sin_phi: float) -> float:
-    """Smallest ``k`` over the Lode angle: the largest dilatancy that creates no energy."""
+    """Smallest ``k`` over the Lode angle: the largest dilatancy with non-negative dissipation for all directions."""
     kind = family(surface)
     if kind == CONE:
         return 2.0 * SQRT6 * sin_phi / (3.0 - _CONE[surface] * sin_phi)
@@ -281,7 +281,7 @@ def least_slope(surface: int, sin_phi: float) -> float:
 
 @kernel
 def _largest_gauge(surface: int, sin_phi: float) -> float:
-    """Largest ``gamma`` of a GENERAL surface over the Lode angle: samples, then golden section beside the largest."""
+    """Largest ``gamma`` of a GENERAL surface over the Lode angle: samples, then golden section around the largest."""
     n = 60
     spacing = np.pi / (3.0 * n)
     best = 0
@@ -339,7 +339,7 @@ def required_friction(surface: int, cohesion: float, s: float, p: float, det: fl
                 return np.inf
             tan2 = (9.0 - 1.5 * k * k - 9.0 * i3) / (8.0 * i3)
             return np.arctan(np.sqrt(max(0.0, tan2)))
-        # Cohesion counts for less as phi grows, so that a stress may be borne on an interval of phi only.
+        # Y cos(phi) falls as phi grows: with cohesion the admissible phi may form a bounded interval.
         if _bears(surface, 0.0, cohesion, s, p, det):
             return 0.0
         step = 0.5 * np.pi * (1.0 - 1e-4) / 128.0  # tan^2 must stay finite

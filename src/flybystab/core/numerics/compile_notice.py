@@ -17,7 +17,7 @@ from numba.misc.appdirs import AppDirs
 from flybystab.core.numerics.jit import CACHE
 
 WORDS = "flybystab: compiling numerical kernels, once on this machine (about a minute) ...\n"
-#: Where the package cannot be written, and where the user's cache folder cannot either.
+#: Notices if the folder of the package, or also the user's cache folder, is not writable.
 KEPT = "flybystab: compiling numerical kernels (about a minute), once; they are kept in {folder} ...\n"
 NOT_KEPT = (
     "flybystab: compiling numerical kernels (about a minute) for this process only: neither the package nor the user's "
@@ -26,7 +26,7 @@ NOT_KEPT = (
 
 
 def words() -> str:
-    """The notice: where the kernels are kept, if not beside their sources."""
+    """Text of the notice, with the folder of the kernels if it is not that of their sources."""
     if not CACHE:
         return NOT_KEPT
     if folder := os.environ.get("NUMBA_CACHE_DIR"):
@@ -82,6 +82,6 @@ def install() -> None:
 
 
 def uninstall() -> None:
-    """Undo :func:`install`: the shell has a notice of its own, and none with ``--json``."""
+    """Undo :func:`install`; for the shell, which shows its own notice, or none with ``--json``."""
     if _INSTALLED:
         event.unregister("numba:compile", _INSTALLED.pop())

@@ -1,7 +1,7 @@
 """DOP853, the explicit Runge-Kutta method of Dormand & Prince of order 8(5,3).
 
 Hairer, Norsett & Wanner (1993), section II.5, with dense output of order 7; coefficients as tabulated in SciPy. The
-combinations of the stages are pasted into their callers, where they follow the floating-point flags of the caller.
+combinations of the stages are inlined into their callers and compiled with the floating-point flags of the caller.
 """
 
 from __future__ import annotations
@@ -26,8 +26,8 @@ N_POWERS = 7
 def coefficients() -> Any:
     """Coefficients A, C, E3, E5 and D of the method in SciPy.
 
-    They are read from the file that has them, if it is where it has been since SciPy 1.4: the package
-    ``scipy.integrate`` takes 0.2 s to import.
+    They are read from the file in which SciPy has kept them since version 1.4, if it is there: importing
+    ``scipy.integrate`` takes 0.2 s.
     """
     scipy = find_spec("scipy")
     for folder in (scipy and scipy.submodule_search_locations) or ():

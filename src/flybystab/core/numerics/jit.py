@@ -1,13 +1,13 @@
-"""The one way in which the package compiles a kernel.
+"""Decorators by which the package compiles its kernels.
 
 ``kernel`` is ``numba.njit`` with the on-disk cache, without the GIL and with IEEE division (a zero
 divisor gives inf or nan, which the callers test for, instead of an exception inside a kernel).
 ``fastmath`` stays off: compensated sums and sign tests rely on the order of operations. ``summing_kernel`` is for
 the few inner loops that are plain sums: there the compiler may reorder additions and fuse products, which lets it
-use vector instructions; infinities and nan keep their meaning. ``pasted_kernel`` is one that is pasted into its
-caller. A kernel on disk is compiled anew when any file that it is made from has changed
-(:mod:`flybystab.core.numerics.kernel_cache`). Where the cache
-cannot be written anywhere (read-only package and home) each process compiles for itself.
+use vector instructions; infinities and nan are still handled. ``pasted_kernel`` is a kernel that is inlined into its
+callers. A kernel on disk is recompiled when any file from which it is compiled has changed
+(:mod:`flybystab.core.numerics.kernel_cache`). If no folder for the cache is writable (read-only package and home) each
+process compiles for itself.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ watch()
 
 
 def _cacheable() -> bool:
-    """Whether numba finds a place for its cache; it refuses to define a cached kernel where it does not."""
+    """True if numba finds a folder for its cache; without one it refuses to define a cached kernel."""
     try:
         njit(cache=True)(lambda: 0)
     except RuntimeError:
@@ -34,7 +34,7 @@ def _cacheable() -> bool:
     return True
 
 
-#: Whether compiled kernels are kept on disk.
+#: True if compiled kernels are kept on disk.
 CACHE = _cacheable()
 kernel = njit(cache=CACHE, nogil=True, error_model="numpy")
 #: For kernels that are made from others at run time, which numba cannot keep on disk; they become part of the cached
@@ -42,7 +42,7 @@ kernel = njit(cache=CACHE, nogil=True, error_model="numpy")
 uncached_kernel = njit(nogil=True, error_model="numpy")
 _SUMS: Any = {"fastmath": {"reassoc", "contract", "nsz"}}
 summing_kernel = njit(cache=CACHE, nogil=True, error_model="numpy", **_SUMS)
-# Passing a tuple of arrays to a function costs more than the few sums inside it.
+# Inlined, since passing a tuple of arrays to a function costs more than the few sums inside it.
 pasted_kernel = njit(cache=CACHE, nogil=True, error_model="numpy", inline="always", **_SUMS)
 
 #: A kernel that becomes part of its callers, so that large kernels which it calls are not compiled once more for it.
@@ -63,7 +63,7 @@ def _borrowed(context, array):  # type: ignore[no-untyped-def]
     return array(array), generate
 
 
-#: Inside a kernel: the same array without its reference count. Counting costs an atomic instruction at each use,
-#: which is most of the time of a loop over bodies. Only an argument may be borrowed, as its caller keeps it alive: a
-#: local array is freed after its last use, and its memory is given to the next one.
+#: Inside a kernel: the same array without reference counting, which costs an atomic instruction at each use and most of
+#: the time of a loop over bodies. Use it for arguments only, which the caller keeps alive: a local array would be freed
+#: after its last counted use, and its memory reused.
 borrowed: Any = (lambda array: array) if getattr(config, "DISABLE_JIT", 0) else intrinsic(_borrowed)

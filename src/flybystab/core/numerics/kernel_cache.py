@@ -1,9 +1,9 @@
-"""When a compiled kernel on disk is out of date.
+"""Invalidation of compiled kernels on disk.
 
 numba keeps a kernel until the file that defines it changes. A kernel also contains the kernels that it calls, with
-their constants, from other files: after an update of the package it could run code of the previous version. Here the
+their constants, from other files: after an update of the package, code of the previous version could run. Here the
 stamp of a kernel of this package is the digest of all files from which it is compiled. An index of kernels that names
-a class which the updated package no longer has is out of date too.
+a class which no longer exists counts as out of date, too.
 
 The environment variable FLYBYSTAB_KERNELS names a folder in which installations share their kernels: there a kernel is
 found by its stamp, not by the place of its source. numba itself loads a kernel only with the version that compiled it
@@ -137,7 +137,7 @@ class _Shared(InTreeCacheLocator):
         return super().from_function(py_func, py_file) if os.environ.get("FLYBYSTAB_KERNELS") else None
 
     def ensure_cache_path(self) -> None:
-        """Mark this version of the kernels as used, and remove those that have not been used for longest."""
+        """Mark this version of the kernels as used, and remove the least recently used ones."""
         super().ensure_cache_path()
         os.utime(self._cache_path)
         versions = sorted(Path(self._cache_path).parent.iterdir(), key=lambda p: p.stat().st_mtime)

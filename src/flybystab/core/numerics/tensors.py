@@ -1,7 +1,7 @@
 """Small-tensor algebra for the kernels.
 
-A symmetric tensor is six numbers ``xx, yy, zz, xy, xz, yz``; a matrix is a (3, 3) array. Everything works
-in place on buffers of the caller, so that the loops allocate nothing.
+A symmetric tensor is six numbers ``xx, yy, zz, xy, xz, yz``; a matrix is a (3, 3) array. All functions
+write to buffers of the caller, so that loops do not allocate memory.
 """
 
 from __future__ import annotations
@@ -143,7 +143,7 @@ def eigensystem(c: Array, values: Array, vectors: Array) -> None:
 
 @kernel
 def _rotation(app: float, aqq: float, apq: float) -> tuple[float, float, float]:
-    """Cosine, sine and tangent of the rotation that clears ``apq``."""
+    """Cosine, sine and tangent of the rotation that makes ``apq`` zero."""
     theta = 0.5 * (aqq - app) / apq
     t = 1.0 / (abs(theta) + np.sqrt(theta * theta + 1.0))
     if theta < 0.0:

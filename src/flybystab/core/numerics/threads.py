@@ -20,7 +20,7 @@ _active: set[ThreadPoolExecutor] = set()
 
 
 def _warn_before_fork() -> None:
-    """Warn of a fork while threads compute: locks that they hold stay locked in the child, which may hang."""
+    """Warn of a fork while threads compute: locks held by threads stay locked in the child, which may hang."""
     if _active:
         warnings.warn(
             "this process forks while threads of flybystab compute: the child may hang. Start processes by spawn "
@@ -35,7 +35,7 @@ if hasattr(os, "register_at_fork"):
 
 
 def in_order(work: Callable[[T], R], tasks: Iterable[T], threads: int) -> Iterator[R]:
-    """Results of ``work(task)`` in the order of the tasks; an exception (or Ctrl-C) drops those not begun."""
+    """Results of ``work(task)`` in the order of the tasks; an exception (or Ctrl-C) cancels those not started."""
     tasks = list(tasks)
     if threads < 2 or len(tasks) < 2:
         yield from map(work, tasks)

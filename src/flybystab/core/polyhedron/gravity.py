@@ -26,7 +26,7 @@ Integers = NDArray[np.int64]
 def solid_angle(a: Array, b: Array, c: Array) -> float:
     """Signed solid angle, sr, of the triangle ``a b c`` seen from the origin (Van Oosterom & Strackee 1983).
 
-    Positive where the triangle turns its back to the origin: its normal points away.
+    Positive if its normal points away from the origin.
     """
     la = np.sqrt(a[0] * a[0] + a[1] * a[1] + a[2] * a[2])
     lb = np.sqrt(b[0] * b[0] + b[1] * b[1] + b[2] * b[2])

@@ -173,7 +173,7 @@ def borrowed_field(f: Field) -> Field:
 def _pull(
     p: Array, slots: int, gm: Array, inner: Array, x: float, y: float, z: float
 ) -> tuple[float, float, float, float, int]:
-    """Newtonian acceleration by the bodies of one grid (m/s2), potential (m2/s2), number of bodies around the asteroid.
+    """Newtonian acceleration by the bodies of one grid (m/s2), potential (m2/s2), number of bodies left out.
 
     Bodies with the asteroid inside their smooth core are left out of both sums.
     """
@@ -268,7 +268,7 @@ def _relativistic_sources(
 ) -> tuple[float, float, float]:
     """Sum of the terms of the sources in ``c^2`` times the 1PN acceleration, m3/s4; the Sun first.
 
-    ``places.heavy`` has been found for this time.
+    ``places.heavy`` must have been computed for this time.
     """
     fast, slow, q = places.fast, places.slow, places.heavy
     ex, ey, ez = of_source(
@@ -356,7 +356,7 @@ def rate(
 def first_rate(
     field: Field, law: NonGravitationalParameters, t: float, y: Array, places: Places, out: Array
 ) -> None:
-    """`rate` as a kernel of its own, for the start of an integration: it is compiled once instead of once a caller."""
+    """`rate` as a separate kernel, for the start of an integration: compiled once instead of inlined in each caller."""
     rate(field, law, t, y, places, out)
 
 

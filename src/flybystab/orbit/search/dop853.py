@@ -14,14 +14,14 @@ from flybystab.orbit.nongravitational import NonGravitationalParameters
 from flybystab.orbit.search.acceleration import Field, empty_places, rate
 from flybystab.typing import Array
 
-#: Units of position (m) and velocity (m/s) in which the tolerance counts.
+#: Units of position (m) and velocity (m/s) of the tolerance.
 _UNITS = np.array([1.5e11, 1.5e11, 1.5e11, 3.0e4, 3.0e4, 3.0e4])
-#: Longest step, and the one below which it has collapsed, s.
+#: Longest step, and the step below which the step size counts as collapsed, s.
 LONGEST, SHORTEST = 30.0 * DAY, 1e-3
 
 
 class Room(NamedTuple):
-    """Where a step is worked out: rates ``k[13, 6]`` of its stages and places of the bodies."""
+    """Buffers of a step: rates ``k[13, 6]`` of its stages and positions of the bodies."""
 
     k: Array
     places: Places
@@ -29,13 +29,13 @@ class Room(NamedTuple):
 
 @kernel
 def empty_room() -> Room:
-    """Room for one integration."""
+    """Buffers for one integration."""
     return Room(np.empty((N_STAGES + 1, 6)), empty_places())
 
 
 @kernel
 def borrowed_room(room: Room) -> Room:
-    """The same room without reference counts, for use inside a kernel that has it as an argument."""
+    """The same buffers without reference counts, for use inside a kernel that has it as an argument."""
     p = room.places
     return Room(
         borrowed(room.k), Places(borrowed(p.fast), borrowed(p.slow), borrowed(p.belt), borrowed(p.heavy))
@@ -87,7 +87,7 @@ def advance(
     float
         Time reached, s; exactly ``stop`` in the last step; nan where the step size collapsed.
     float
-        Length of the next step, positive, s: from this one's error, or as it was where ``stop`` cut it short.
+        Length of the next step, positive, s: from the error of this one, or `h` itself if ``stop`` shortened the step.
     """
     h = abs(h)
     sign = 1.0 if stop > t else -1.0

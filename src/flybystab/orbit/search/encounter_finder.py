@@ -69,10 +69,10 @@ def find_encounters(
     Parameters
     ----------
     objects : Orbit, object with ``orbit`` and ``name``, or an iterable of either
-        The asteroids; they do not disturb each other.
+        The asteroids; they do not attract each other.
     start, stop : Time or str
-        Span of the search; text is read as TDB. A passage within 1 s of an end counts at `start` and not at `stop`, so
-        that spans side by side have each passage once.
+        Span of the search; text is read as TDB. An encounter within 1 s of an end counts at `start` and not at `stop`,
+        so that each encounter is in exactly one of two adjacent spans.
     planets : sequence of str
         Planets and ``"moon"``. Impacts on the Sun are always included (``planet`` is ``"sun"``).
     within : Quantity
@@ -106,16 +106,16 @@ def find_encounters(
     -------
     ResultTable
         One row per encounter, sorted by asteroid and time: ``asteroid``, ``planet``, ``time`` (TDB),
-        ``distance`` (km), ``v_rel`` and ``v_inf`` (km/s; 0 for a bound passage), ``b_t`` and ``b_r`` (km;
-        target plane, north +z of ICRF, :mod:`flybystab.orbit.target_plane`; nan for a bound passage), ``impact``,
+        ``distance`` (km), ``v_rel`` and ``v_inf`` (km/s; 0 for a bound encounter), ``b_t`` and ``b_r`` (km;
+        target plane, north +z of ICRF, :mod:`flybystab.orbit.target_plane`; nan for a bound encounter), ``impact``,
         ``index`` (of the asteroid), ``position`` and ``velocity`` (ICRF, relative to the planet). On an impact, time
         and distance are those of the periapsis of the two-body orbit without a surface, position and velocity those at
         the entry into the atmosphere (the surface of a body without one), and the search ends for that asteroid. If
         there is an impact: ``entry_time`` (TDB, text; empty in other rows), ``entry_longitude`` (east) and
         ``entry_latitude`` (geodetic, deg; nan elsewhere than on the Earth). Metadata: ephemeris, forces and
-        the largest estimated share of each (``share_km``, point masses and 1PN), shares of the forces left out
-        (``left_out_km``), frame, time scale, tolerance, and, of several asteroids, those that could not be
-        followed (``failed``: ``asteroid`` and ``why``).
+        the largest estimated displacement by each (``share_km``, point masses and 1PN), those of the forces left out
+        (``left_out_km``), frame, time scale, tolerance, and, for several asteroids, those that could not be
+        integrated (``failed``: ``asteroid`` and ``why``).
 
     Raises
     ------
@@ -135,14 +135,14 @@ def find_encounters(
     eph = as_ephemeris(ephemeris)
     span, epochs = search_span(rows, start, stop, eph, growth)
     states = initial_states(rows, span.window, epochs)
-    # A tenth: several displacements add up, and passages enlarge them.
+    # A tenth: the displacements add up, and encounters amplify them.
     least = 0.1 * accuracy if forces is None and not growth else 0.0
     acting = search_forces(rows, found, forces, least, span.window, epochs, states)
     tolerances = search_tolerances(span, epochs, accuracy, tolerance, growth)
     shares = np.zeros((len(rows), N_SHARES))
     job = _Search(rows, span, acting, epochs, states, reach_of(found, distances), tolerances, shares, {})
     raw = _without_early_impacts(job, _integrated(job, workers, progress))
-    # A fall into the Sun ends an orbit and is always a row.
+    # An impact on the Sun ends an orbit and always has a row.
     requested = np.isin(raw["body"], [SUN, *(BODIES.index(b.name) for b in found)])
     meta = _metadata(job, raw[~requested])
     raw = raw[requested]
@@ -171,7 +171,7 @@ class _Search(NamedTuple):
     shares : ndarray, shape (n, N_SHARES)
         Estimated displacement by each force, m; written by the search.
     failed : dict of int to dict
-        Asteroids that could not be followed, with the reason; written by the search.
+        Asteroids that could not be integrated, with the reason; written by the search.
     """
 
     rows: list[tuple[str, Orbit]]
@@ -185,7 +185,7 @@ class _Search(NamedTuple):
     failed: dict[int, dict[str, str]]
 
     def fail(self, i: int, error: Exception) -> None:
-        """Record that asteroid `i` could not be followed; raises the error if it is the only one."""
+        """Record that asteroid `i` could not be integrated; raises the error if it is the only one."""
         if len(self.rows) == 1:
             raise error
         self.failed[i] = {"asteroid": self.rows[i][0], "why": str(error)}
@@ -230,7 +230,7 @@ def _integrated(
 ) -> NDArray[Any]:
     """Rows of all encounters, sorted by asteroid and time."""
     total, own = len(job.rows), job.forces.own
-    # Parts small enough for an even load of the threads, large enough for a small overhead of Python.
+    # Parts are small enough to balance the load of the threads, and large enough for a small overhead of Python.
     size = max(1, min(64, -(-total // (4 * workers)))) if workers > 1 else max(total, 1)
     cuts = sorted({*range(0, total, size), *own, *(i + 1 for i in own), total})
     tasks = [slice(i, j) for i, j in pairwise(cuts)]
@@ -246,7 +246,7 @@ def _integrated(
 
 
 def _part(job: _Search, part: slice) -> list[NDArray[Any]]:
-    """Rows of the encounters of some of the asteroids, which have one field of forces."""
+    """Rows of the encounters of a slice of the asteroids, which have the same field of forces."""
     forces, span = job.forces, job.span
     tables = (
         forces.own.get(part.start, forces.everything),
@@ -287,7 +287,7 @@ def _part(job: _Search, part: slice) -> list[NDArray[Any]]:
 
 
 def _without_early_impacts(job: _Search, raw: NDArray[Any]) -> NDArray[Any]:
-    """Rows within the span; an impact between the epoch of an orbit and the span ends the search of that asteroid."""
+    """Rows within the span; an asteroid with an impact between its epoch and the span counts as failed."""
     t_start, t_stop = job.span.start, job.span.stop
     since = np.array([job.epochs[int(i)] for i in raw["asteroid"]])
     early = (raw["time"] < t_start - EDGE) & (since < t_start)

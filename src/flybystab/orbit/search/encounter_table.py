@@ -18,13 +18,13 @@ from flybystab.orbit.target_plane import target_plane
 from flybystab.result_table import ResultTable
 from flybystab.typing import Array
 
-#: A passage this close to an end of the span counts at `start` and not at `stop`, s. It exceeds the error of the time,
-#: so that exactly one of two adjacent spans contains the passage.
+#: An encounter this close to an end of the span counts at `start` and not at `stop`, s. The margin exceeds the error of
+#: the time, so that exactly one of two adjacent spans contains the encounter.
 EDGE = 1.0
 
 
 def in_span(raw: NDArray[Any], t_start: float, t_stop: float) -> NDArray[np.bool_]:
-    """Rows of a sorted result inside the span; each passage once, also where the epoch of an orbit lies at it.
+    """True for rows of a sorted result inside the span; each encounter once, also if the epoch of the orbit is at it.
 
     `raw` is an array of :data:`flybystab.orbit.search.minima.FOUND`.
     """

@@ -1,4 +1,4 @@
-"""Where and when an asteroid reaches the top of the atmosphere, or the surface of a body without one."""
+"""Time and place at which an asteroid reaches the top of the atmosphere, or the surface of a body without one."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def entry(
 ) -> tuple[float, Array]:
     """First contact of an impact that a search has found.
 
-    Two-body motion gives a first guess; Newton's method on the distance, with the state integrated from the last step
-    outside with all forces, the rest.
+    The first guess is that of two-body motion; it is refined by Newton's method on the distance, with the state
+    integrated with all forces from the last step outside.
 
     Parameters
     ----------
@@ -40,7 +40,7 @@ def entry(
     floor : float
         Distance of contact, m.
     sign : float
-        Direction of the integration in time. Backward, the contact is where the path would leave the body.
+        Direction of the integration in time. Backward in time, the contact is where the path leaves the body.
 
     Returns
     -------

@@ -1,7 +1,7 @@
 """Selection of the forces for an orbit and a time span: estimated displacement by each against the allowed error.
 
 The estimate is that of :func:`flybystab.orbit.forces.shares`, ``3 int |a_i(t)| |t_end - t| dt``, along the two-body
-orbit around the Sun with positions from the almanac. It takes some microseconds an asteroid.
+orbit around the Sun with positions from the almanac. It takes some microseconds per asteroid.
 """
 
 from __future__ import annotations

@@ -25,7 +25,7 @@ from flybystab.orbit.search.dop853 import step
 from flybystab.typing import Array
 
 #: An encounter: place of the body in ``BODIES``; time of the minimum (s), state relative to the body (m, m/s) and
-#: distance (m) then; square of the hyperbolic excess speed (m2/s2; negative for a bound passage); whether it is an
+#: distance (m) then; square of the hyperbolic excess speed (m2/s2; negative for a bound encounter); whether it is an
 #: impact; number of the asteroid. The state of an impact is that at the last step outside the body; its time and
 #: distance are those of the periapsis of the two-body orbit through that state. (np.record: fields are attributes in
 #: uncompiled kernels, too.)
@@ -99,7 +99,7 @@ def end_state(field: Field, pair: Array, end: int, body: int, out: Array, work: 
 
 @kernel
 def cuts(field: Field, pair: Array, body: int) -> int:
-    """Number of sampling intervals: `FINE` where ``|r.a|`` can exceed ``v^2`` and ``r.v`` can change sign twice."""
+    """Number of sampling intervals: `FINE` if ``|r.a|`` can exceed ``v^2``, so that ``r.v`` can change sign twice."""
     a, b, work = np.empty(6), np.empty(6), np.empty(6)
     end_state(field, pair, 0, body, a, work)
     end_state(field, pair, 1, body, b, work)
@@ -135,8 +135,8 @@ def refine(
     p = np.empty((3, 6))
     for _ in range(12):
         step(field, law, t0, y0, t - t0, k, y, places)
-        # Positions, and the planet's acceleration by a central difference over two minutes: in a slow passage
-        # the Sun's tide matters as much as the planet's attraction.
+        # Positions, and the planet's acceleration by a central difference over two minutes: in a slow encounter
+        # the tide of the Sun is comparable with the attraction by the planet.
         for i in range(3):
             body_state(field.head, field.data, field.gm, body, t + 60.0 * (i - 1), p[i])
         rv = 0.0
@@ -211,7 +211,7 @@ def _write_minimum(row: Any, body: int, gm: float, t: float, s: Array) -> None:
 def _minimum_between(
     field: Field, pair: Array, body: int, a: float, b: float, ga: float, gb: float, s: Array, work: Array
 ) -> float:
-    """Time of ``r.v = 0`` on the quintic between `a` and `b` (s), where it is `ga` and `gb`; relative state in ``s``.
+    """Time of ``r.v = 0`` on the quintic between `a` and `b` (s) with ``r.v`` = `ga`, `gb`; relative state in ``s``.
 
     Illinois variant of the false position.
     """
@@ -247,7 +247,7 @@ def minima_in_step(
 ) -> tuple[int, float]:
     """Minima of the distance from a body inside one step: rows in ``out`` from ``n``.
 
-    An end that is a minimum itself counts with the step before it, so that adjacent steps find it once.
+    A minimum at an end of a step belongs to the step before it, so that it is found only once.
 
     Parameters
     ----------

@@ -1,4 +1,4 @@
-"""Errors of orbits at their encounters, by state transition matrices, or by sigma points where these do not suffice.
+"""Errors of orbits at their encounters, by state transition matrices, or by sigma points outside their linear range.
 
 The variational equations (:mod:`flybystab.orbit.search.variational`) give the covariance at every later time in one
 integration. The linear theory holds while the displacements are small compared with the distances over which the forces
@@ -32,13 +32,13 @@ from flybystab.orbit.search.dop853 import Room, advance, borrowed_room, empty_ro
 from flybystab.orbit.search.variational import carry_with_deviations
 from flybystab.typing import Array
 
-#: Differences (m) of two-body motion, tolerance of the search for the passage in an interval, longest interval, s.
+#: Differences (m) of two-body motion, tolerance of the search for the encounter in an interval, longest interval, s.
 _STEP, _LOOSE, _INTERVAL = 1e4, 1e-10, 0.25 * YEAR
-#: Tolerance of state transition matrices: they are no differences of orbits.
+#: Tolerance of state transition matrices; it can be larger than for differences of orbits.
 _FINE = 1e-12
-#: Largest displacement for the linear theory, over the distance from the nearest body on the way.
+#: Largest displacement for the linear theory, over the distance from the nearest body at any time before.
 _LINEAR = 0.02
-#: Factor beyond two-body motion by which errors grow in an interval with a passage.
+#: An interval contains an encounter if its transition matrix exceeds that of two-body motion by this factor.
 AMPLIFIED = 2.0
 
 
@@ -102,13 +102,13 @@ class Spread:
     Attributes
     ----------
     displacement : ndarray
-        One sigma in the direction least known, m; inf where a displaced orbit could not be followed.
+        One sigma in the direction of the largest error, m; inf if a displaced orbit could not be integrated.
     growth : ndarray
-        That over the displacement at the epoch of the covariance.
+        Its ratio to the displacement at the epoch of the covariance.
     model_error : ndarray
-        Displacement by ephemeris, masses, tolerance and forces left out, m, grown past the passages on the way.
+        Displacement by ephemeris, masses, tolerance and neglected forces, m, amplified by the encounters before.
     passed : ndarray of bool
-        Whether there is such a passage.
+        True if there is such an encounter.
     """
 
     displacement: Array
@@ -127,10 +127,10 @@ def spread(
 ) -> Spread:
     """Errors of an orbit at `times` (s from the epoch of the window) with all forces of `field`.
 
-    The displacement is the square root of the largest eigenvalue of the covariance of the position, by the state
-    transition matrix. From where it exceeds 2 % of the distance from the nearest body, it is
-    that of the second moment of the sigma points about the orbit. The error of the model before each
-    passage on the way grows as the mean of displacements along the axes of phase space.
+    The displacement is the square root of the largest eigenvalue of the covariance of the position, propagated by the
+    state transition matrix. Once it exceeds 2 % of the distance from the nearest body, the second moment of the sigma
+    points about the orbit replaces the covariance. The error of the model before an encounter is amplified by the mean
+    over displacements along the axes of phase space.
 
     Parameters
     ----------
@@ -163,17 +163,17 @@ def spread(
         state = beside.orbit.barycentric(window)
         carry_with_deviations(field, law, start, state, grid, _FINE, empty_room(), units, base, change)
         sigma = _along(ways.T, more[:, active].T, change)
-        passages = _passages(field, law, window, grid, base, change)
+        encounters = _encounters(field, law, window, grid, base, change)
         linear = _sizes(sigma)
         displacement[rows] = linear[at]
         wide = [*np.flatnonzero(linear > _LINEAR * _clearance(window, grid, base))]
-        wide += [p.interval + 1 for p in passages if linear[p.interval] > _LINEAR * p.distance]
+        wide += [p.interval + 1 for p in encounters if linear[p.interval] > _LINEAR * p.distance]
         bent = at >= min(wide, default=grid.size)
         if beside.scale == 1.0 and bent.any():  # a shift scaled to a metre is always linear
             displacement[rows[bent]] = _by_points(
                 field, law, window, start, state, states, parameters, grid[at[bent]], tolerance
             )
-        model_error[rows] = _grown_error(field, law, grid, change, passages, at)
+        model_error[rows] = _grown_error(field, law, grid, change, encounters, at)
     displacement *= beside.scale
     shift = beside.scale * float(np.linalg.norm(ways[:, :3], 2))
     passed = model_error > undisturbed_error(times - start)
@@ -198,7 +198,7 @@ def _along(states: Array, parameters: Array, change: Array) -> Array:
     states, parameters : ndarray, shapes (6, m) and (q, m)
         Deviations at the start: state, and the parameters that have a column in `change`.
     change : ndarray, shape (n, 6, 6 + q)
-        What unit deviations at each time have become at the next.
+        Deviations at the next time that result from unit deviations at each time.
     """
     out = np.empty((len(change), *states.shape))
     now = states
@@ -209,7 +209,7 @@ def _along(states: Array, parameters: Array, change: Array) -> Array:
 
 
 def _sizes(deviations: Array) -> Array:
-    """Largest principal displacement, m, shape (n,), of deviations of shape (n, 6, m); inf where they were lost."""
+    """Largest principal displacement, m, shape (n,), of deviations of shape (n, 6, m); inf if not finite."""
     out = np.full(len(deviations), np.inf)
     known = np.isfinite(deviations).all(axis=(1, 2))
     out[known] = np.linalg.norm(deviations[known, :3], 2, axis=(1, 2))
@@ -239,7 +239,7 @@ def _by_points(
 
 
 def _largest(gaps: Array) -> Array:
-    """Largest principal displacement, shape (n,), of pairs of points, shape (2 k, n, 3); inf where one was lost."""
+    """Largest principal displacement, shape (n,), of pairs of points, shape (2 k, n, 3); inf if one is not finite."""
     pairs = np.transpose(gaps, (1, 0, 2))
     out = np.full(len(pairs), np.inf)
     for k, points in enumerate(pairs):
@@ -255,8 +255,8 @@ def _clearance(window: Window, t: Array, states: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class _Passage:
-    """A passage on the way: its interval of the grid, and time, state and distance (s, m, m/s) just before it."""
+class _Encounter:
+    """An earlier encounter: its interval of the grid, and time, state and distance (s, m, m/s) just before it."""
 
     interval: int
     t: float
@@ -264,9 +264,9 @@ class _Passage:
     distance: float
 
 
-def _passages(
+def _encounters(
     field: Field, law: NonGravitationalParameters, window: Window, grid: Array, base: Array, change: Array
-) -> list[_Passage]:
+) -> list[_Encounter]:
     """Intervals of the grid whose state transition matrix exceeds that of two-body motion by :data:`AMPLIFIED`."""
     helio = base - window.states(SUN, grid)
     out = []
@@ -275,7 +275,7 @@ def _passages(
         unit = np.array([1.0, 1.0, 1.0, per, per, per])
         matrix = change[i + 1, :, :6] * unit / unit[:, None]
         if np.linalg.norm(matrix) >= AMPLIFIED * quiet_growth(helio[i], grid[i + 1] - grid[i]):
-            out.append(_Passage(i, *_before_passage(field, law, window, grid[i], grid[i + 1], base[i])))
+            out.append(_Encounter(i, *_before_encounter(field, law, window, grid[i], grid[i + 1], base[i])))
     return out
 
 
@@ -284,36 +284,36 @@ def _grown_error(
     law: NonGravitationalParameters,
     grid: Array,
     change: Array,
-    passages: Sequence[_Passage],
+    encounters: Sequence[_Encounter],
     at: NDArray[np.intp],
 ) -> Array:
-    """Error of the force model, m, at ``grid[at]``: the largest of what it was before a passage, grown since."""
+    """Error of the force model, m, at ``grid[at]``: the largest of the amplified errors before the encounters."""
     out = undisturbed_error(grid[at] - grid[0])
-    for passage in passages:
-        end = passage.interval + 1
+    for encounter in encounters:
+        end = encounter.interval + 1
         rest = np.full((1, 6, 6), np.nan)
         there = np.empty((1, 6))
         nothing = np.zeros((0, len(NONGRAV_PARAMETERS)))
         when = grid[end : end + 1]
         carry_with_deviations(
-            field, law, passage.t, passage.state, when, _FINE, empty_room(), nothing, there, rest
+            field, law, encounter.t, encounter.state, when, _FINE, empty_room(), nothing, there, rest
         )
         unit = np.ones(6)
-        unit[3:] = np.linalg.norm(passage.state[3:]) / np.linalg.norm(passage.state[:3])
+        unit[3:] = np.linalg.norm(encounter.state[3:]) / np.linalg.norm(encounter.state[:3])
         since = _along(np.diag(unit), np.zeros((0, 6)), np.concatenate([rest, change[end + 1 :, :, :6]]))
-        # In the mean over directions in phase space.
+        # Mean over directions in phase space.
         growth = np.linalg.norm(since[:, :3], axis=(1, 2)) / np.sqrt(6.0)
         growth[~np.isfinite(growth)] = np.inf
-        later = at > passage.interval
-        grown = undisturbed_error(passage.t - grid[0]) * growth[at[later] - end]
+        later = at > encounter.interval
+        grown = undisturbed_error(encounter.t - grid[0]) * growth[at[later] - end]
         out[later] = np.maximum(out[later], grown)
     return out
 
 
-def _before_passage(
+def _before_encounter(
     field: Field, law: NonGravitationalParameters, window: Window, begin: float, end: float, state: Array
 ) -> tuple[float, Array, float]:
-    """Time (s) and state before the largest attraction by a planet in an interval, and the distance there (m)."""
+    """Time (s) and state before the largest attraction by a planet in an interval, and the distance then (m)."""
     times = np.linspace(begin, end, 65)
     states = np.full((times.size, 6), np.nan)
     carry(field, law, begin, state, times, _LOOSE, empty_room(), states)
@@ -340,8 +340,8 @@ def add_growth(
 ) -> None:
     """Add to a table of encounters ``displacement``, ``model_error`` (km), ``growth`` and ``predictability``.
 
-    Displacement: :class:`Spread`, at closest approach or, of an impact, at the entry. Growth: displacement over
-    that at the epoch. Model error: what ephemeris, tolerance and forces left out make.
+    Displacement: :class:`Spread`, at closest approach or, for an impact, at the entry. Growth: displacement over that
+    at the epoch. Model error: displacement by the errors of ephemeris and tolerance and by neglected forces.
 
     Parameters
     ----------
@@ -350,14 +350,14 @@ def add_growth(
     times : ndarray
         Of the rows: closest approach, or entry of an impact, s from the epoch of the window.
     beside : mapping
-        Deviations by number of the asteroid, of each that the table has.
+        Deviations by number of the asteroid, for each asteroid in the table.
     laws : ndarray, shape (n, N_LAW)
         Non-gravitational acceleration of each asteroid: rows of
         :class:`flybystab.orbit.nongravitational.NonGravitationalParameters`.
     window, tolerances
         Of the search.
     field_of : callable
-        Number of an asteroid to the forces that it was given.
+        Function from the number of an asteroid to the forces on it.
     """
     index = np.asarray(table["index"])
     out = np.full((3, len(table)), np.nan)

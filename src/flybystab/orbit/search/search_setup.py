@@ -65,9 +65,9 @@ class SearchForces(NamedTuple):
     names : tuple of str
         Names of the forces; those that are irrelevant for an asteroid are left out for it.
     everything : Field
-        All of them, without the non-gravitational acceleration.
+        All forces, without the non-gravitational acceleration.
     own : dict of int to Field
-        Instead of `everything` for the orbits of massive asteroids, which do not attract themselves.
+        In place of `everything` for the orbits of massive asteroids, which do not attract themselves.
     laws : ndarray, shape (n, N_LAW)
         Non-gravitational acceleration of each asteroid: rows of
         :class:`flybystab.orbit.nongravitational.NonGravitationalParameters`.
@@ -156,15 +156,15 @@ def search_tolerances(
         return np.full(len(epochs), float(tolerance))
     longest = np.maximum(np.abs(epochs - span.start), np.abs(epochs - span.stop))
     tolerances = np.clip(_AT_10_YEARS * accuracy * (10.0 * YEAR / longest) ** 2, *_TOLERANCES)
-    # passages amplify errors: those of the tolerance, too
+    # encounters also amplify the errors of the integration
     return np.minimum(tolerances, 1e-14) if growth else tolerances
 
 
 def reach_of(found: list[Planet], distances: Array) -> Reach:
-    """Distances that count, from the planets of a search and the largest distance from each, m."""
+    """Limits of encounters and impacts, from the planets of a search and the largest distance from each, m."""
     limits = np.zeros(len(BODIES))
     limits[[BODIES.index(b.name) for b in found]] = distances
-    limits[SUN] = 0.0  # a perihelion is no encounter
+    limits[SUN] = 0.0  # a perihelion is not an encounter
     return Reach(limits, np.array([PLANETS[name].impact_distance for name in BODIES]))
 
 

@@ -1,6 +1,6 @@
-"""Integration of one asteroid after the other with DOP853, and the search for encounters within each step.
+"""Integration of asteroids, one at a time, with DOP853, and the search for encounters within each step.
 
-Each asteroid has its own step size and those forces that are relevant to it. After each step the distances from the
+Each asteroid has its own step size and its own selection of forces. After each step the distances from the
 requested planets are checked for minima (:mod:`flybystab.orbit.search.minima`). An impact on any body is reported and
 ends the integration of that asteroid.
 """
@@ -27,19 +27,20 @@ from flybystab.typing import Array
 
 #: Status of a search: `out` too small, step size collapsed, start inside a body or its atmosphere, `MAX_STEPS` taken.
 FULL, STALLED, INSIDE, EXHAUSTED = 1, 2, 3, 4
-#: Most steps from the epoch to the end of the span; an asteroid of the inner main belt takes about 60 a year.
+#: Largest number of steps from the epoch to the end of the span; an asteroid of the inner main belt takes about 60 a
+#: year.
 MAX_STEPS = 1_000_000
 # Typed: numba compiles a kernel anew for each literal argument.
 _NO_ROWS = code(0)
 
 
 class Reach(NamedTuple):
-    """Distances that count, of each body.
+    """Limits of encounters and impacts for each body.
 
     Attributes
     ----------
     limits : ndarray, shape (bodies,)
-        Largest distance of an encounter (zero: only impacts count), m.
+        Largest distance of an encounter (zero: impacts only), m.
     floors : ndarray, shape (bodies,)
         Distance of an impact, m.
     """
@@ -50,15 +51,15 @@ class Reach(NamedTuple):
 
 @kernel
 def _is_inside(y: Array, place: Array, floor: float) -> bool:
-    """Whether ``y[:3]`` is closer to ``place[3]`` than `floor`, m."""
+    """True if the distance of ``y[:3]`` from ``place[3]`` is below `floor`, m."""
     return (y[0] - place[0]) ** 2 + (y[1] - place[1]) ** 2 + (y[2] - place[2]) ** 2 < floor**2
 
 
 @inlined
 def _write_ends(t: float, y: Array, t_new: float, new: Array, k: Array, pair: Array) -> float:
-    """Write the ends of a step in order of time into ``pair[2, LOG_WIDTH]``; three times the larger acceleration there.
+    """Write the ends of a step in order of time into ``pair[2, LOG_WIDTH]``.
 
-    Three times: the acceleration may be larger between them (m/s2).
+    Returns three times the larger acceleration at the ends (m/s2), since it may be larger between them.
     """
     early, late = (0, 1) if t_new >= t else (1, 0)
     pair[early, TIME] = t
@@ -199,11 +200,11 @@ def search(
     Returns
     -------
     int
-        The asteroid to go on with.
+        The asteroid with which to continue.
     int
         Number of rows.
     int
-        0 for done, or a status of :func:`track_encounters`: that of the asteroid to go on with.
+        0 if all are done, else the status of :func:`track_encounters` for the asteroid with which to continue.
     float
         Time at which it occurred, s; for `INSIDE` the number of the body.
     """

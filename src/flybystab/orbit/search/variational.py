@@ -43,7 +43,7 @@ from flybystab.orbit.search.acceleration import (
 from flybystab.orbit.search.dop853 import Room, advance, borrowed_room
 from flybystab.typing import Array
 
-#: Gradients below this share of that of the attracting body are left out.
+#: Gradients below this fraction of that of the attracting body are left out.
 _NEGLIGIBLE = 1e-9
 
 
@@ -115,7 +115,7 @@ def vary(
     now: Array,
     places: Places,
 ) -> None:
-    """Carry deviations over a step that the orbit has taken.
+    """Integrate deviations over a step that the orbit has taken.
 
     Parameters
     ----------
@@ -124,7 +124,7 @@ def vary(
     k : ndarray, shape (13, 6)
         Rates of the orbit at the stages of the step.
     by_parameters, by_delay : bool
-        Whether non-gravitational parameters deviate, and whether DT is among them.
+        True if non-gravitational parameters deviate, and if DT is among them.
     more : ndarray, shape (5, m)
         Deviations of A1, A2, A3, DT, AMRAT that go with each column.
     columns : ndarray, shape (6, m)
@@ -176,7 +176,7 @@ def carry_with_deviations(
     states: Array,
     changes: Array,
 ) -> int:
-    """States at ``times`` and what unit deviations at each time have become at the next.
+    """States at ``times`` and the state transition matrices between successive times.
 
     Parameters
     ----------
