@@ -64,9 +64,7 @@ class Flow(NamedTuple):
     par: Parameters
     tide: TidePanels
     limit2: float  # square of the largest axis ratio of the model
-    fade_volume: (
-        float  # V/V0 at which the dilatancy begins to fade; infinite if it is constant or already fading
-    )
+    fade_volume: float  # V/V0 at the start of the fade of the dilatancy; infinite if none is ahead
 
 
 class FlowStep(NamedTuple):

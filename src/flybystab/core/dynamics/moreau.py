@@ -221,9 +221,8 @@ def follow_steps(
         if not drift(0.5 * h, y, scratch.work):
             return Steps(False, first, last, flowing, free)
         _kick(t, h, y, tide, scratch.work)
-        if (
-            step == 0
-        ):  # volumes are compared at the kicks: half a drift of a spinning body raises the volume to second order
+        # Volumes are compared at the kicks: half a drift of a spinning body raises the volume to second order.
+        if step == 0:
             grains = _Grains(material, np.sqrt(determinant(y[0:6])), True, FREE)
         grains = _impulse(y, h, grains, scratch)
         if grains.outcome == FAILED:

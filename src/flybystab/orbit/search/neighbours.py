@@ -76,7 +76,7 @@ def carry(
 
 
 @kernel
-def quiet_growth(state: Array, t: float) -> float:
+def two_body_growth(state: Array, t: float) -> float:
     """Frobenius norm of the state transition matrix of two-body motion from a heliocentric state (m, m/s) over `t` s.
 
     Velocities count as m by the angular velocity v/r of the state.
@@ -274,7 +274,7 @@ def _encounters(
         per = np.linalg.norm(helio[i, 3:]) / np.linalg.norm(helio[i, :3])
         unit = np.array([1.0, 1.0, 1.0, per, per, per])
         matrix = change[i + 1, :, :6] * unit / unit[:, None]
-        if np.linalg.norm(matrix) >= AMPLIFIED * quiet_growth(helio[i], grid[i + 1] - grid[i]):
+        if np.linalg.norm(matrix) >= AMPLIFIED * two_body_growth(helio[i], grid[i + 1] - grid[i]):
             out.append(_Encounter(i, *_before_encounter(field, law, window, grid[i], grid[i + 1], base[i])))
     return out
 
