@@ -61,7 +61,7 @@ def test_apophis_excitation_agrees_with_photometry():
 def test_impossible_periods_are_refused():
     with pytest.raises(InvalidInput, match="ratio in"):
         tumbling_state(MOMENTS, 27.4, 27.4, "SAM")
-    with pytest.raises(InvalidInput, match="rising order"):
+    with pytest.raises(InvalidInput, match="ascending order"):
         tumbling_state(np.array([1.0, 0.5, 0.7]), 27.4, 264.0, "SAM")
     with pytest.raises(UnknownName, match="PAM"):
         tumbling_state(MOMENTS, 27.4, 264.0, "PAM")
