@@ -12,6 +12,7 @@ ROOT = Path(__file__).resolve().parents[1]
 TABLES = {
     "apophis": "python benchmarks/sky.py apophis",
     "apophis_after": "python benchmarks/apophis_after.py",
+    "attacks": "python benchmarks/attack.py table",
     "completeness": "python benchmarks/completeness.py out/whole.ecsv",
     "coverage": "python benchmarks/campaign.py coverage",
     "edges": "python benchmarks/edges.py",
