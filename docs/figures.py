@@ -27,11 +27,16 @@ from flybystab.plots import figures, flyby, grains, outcome_map, population
 from flybystab.plots import scene, screening, shape_map, stability
 
 body = fs.Body([1400, 850, 750] * u.m, 2000 * u.kg / u.m**3, spin_period=6 * u.h)
-passage = lambda radii: fs.Encounter.hyperbolic("earth", radii * fs.R_earth, 5 * u.km / u.s)
-near, far = passage(2.0), passage(3.0)
+
+
+def at(radii):
+    return fs.Encounter.hyperbolic("earth", radii * fs.R_earth, 5 * u.km / u.s)
+
+
+near, far = at(2.0), at(3.0)
 radii, speeds = np.linspace(1.2, 3.2, 9) * fs.R_earth, np.linspace(0, 20, 6) * u.km / u.s
 result = fs.flyby(body, near)
-pile = fs.flyby(body, passage(1.5), grains=300, seeds=6, model="grains")
+piles = fs.flyby(body, at(1.5), grains=300, seeds=6, model="grains")
 shape = fs.Shape.perturbed([1400, 850, 750] * u.m, amplitude=0.05, seed=2)
 solid = fs.Body.from_shape(shape, density=2000 * u.kg / u.m**3, spin_period=6 * u.h)
 slopes = fs.surface_history(solid, far, shape=shape)
@@ -59,18 +64,18 @@ SECTIONS = {
     "Many flybys": [
         ("outcome_map", "`OutcomeMap`: most severe verdict over periapsis and speed", "fs.outcome_map(body, radii, speeds, phases=6).plot(axes)"),
         ("target_map", "`TargetMap`: verdicts over the target plane", "fs.target_map(body, 8 * u.km / u.s, np.linspace(1.2, 3.2, 7) * fs.R_earth, 24).plot(axes)"),
-        ("flyby_table", "`FlybyTable`: number of each verdict", "fs.flyby_many([body] * 30, [passage(q) for q in np.linspace(1.1, 3.5, 30)]).plot(axes)"),
+        ("flyby_table", "`FlybyTable`: number of each verdict", "fs.flyby_many([body] * 30, [at(q) for q in np.linspace(1.1, 3.5, 30)]).plot(axes)"),
         ("spin_sample", "`SpinSample`: change of the spin over attitudes", "fs.spin_sample(apophis, april, n=200).plot(axes)"),
         ("spin_forecast", "`SpinForecast`: periods after an encounter over rotation phases", "fs.spin_forecast(body, far, n=48).plot(axes)"),
-        ("critical", "`CriticalValues`: least value for an outcome at each phase", 'fs.critical(body, passage(2.2), "friction_angle", phases=12).plot(axes)'),
-        ("binary", "`BinarySample`: mutual orbits after an encounter", "fs.binary_flyby(body, passage(4.0), 4 * u.km, samples=200).plot(axes)"),
+        ("critical", "`CriticalValues`: least value for an outcome at each phase", 'fs.critical(body, at(2.2), "friction_angle", phases=12).plot(axes)'),
+        ("binary", "`BinarySample`: mutual orbits after an encounter", "fs.binary_flyby(body, at(4.0), 4 * u.km, samples=200).plot(axes)"),
     ],
     "Grains": [
-        ("grains_outcome", "`GrainsOutcome`: largest clump of each pile", "pile.grains.plot(axes)"),
-        ("grains_run", "`GrainsRun`: the pile at the end", "pile.grains.median.plot(axes)"),
-        ("grains_course", "`GrainsCourse`: largest clump against time", "pile.grains.median.course.plot(axes)"),
-        ("grains_scene_plot", "Planet, path and pile", "grains.grains_scene_plot(axes, pile)"),
-        ("grains_figure", "Four stills, and all piles against time", "grains.grains_figure(pile)"),
+        ("grains_outcome", "`GrainsOutcome`: largest clump of each pile", "piles.grains.plot(axes)"),
+        ("grains_run", "`GrainsRun`: the pile at the end", "piles.grains.median.plot(axes)"),
+        ("grains_course", "`GrainsCourse`: largest clump against time", "piles.grains.median.course.plot(axes)"),
+        ("grains_scene_plot", "Planet, path and pile", "grains.grains_scene_plot(axes, piles)"),
+        ("grains_figure", "Four stills, and all piles against time", "grains.grains_figure(piles)"),
     ],
     "Uncertain orbits": [
         ("distribution", "`EncounterDistribution`: clones on the target plane", "clones.plot(axes)"),

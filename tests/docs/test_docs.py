@@ -23,6 +23,19 @@ def test_python_blocks_run(page, monkeypatch, tmp_path):
         exec(compile(block, page, "exec"), space)
 
 
+def test_the_page_on_grains_runs_with_few_grains(monkeypatch, tmp_path, capsys):
+    monkeypatch.setenv("FLYBYSTAB_CACHE", str(tmp_path))
+    text = (ROOT / "docs" / "grains.md").read_text()
+    space = {}
+    for block in re.findall(r"```python\n(.*?)```", text, re.S):
+        few = re.sub(r"grains=\d+, seeds?=\d+", lambda m: re.sub(r"grains=\d+", "grains=100", m[0]), block)
+        few = few.replace("seeds=8", "seeds=1").replace("fs.Pile(lobes, ", "fs.Pile(lobes, grains=100, ")
+        exec(compile(few, "docs/grains.md", "exec"), space)
+    assert space["result"].rung == "grains"
+    assert len(space["result"].fragments) >= 1
+    capsys.readouterr()
+
+
 @pytest.mark.parametrize("page", NOTEBOOKS, ids=lambda p: p.stem)
 def test_notebooks_run(page, monkeypatch, tmp_path, capsys):
     monkeypatch.chdir(tmp_path)
