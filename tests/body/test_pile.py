@@ -121,6 +121,13 @@ def test_bad_input_is_refused():
         make_pile(body(material=Material(friction_angle=60 * u.deg)), 100)
 
 
+@pytest.mark.parametrize("overlap", [float("nan"), float("inf"), -0.002, 0.0, 1e-9, 0.5, 1e300])
+def test_an_overlap_out_of_range_is_refused(overlap):
+    body = Body([200, 150, 140] * u.m, 2000 * u.kg / u.m**3, spin_period=5 * u.h)
+    with pytest.raises(InvalidInput, match="overlap"):
+        make_pile(body, 100, keep=False, overlap=overlap)
+
+
 def test_a_public_pile_has_quantities_of_the_body():
     b = body()
     pile = Pile(b, 200, 3)

@@ -30,7 +30,7 @@ from flybystab.core.grains.simulation import Simulation
 from flybystab.core.numerics.threads import in_order
 from flybystab.errors import InvalidInput
 from flybystab.typing import Array
-from flybystab.units import whole
+from flybystab.units import to_si, whole
 
 #: Least and largest number of grains: fewer do not resolve a shape, more take days to compute.
 LEAST, MOST = 20, 200_000
@@ -103,16 +103,18 @@ def make_pile(
     keep : bool
         Whether to read the pile from the cache, and to store it there (:mod:`flybystab.body.pile_cache`).
     overlap : float
-        Mean overlap of the grains over their radius, which sets the stiffness.
+        Mean overlap of the grains over their radius, which sets the stiffness: from 1e-6 to 0.1.
     **options
         Attributes of :class:`flybystab.core.grains.simulation.Simulation`, for tests of the numerics.
 
     Raises
     ------
     InvalidInput
-        A friction angle beyond the calibrated range, too strong a cohesion, or a number of grains out of range.
+        A friction angle beyond the calibrated range, too strong a cohesion, and a number of grains or an
+        overlap out of range.
     """
     whole(seed, "seed", 0)
+    overlap = float(to_si(overlap, u.dimensionless_unscaled, "overlap", low=1e-6, high=0.1))
     if friction is None:
         check_grains(body, grains)
     friction = friction or contact_friction(body.material.phi)
