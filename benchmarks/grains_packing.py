@@ -20,9 +20,8 @@ import numpy as np
 from flybystab.bench.grains import body, earth
 from flybystab.body.grain_calibration import Friction
 from flybystab.body.grain_sizes import GrainSizes
-from flybystab.body.packing import _carved, _scattered, settled_pile
+from flybystab.body.packing import _carved, _scattered, settled, settled_pile
 from flybystab.body.pile import spun
-from flybystab.core.grains.clumps import moments, semi_axes, spin_of
 from flybystab.core.grains.simulation import Simulation
 from flybystab.core.grains.state import Grains, contact_parameters
 from flybystab.flybys.grains_run import one_pile
@@ -48,22 +47,7 @@ def collapsed_pile(axes: Array, grains: int, seed: int) -> Simulation:
     sim.advance(COLLAPSE, drag=DRAG)
     chosen = _carved(sim.grains, axes, grains)
     g = Grains(*(a[chosen].copy() for a in sim.grains))
-    g = g._replace(mass=g.mass / g.mass.sum())
-    everything = np.ones(grains, np.bool_)
-    found, _ = semi_axes(1.0, moments(g, everything)[3])
-    g.x[:] /= np.cbrt(np.prod(found))
-    g.radius[:] /= np.cbrt(np.prod(found))
-    g.v[:], g.w[:] = 0.0, 0.0
-    law = contact_parameters(float(g.radius.mean()), mu_s=FRICTION.mu_s, beta=FRICTION.beta)
-    sim = Simulation.of(g, law)
-    sim.centre()
-    sim.advance(1.9, drag=3.0)
-    sim.advance(1.9)
-    sim.centre()
-    _, _, _, inertia, momentum = moments(g, everything)
-    sim.add_spin(-spin_of(inertia, momentum))
-    sim.rotate(semi_axes(1.0, inertia)[1].T)
-    return sim
+    return settled(g, FRICTION.mu_s, FRICTION.beta)
 
 
 def main(arguments: list[str] | None = None) -> None:

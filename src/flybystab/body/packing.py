@@ -66,8 +66,24 @@ def settled_pile(
     sim.advance(1.5, gravity=False, pull=field, drag=3.0)
     chosen = _carved(sim.grains, axes, grains) if shape is None else _cut(sim.grains, shape, grains)
     g = Grains(*(a[chosen].copy() for a in sim.grains))
+    # a shape is already in its principal axes, which must not be permuted
+    return settled(g, mu_s, beta, principal_axes=shape is None)
+
+
+def settled(g: Grains, mu_s: float, beta: float, principal_axes: bool = True) -> Simulation:
+    """The grains settled under their own gravity, without rotation and in scaled units.
+
+    Parameters
+    ----------
+    g : Grains
+        Grains cut out of an aggregate; positions and radii are scaled in place.
+    mu_s, beta : float
+        Sliding friction and contact patch.
+    principal_axes : bool
+        Whether to rotate the grains into their principal axes.
+    """
     g = g._replace(mass=g.mass / g.mass.sum())
-    everything = np.ones(grains, np.bool_)
+    everything = np.ones(len(g.mass), np.bool_)
     m, _, _, inertia, _ = moments(g, everything)
     found, _ = semi_axes(m, inertia)
     g.x[:] /= np.cbrt(np.prod(found))
@@ -80,7 +96,7 @@ def settled_pile(
     sim.centre()
     m, _, _, inertia, momentum = moments(g, everything)
     sim.add_spin(-spin_of(inertia, momentum))
-    if shape is None:  # a shape is already in its principal axes, which must not be permuted
+    if principal_axes:
         _, turn = semi_axes(m, inertia)
         sim.rotate(turn.T)
     return sim

@@ -45,7 +45,7 @@ _LEVELS = (0, 5, 10, 15, 20, 25, 30, 35, 40, 45, 60)
 
 
 def bounds_plot(axes: Axes, table: QTable, column: str | None = None) -> Axes:
-    """Plot the minimum friction angle over density and cohesion, of a table by :func:`flybystab.infer`.
+    """Plot the minimum friction angle over density and cohesion from a table of :func:`flybystab.infer`.
 
     Hatched: no friction angle suffices. The white line and band are the density of the catalogue and its 1-sigma.
 
@@ -285,7 +285,7 @@ def _date_axis(axes: Axes) -> None:
 
 
 def impacts_plot(axes: Axes, table: QTable) -> Axes:
-    """Plot the probability of each possible impact against time, of a table by :func:`flybystab.virtual_impactors`."""
+    """Plot the probability of possible impacts against time, from a table of :func:`flybystab.virtual_impactors`."""
     from matplotlib.dates import date2num
 
     day = date2num(np.asarray(table["time"].tdb.isot, dtype="datetime64[ms]"))
