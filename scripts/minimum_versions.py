@@ -44,8 +44,8 @@ def main():
     )
     parser.add_argument("--python", default=sys.executable, help="interpreter (the running one)")
     parser.add_argument("--newest", action="store_true", help="newest versions instead of the minima")
-    parser.add_argument("tests", nargs="*", default=TESTS, help="tests to run")
-    options = parser.parse_args()
+    parser.add_argument("tests", nargs="*", default=TESTS, help="tests to run; other options go to pytest")
+    options, others = parser.parse_known_args()
     name = ("newest " if options.newest else "minimum ") + Path(options.python).name
     place = ROOT / "out" / name.replace(" ", "-")
     python = place / "bin" / "python"
@@ -62,7 +62,7 @@ def main():
     print(" ".join(line for line in listed.splitlines() if "==" in line), flush=True)
     # the modules that tests share are not part of the package; -P keeps the working tree out of the path
     done = subprocess.run(
-        [python, "-P", "-m", "pytest", "-q", "-p", "no:cacheprovider", *options.tests], cwd=ROOT
+        [python, "-P", "-m", "pytest", "-q", "-p", "no:cacheprovider", *others, *options.tests], cwd=ROOT
     )
     sys.exit(done.returncode)
 
