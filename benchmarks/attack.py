@@ -219,8 +219,8 @@ TESTED = {
         "bad_row or time_limit or endless",
         "the run",
     ),
-    "dask: wrong and missing scheduler files, servers that are no scheduler, tls without certificates, workers killed, "
-    "out of memory or without the package": (
+    "dask: wrong and missing scheduler files, servers that are no scheduler, tls without certificates, schedulers and "
+    "workers killed, out of memory or without the package": (
         ["screening/test_executors.py"],
         "dask or scheduler",
         "raw errors; a server that does not answer was waited for without end",

@@ -10,6 +10,7 @@ import threading
 import time
 import warnings
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack, suppress
 from pathlib import Path
 
@@ -72,6 +73,31 @@ def test_dead_process_is_named_and_the_run_goes_on(tmp_path, reference):
         run.run(tmp_path / "p.ecsv", executor=pool, progress=states.append)
     assert states[0].resumed >= 4
     same(read_results(tmp_path / "p.ecsv"), reference)
+
+
+def test_dead_processes_found_at_the_next_call_are_named(tmp_path, reference):
+    """The pool then refuses the next call instead of failing one in progress."""
+
+    def kill(state):
+        if state.done == 4:
+            os.kill(next(iter(pool._processes)), signal.SIGKILL)
+            wait_for(lambda: pool._broken)
+
+    run = screening(16, three, samples=3, seed=4)
+    with open_executor(2) as pool, pytest.raises(WorkersLost, match=r"BrokenProcessPool.*in progress: \w"):
+        run.run(tmp_path / "p.ecsv", executor=pool, chunk=1, progress=kill)
+    states = []
+    run.run(tmp_path / "p.ecsv", progress=states.append)
+    assert 4 <= states[0].resumed < 16
+    same(read_results(tmp_path / "p.ecsv"), reference)
+
+
+def test_calls_that_an_executor_refuses_for_other_reasons_keep_their_error(tmp_path):
+    with ThreadPoolExecutor(1) as pool:
+        pass
+    with pytest.raises(RuntimeError, match="after shutdown") as caught:
+        screening(3).run(tmp_path / "p.ecsv", executor=pool)
+    assert not isinstance(caught.value, WorkersLost)
 
 
 def test_ctrl_c_leaves_a_valid_file(tmp_path, reference):
@@ -305,54 +331,94 @@ def test_killed_run_resumes_without_losing_or_repeating_a_row(tmp_path, referenc
     assert sum(computed.values()) <= 17
 
 
+@pytest.fixture
+def dask_processes(tmp_path):
+    """A function that starts a dask scheduler and workers of one thread as processes: scheduler, workers, file.
+
+    All of them end with the test.
+    """
+    pytest.importorskip("distributed")
+    file, started = tmp_path / "scheduler.json", []
+
+    def start(workers, **variables):
+        environment = os.environ | variables
+        environment["PYTHONPATH"] = os.pathsep.join([str(HERE), os.environ.get("PYTHONPATH", "")])
+
+        def process(name, *arguments):
+            command = [sys.executable, "-m", f"distributed.cli.{name}", "--scheduler-file", file, *arguments]
+            quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
+            started.append(subprocess.Popen([*command, "--no-dashboard"], env=environment, **quiet))
+
+        process("dask_scheduler", "--host", "127.0.0.1", "--port", "0")
+        wait_for(file.exists)
+        for k in range(workers):
+            process("dask_worker", "--nthreads", "1", "--no-nanny", "--local-directory", tmp_path / f"w{k}")
+        return started[0], started[1:], file
+
+    try:
+        yield start
+    finally:
+        for process in started:
+            process.kill()
+            process.wait()
+
+
 @pytest.mark.slow
-def test_dask_with_a_killed_worker_gives_the_same_rows(tmp_path, reference):
+def test_dask_with_a_killed_worker_gives_the_same_rows(tmp_path, reference, dask_processes):
     distributed = pytest.importorskip("distributed")
     marks, hold = tmp_path / "marks", tmp_path / "hold"
     marks.mkdir()
-    environment = os.environ | {
-        "MARKS": str(marks),
-        "HOLD": str(hold),
-        "PYTHONPATH": os.pathsep.join([str(HERE), os.environ.get("PYTHONPATH", "")]),
-        "DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "10",
-    }
-    python = [sys.executable, "-m"]
-    address = tmp_path / "scheduler.json"
-    quiet = {"env": environment, "stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    scheduler = subprocess.Popen(
-        [*python, "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", "0", "--no-dashboard",
-         "--scheduler-file", address], **quiet,
-    )  # fmt: skip
-    workers = []
-    try:
-        wait_for(address.exists)
-        workers = [
-            subprocess.Popen(
-                [*python, "distributed.cli.dask_worker", "--scheduler-file", address, "--nthreads", "1",
-                 "--no-nanny", "--no-dashboard", "--local-directory", tmp_path / f"w{k}"], **quiet,
-            )
-            for k in range(2)
-        ]  # fmt: skip
-        with distributed.Client(scheduler_file=str(address), timeout=600) as client:
-            client.wait_for_workers(2, timeout=600)
+    _, workers, address = dask_processes(
+        2, MARKS=str(marks), HOLD=str(hold), DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES="10"
+    )
+    with distributed.Client(scheduler_file=str(address), timeout=600) as client:
+        client.wait_for_workers(2, timeout=600)
 
-            def kill():
-                wait_for(lambda: lines(tmp_path / "d.ecsv.journal") > 4 and len(list(marks.iterdir())) == 2)
-                workers[0].kill()
-                workers[0].wait()
-                hold.touch()
+        def kill():
+            wait_for(lambda: lines(tmp_path / "d.ecsv.journal") > 4 and len(list(marks.iterdir())) == 2)
+            workers[0].kill()
+            workers[0].wait()
+            hold.touch()
 
-            killer = threading.Thread(target=kill)
-            killer.start()
-            run = screening(16, slow, samples=3, seed=4)
-            run.run(tmp_path / "d.ecsv", executor=client.get_executor(), chunk=1)
-            killer.join()
-        assert workers[0].poll() is not None
-    finally:
-        for process in (*workers, scheduler):
-            process.kill()
-            process.wait()
+        killer = threading.Thread(target=kill)
+        killer.start()
+        run = screening(16, slow, samples=3, seed=4)
+        run.run(tmp_path / "d.ecsv", executor=client.get_executor(), chunk=1)
+        killer.join()
+    assert workers[0].poll() is not None
     same(read_results(tmp_path / "d.ecsv"), reference)
+
+
+# the worker may not have connected yet
+@pytest.mark.filterwarnings("ignore:the dask scheduler .* has no workers")
+def test_a_dask_scheduler_that_is_killed_is_named_and_the_run_goes_on(tmp_path, reference, dask_processes):
+    """It is killed while the worker waits in the eleventh asteroid, so that calls are certainly in progress."""
+    out, marks = tmp_path / "d.ecsv", tmp_path / "marks"
+    marks.mkdir()
+    scheduler, _, address = dask_processes(1, MARKS=str(marks), HOLD=str(tmp_path / "never"))
+
+    def kill():
+        wait_for(lambda: "copy 10" in "".join(f.read_text() for f in marks.iterdir()))
+        wait_for(lambda: lines(out.with_name("d.ecsv.journal")) > 5)
+        scheduler.kill()
+
+    killer = threading.Thread(target=kill)
+    killer.start()
+    with (
+        open_executor(dask=str(address)) as executor,
+        pytest.raises(
+            WorkersLost, match=r"workers died or were lost .*in progress: .*the same call continues"
+        ),
+    ):
+        screening(16, slow, samples=3, seed=4).run(out, executor=executor, chunk=1)
+    killer.join()
+    part = read_results(out)
+    assert not part.meta["complete"]
+    assert 0 < len(part) < len(reference)
+    states = []
+    screening(16, three, samples=3, seed=4).run(out, progress=states.append)
+    assert 5 <= states[0].resumed <= 10
+    same(read_results(out), reference)
 
 
 def test_old_names_of_the_number_of_workers_are_deprecated():

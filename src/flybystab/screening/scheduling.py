@@ -169,13 +169,29 @@ class _Schedule:
         while self.waiting:
             if (found := next(self.waiting[0], None)) is not None:
                 piece, part = found
-                self.calls[self.executor.submit(_judge, part, self.settings)] = piece
+                self.submit(piece, _judge, part, self.settings)
                 return True
             self.waiting.popleft()
         if chosen := list(islice(self.positions, self.chunk)):
             new = [self.asteroids[i] for i in chosen]
-            self.calls[self.executor.submit(_begin, new, self.settings, self.finder, self.block)] = chosen
+            self.submit(chosen, _begin, new, self.settings, self.finder, self.block)
         return bool(chosen)
+
+    def submit(self, call: list[int] | _Piece, function: Callable[..., Any], *arguments: object) -> None:
+        """Submit a call.
+
+        Raises
+        ------
+        WorkersLost
+            The executor has lost its workers since the last result.
+        """
+        try:
+            self.calls[self.executor.submit(function, *arguments)] = call
+        except Exception as error:
+            if not _is_loss(error):
+                raise
+            running = next(iter(self.calls.values()), call)
+            raise self.workers_lost(f"workers died or were lost ({_said(error)})", running) from error
 
     def received(self, future: Future[Any]) -> tuple[list[int] | _Piece, Any]:
         """A finished call and its result.
@@ -190,10 +206,14 @@ class _Schedule:
         except Exception as error:
             if (reason := _failed_workers(error, self.executor)) is None:
                 raise
-            names = ", ".join(self.asteroids[i].name for i in _positions(call))
-            raise WorkersLost(
-                f"{reason}; in progress: {names}. Finished asteroids are kept: the same call continues the run"
-            ) from error
+            raise self.workers_lost(reason, call) from error
+
+    def workers_lost(self, reason: str, call: list[int] | _Piece) -> WorkersLost:
+        """The error that names the asteroids of a call."""
+        names = ", ".join(self.asteroids[i].name for i in _positions(call))
+        return WorkersLost(
+            f"{reason}; in progress: {names}. Finished asteroids are kept: the same call continues the run"
+        )
 
     def take(self, piece: _Piece, verdicts: SampleVerdicts) -> Rows | None:
         """Store the verdicts of a part; the rows of its asteroid if it was the last one."""
@@ -247,18 +267,28 @@ def _failed_workers(error: Exception, executor: Executor) -> str | None:
 
     Errors of lost workers come from concurrent.futures or from dask (``KilledWorker``, closed connections).
     """
-    modules = {kind.__module__.partition(".")[0] for kind in type(error).__mro__}
-    said = ": ".join(filter(None, (type(error).__name__, " ".join(str(error).split()))))
+    said = _said(error)
     if type(error).__name__ == "KilledWorker":
         return (
             "workers died, in most cases because they had too little memory (dask worker --memory-limit) or not the "
             f"same version of flybystab as this process ({said})"
         )
-    if isinstance(error, BrokenExecutor | CancelledError) or "distributed" in modules:
+    if _is_loss(error):
         return f"workers died or were lost ({said})"
     if not isinstance(executor, SerialExecutor) and isinstance(error, _DESERIALISATION):
         return f"workers could not load the tasks: they need the same version of flybystab as this process ({said})"
     return None
+
+
+def _said(error: Exception) -> str:
+    """Type and message of an error in one line."""
+    return ": ".join(filter(None, (type(error).__name__, " ".join(str(error).split()))))
+
+
+def _is_loss(error: Exception) -> bool:
+    """Whether an error of concurrent.futures or of dask means that workers or the scheduler were lost."""
+    modules = {kind.__module__.partition(".")[0] for kind in type(error).__mro__}
+    return isinstance(error, BrokenExecutor | CancelledError) or "distributed" in modules
 
 
 #: Raised where a worker has no flybystab or another version of it; dask reports them as RuntimeError.
