@@ -44,7 +44,7 @@ def flown(body: Body, encounter: Encounter, attitude: NDArray[np.float64]) -> Ca
         keep=20_000,
     )
     q = run.history["quaternion"]
-    vectors = CubicSpline(run.history["time"], Rotation.from_quat(q, scalar_first=True).as_matrix())
+    vectors = CubicSpline(run.history["time"], Rotation.from_quat(np.roll(q, -1, axis=-1)).as_matrix())
 
     def gap(t: float) -> float:
         r = encounter.positions(t)[0]

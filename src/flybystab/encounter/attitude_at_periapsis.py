@@ -60,5 +60,5 @@ def attitude_at_start(body: Body, encounter: Encounter, at_periapsis: object) ->
             rtol=_TOLERANCE,
             atol=_TOLERANCE * size,
         )
-        turned = Rotation.from_quat(found.y[:4, -1], scalar_first=True)
+        turned = Rotation.from_quat(np.roll(found.y[:4, -1], -1))  # scipy's scalar is the last component
     return target @ turned.as_matrix().T

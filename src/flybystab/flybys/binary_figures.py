@@ -121,4 +121,5 @@ def synchronous(frames: Array, state: Array, rate: float) -> tuple[Array, Array]
     normal = frames[:, :, 2]
     axes = np.stack([first, np.cross(normal, first), normal], axis=2)
     spin = np.tile([0.0, 0.0, rate], (len(state), 1))
-    return np.asarray(Rotation.from_matrix(axes).as_quat(scalar_first=True)), spin
+    # scipy's scalar is the last component
+    return np.roll(Rotation.from_matrix(axes).as_quat(), 1, axis=-1), spin

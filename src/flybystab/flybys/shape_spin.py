@@ -138,7 +138,7 @@ def shape_spin(
     allowed = to_si(error, u.dimensionless_unscaled, "error", low=1e-10, high=1e-2)
     start = periapsis_axes(encounter).T @ attitude_matrix(attitude)
     motion = _Motion(shape, encounter)
-    q0 = Rotation.from_matrix(start).as_quat(scalar_first=True)
+    q0 = np.roll(Rotation.from_matrix(start).as_quat(), 1)  # scipy's scalar is the last component
     first = np.concatenate([q0, body.omega])
     plain, torques = motion.followed(first, octupole=False, tolerance=STEP * allowed)
     ratio = torques[1] / torques[0] if torques[0] > 0.0 else 0.0
@@ -252,4 +252,4 @@ class _Motion:
 
 
 def _matrix(y: Array) -> Array:
-    return np.asarray(Rotation.from_quat(y[:4], scalar_first=True).as_matrix())
+    return np.asarray(Rotation.from_quat(np.roll(y[:4], -1)).as_matrix())
