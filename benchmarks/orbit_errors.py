@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from flybystab.catalogues import orbit_errors
 from flybystab.catalogues.asteroid import Asteroid
 from flybystab.catalogues.catalogue import catalogue
-from flybystab.catalogues.orbit_errors import SHARE
+from flybystab.catalogues.orbit_errors import FACTOR
 from flybystab.catalogues.orbit_errors import runoff as sigma_of_code
 from flybystab.constants import AU, YEAR
 from flybystab.encounter.encounter import Encounter
@@ -121,7 +121,7 @@ def runoff() -> list[str]:
         "JPL's orbits of 2020-09 at the epoch of those of 2026-07: distance over semi-major axis, arcsec in ten years",
         "code orbits    sigma   median     68 %     95 %  within sigma  2 sigma",
     ]
-    ratio = np.array([r / (sigma_of_code(int(c)) * SHARE) for r, c in zip(rate, code, strict=True)])
+    ratio = np.array([r / (sigma_of_code(int(c)) * FACTOR) for r, c in zip(rate, code, strict=True)])
     for c in [*range(10), None]:
         here = np.isfinite(rate) & (code == c if c is not None else code >= 0)
         shares = f"{100 * np.mean(ratio[here] < 1.0):11.0f} % {100 * np.mean(ratio[here] < 2.0):6.0f} %"
@@ -129,7 +129,7 @@ def runoff() -> list[str]:
             out.append(f" all {here.sum():6d} {'':35s} {shares}")
         elif here.any():
             measured = np.percentile(rate[here] * unit, [50, 68, 95])
-            numbers = " ".join(f"{x:8.3g}" for x in (sigma_of_code(c) * SHARE * unit, *measured))
+            numbers = " ".join(f"{x:8.3g}" for x in (sigma_of_code(c) * FACTOR * unit, *measured))
             out.append(f"{c:4d} {here.sum():6d} {numbers} {shares}")
     return out
 
@@ -242,7 +242,7 @@ def pairs(size: int = 200) -> dict[str, list[tuple[Orbit, Orbit]]]:
 def factor(size: int = 500) -> list[str]:
     """Shares within 1 and 3 sigma by the part of the runoff that is called one sigma, for two halves of the asteroids.
 
-    The first half is that of the choice of ``orbit_errors.SHARE``; `size` limits the asteroids with U = 0.
+    The first half is that of the choice of ``orbit_errors.FACTOR``; `size` limits the asteroids with U = 0.
     """
     new, mpc = read(NEW), read(MPC)
     late = {k: a.orbit for k, a in new.items() if abs(seconds(a.epoch, MEETING)) < 2.0 * YEAR}
@@ -259,7 +259,7 @@ def factor(size: int = 500) -> list[str]:
     ]
     for label, reliable in (("others", True), ("weak, old", False)):
         for share in (1.0 / 3.0, 0.5, 2.0 / 3.0, 1.0):
-            orbit_errors.SHARE = orbit_errors.SHARE_UNRELIABLE = share
+            orbit_errors.FACTOR = orbit_errors.FACTOR_UNRELIABLE = share
             cells = []
             for half in (0, 1):
                 some = [k for k in keys if known[k] is reliable and zlib.crc32(k.encode()) % 2 == half]
@@ -274,7 +274,7 @@ def factor(size: int = 500) -> list[str]:
                     f"{len(z):6d} {100 * shares[0]:6.0f} % {100 * shares[1]:6.1f} +- {100 * error:3.1f} %"
                 )
             out.append(f"{label:11s} {share:12.2f}   " + "   ".join(cells))
-    orbit_errors.SHARE, orbit_errors.SHARE_UNRELIABLE = SHARE, 1.0
+    orbit_errors.FACTOR, orbit_errors.FACTOR_UNRELIABLE = FACTOR, 1.0
     return out
 
 

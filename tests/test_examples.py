@@ -144,7 +144,7 @@ def test_apophis_forecast(monkeypatch, tmp_path):
     table = QTable.read(tmp_path / "out" / "apophis_forecast.ecsv")
     assert np.all(table["share_sam"] > 0.8)
     assert np.all((table["pole_change_50"] > 9 * u.deg) & (table["pole_change_95"] > 20 * u.deg))
-    # rival periods change the median forecast by less than the spread over the phases
+    # alternative periods change the median forecast by less than the spread over the phases
     middle = table["precession_period_50"][:3].to_value(u.h)
     spread = (table["precession_period_95"] - table["precession_period_5"])[0].to_value(u.h)
     assert np.ptp(middle) < 0.05 * spread

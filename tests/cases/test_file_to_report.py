@@ -159,7 +159,7 @@ def test_physical_parameters_of_a_file_complete_its_orbit(tmp_path, capsys):
     words = ["flyby", str(FILES / "2018VP1.eq0"), "--date", "2018-11-02", "--attitudes", "2", "--assume"]
     assert main([*words, "--phys", str(spins)]) == 0
     shown = capsys.readouterr().out
-    assert "one of 2 rival spin solutions (weight 67%)" in shown
+    assert "one of 2 alternative spin solutions (weight 67%)" in shown
     assert "pole unknown" not in shown
     assert "spin period" not in shown.partition("assumed")[2]
 

@@ -8,7 +8,7 @@ from astropy.time import Time
 
 import flybystab as fs
 from flybystab.catalogues.asteroid import Asteroid
-from flybystab.catalogues.orbit_errors import SHARE, SHARE_UNRELIABLE, error_of, runoff
+from flybystab.catalogues.orbit_errors import FACTOR, FACTOR_UNRELIABLE, error_of, runoff
 from flybystab.catalogues.readers.arcs import arc_columns
 from flybystab.catalogues.readers.mpc import from_mpc
 from flybystab.constants import AU, YEAR
@@ -74,7 +74,7 @@ def test_the_longitude_is_known_where_it_was_observed():
         gap = np.linalg.norm(
             np.subtract(*(two_body(GM_SUN, covariance.values + k * way, t)[:3] for k in (0.0, 1.0)))
         )
-        assert gap == pytest.approx(share * axis * runoff(2) * SHARE * 10.0 * YEAR, rel=0.2, abs=1e3)
+        assert gap == pytest.approx(share * axis * runoff(2) * FACTOR * 10.0 * YEAR, rel=0.2, abs=1e3)
 
 
 @pytest.mark.parametrize("name", ["2023 CX1", "2024 BX1"])
@@ -168,7 +168,7 @@ def test_one_sigma_is_a_part_of_the_runoff():
         np.linalg.norm(mpc("Apophis", U="2", arc=arc, last_obs="2015-06-01").orbit.covariance.sigma[3:])
         for arc in ("2014-2016", "20 d")
     )
-    assert weak / good == pytest.approx(SHARE_UNRELIABLE / SHARE, rel=0.1)
+    assert weak / good == pytest.approx(FACTOR_UNRELIABLE / FACTOR, rel=0.1)
 
 
 @pytest.mark.parametrize(

@@ -1,4 +1,4 @@
-"""Physical parameters from files of JPL, SsODNet, DAMIT, the LCDB and a user, and rival spin solutions."""
+"""Physical parameters from files of JPL, SsODNet, DAMIT, the LCDB and a user, and alternative spin solutions."""
 
 import gzip
 import json
@@ -66,7 +66,7 @@ LCDB = (
     "887,Alinda,1918 DB,9101,A,S*,D,-,5.26,L,13.76,V,A,0.24,-9.99,A,-,0.20,-,11.0,-,-,0.12,0.35,1+,-,-,Y,-,N,N\n"
     "99942,Apophis,2004 MN4,9101,A,S,D,-,-9.99,L,18.94,V,A,0.24,-9.99,A,-,-9.99,-,30.56,-,-,0.3,1.14,3,T,-,Y,-,N,N\n"
 )
-RIVALS = (
+SOLUTIONS = (
     "period_h,sigma_h,lon_deg,lat_deg,weight,source\n5.2,0.01,10,20,3,A\n7.8,,190,-20,1,B\n10.4,0.1,,,1,C\n"
 )
 
@@ -127,7 +127,7 @@ def test_gm_and_extent_give_the_density(tmp_path):
     assert a.sources["density"].endswith("with extent")
 
 
-def test_spin_files_of_damit_are_rivals(tmp_path):
+def test_spin_files_of_damit_are_alternatives(tmp_path):
     itokawa = fs.Asteroid.from_catalogue("Itokawa")
     one = itokawa.with_physical(write(tmp_path / "spin.txt", SPIN))
     assert one.quantity("spin_period_h").value == 12.13237
@@ -136,7 +136,7 @@ def test_spin_files_of_damit_are_rivals(tmp_path):
     assert one.semi_axes.value == pytest.approx(itokawa.semi_axes.value)
     two = itokawa.with_physical(tmp_path / "spin.txt", write(tmp_path / "mirror.txt", MIRROR))
     assert [s.pole for s in two.spin_solutions] == [(252.0, -63.0), (72.5, -50.1)]
-    assert any("one of 2 rival spin solutions (weight 50%)" in x for x in two.assumptions)
+    assert any("one of 2 alternative spin solutions (weight 50%)" in x for x in two.assumptions)
 
 
 def test_rows_of_the_lcdb(tmp_path):
@@ -158,8 +158,8 @@ def test_rows_of_the_lcdb(tmp_path):
         fs.Asteroid.from_catalogue("Bennu").with_physical(path)
 
 
-def test_a_screening_draws_rival_solutions_by_their_weights(tmp_path):
-    a = fs.Asteroid.from_catalogue("Itokawa").with_physical(write(tmp_path / "rivals.csv", RIVALS))
+def test_a_screening_draws_alternative_solutions_by_their_weights(tmp_path):
+    a = fs.Asteroid.from_catalogue("Itokawa").with_physical(write(tmp_path / "solutions.csv", SOLUTIONS))
     assert (a.quantity("spin_period_h").value, a.sources["spin"]) == (5.2, "A")
     sample = draws(a, 5000, seed=4)
     hours = sample.period / 3600.0
@@ -178,7 +178,7 @@ def test_a_screening_draws_rival_solutions_by_their_weights(tmp_path):
     assert np.array_equal(draws(a, 100, seed=4).period, sample.period[:100])
 
 
-def test_without_rivals_the_draws_are_those_of_the_catalogue():
+def test_without_alternatives_the_draws_are_those_of_the_catalogue():
     a = fs.Asteroid.from_catalogue("Itokawa")
     assert (draws(a, 10, seed=1).solution == -1).all()
 
@@ -195,7 +195,7 @@ def test_solutions_survive_their_column():
 
 def test_formats_do_not_overlap_and_are_gzipped_or_named_as_they_like(tmp_path):
 
-    texts = [json.dumps(CARD), SPIN, MIRROR, LCDB, RIVALS, json.dumps(ANSWER)]
+    texts = [json.dumps(CARD), SPIN, MIRROR, LCDB, SOLUTIONS, json.dumps(ANSWER)]
     for text in texts:
         assert sum(r.identify(text.replace("\r\n", "\n")) for r in PHYSICAL_READERS) == 1
         windows = text.replace("\r\n", "\n").replace("\n", "\r\n")
@@ -211,7 +211,7 @@ def test_other_files_are_refused(tmp_path, text):
 
 
 def test_the_option_of_the_shell(tmp_path, capsys):
-    path = write(tmp_path / "rivals.csv", RIVALS)
+    path = write(tmp_path / "solutions.csv", SOLUTIONS)
     assert main(["stability", "Itokawa", "--phys", str(path)]) == 0
     first = capsys.readouterr().out
     assert main(["stability", "Itokawa", "--phys", str(path), "--period", "12.1 h"]) == 0

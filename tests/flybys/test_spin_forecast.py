@@ -37,12 +37,12 @@ def test_it_is_the_spin_sample_of_the_same_phases():
     assert np.max(np.abs((turned.precession_period - found.precession_period).value)) > 0.1
 
 
-def test_rival_solutions():
-    rival = APOPHIS.with_tumbling(27.374 * u.h, 262.2 * u.h, inertia=(0.61, 0.965))
-    j = rival.body.inertia.value
+def test_alternative_solutions():
+    other = APOPHIS.with_tumbling(27.374 * u.h, 262.2 * u.h, inertia=(0.61, 0.965))
+    j = other.body.inertia.value
     assert j[:2] / j[2] == pytest.approx([0.61, 0.965], rel=1e-12)
-    assert rival.body.volume.value == pytest.approx(APOPHIS.body.volume.value, rel=1e-12)
-    assert rival.quantity("precession_period_h") == 27.374 * u.h
+    assert other.body.volume.value == pytest.approx(APOPHIS.body.volume.value, rel=1e-12)
+    assert other.quantity("precession_period_h") == 27.374 * u.h
     with pytest.raises(InvalidInput, match="inertia"):
         APOPHIS.with_tumbling(27 * u.h, 262 * u.h, inertia=(0.3, 0.6))
     with pytest.raises(InvalidInput, match="Encounter"):

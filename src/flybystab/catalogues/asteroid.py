@@ -29,13 +29,13 @@ if TYPE_CHECKING:
     from flybystab.orbit.covariance import Covariance
     from flybystab.orbit.orbit import Orbit
 
-#: Version of the embedded table: the date of its newest source.
+#: Version of the embedded catalogue: date of its newest source.
 CATALOGUE_DATE = "2026-07"
 
 
 @lru_cache(maxsize=64)
 def _day(jd: float) -> Time:
-    """A Time (TDB) from a Julian date; cached, since most rows of a catalogue have the same epoch."""
+    """Time (TDB) from a Julian date; cached, since most rows of a catalogue have the same epoch."""
     whole = np.floor(jd)
     return Time(whole, jd - whole, format="jd", scale="tdb")
 
@@ -49,23 +49,24 @@ class Asteroid(Record):
     row : mapping of str to str, optional
         A row of a catalogue.
     material : Material, optional
-        Material of the body, which catalogues do not give. By default that of `body`, otherwise 35 degrees of friction.
+        Material of the body; catalogues do not contain one. By default that of `body`, or without a body a friction
+        angle of 35 degrees.
     file : str
         File from which the row was read; "given values" by default.
     covariance : Covariance, optional
-        Covariance of the orbit, if a file gives one; otherwise see :attr:`orbit`.
+        Covariance of the orbit, if it is published; by default as described in :attr:`orbit`.
     orbit : Orbit, optional
-        Replaces the elements of the row; with its own covariance.
+        Replaces the elements of the row and their covariance.
     body : Body, optional
-        Replaces semi-axes, density, period and material of the row. It must spin about its short axis.
+        Replaces semi-axes, density, period and material. It must rotate about its short axis.
     pole : Quantity (2,), optional
         Ecliptic longitude and latitude (J2000) of the spin pole.
     sigmas : mapping, optional
-        1-sigma errors of the body: ``axes`` (one length or three), ``density``, ``period``. A screening samples them.
+        1-sigma errors of ``axes`` (one length or three), ``density`` and ``period``, which a screening samples.
     sources : mapping, optional
-        Sources by name: ``axes``, ``diameter``, ``density``, ``period``, ``pole``, ``orbit``.
+        Sources of ``axes``, ``diameter``, ``density``, ``period``, ``pole`` and ``orbit``.
     name : str, optional
-        That of the orbit by default.
+        By default the name of the orbit.
 
     Raises
     ------
@@ -134,19 +135,19 @@ class Asteroid(Record):
     @classmethod
     @check_arguments
     def from_catalogue(cls, name: str | int, material: Material | None = None) -> Asteroid:
-        """The asteroid of the embedded catalogue with this number, name or designation.
+        """The asteroid with this number, name or designation in the embedded catalogue.
 
         Parameters
         ----------
         name : str or int
-            "Apophis", 99942, "2004 MN4", "2004mn4", "(99942) Apophis"; case and spaces are ignored.
+            For example "Apophis", 99942, "2004 MN4" or "(99942) Apophis"; case and spaces are ignored.
         material : Material, optional
             Material of the body.
 
         Raises
         ------
         UnknownName
-            With near matches.
+            There is no such asteroid; the message lists similar names.
         """
         from flybystab.catalogues.catalogue import catalogue, find
 
@@ -155,7 +156,7 @@ class Asteroid(Record):
     @classmethod
     @check_arguments
     def from_file(cls, path: str | Path, name: str | int, material: Material | None = None) -> Asteroid:
-        """The asteroid with this number, name or designation of a file with the catalogue's columns."""
+        """The asteroid with this number, name or designation in a file, of any format of :func:`catalogue`."""
         from flybystab.catalogues.catalogue import catalogue, find
 
         return find(catalogue(path), name, str(path)).with_material(material)
@@ -169,14 +170,14 @@ class Asteroid(Record):
     def with_shape(self, shape: Shape) -> Asteroid:
         """The same asteroid with the equivalent ellipsoid of a polyhedral shape (:meth:`Body.from_shape`).
 
-        The semi-axes are treated as measured. Their relative uncertainties are those of the row, since a shape model
-        does not give its own. A catalogued pole and spin state refer to the principal axes of the shape.
+        The semi-axes are marked as measured. Their relative errors are kept from the row, since a shape model does not
+        include errors. Pole and spin state refer to the principal axes of the shape.
 
         Raises
         ------
         InvalidInput
-            For anything but a Shape. A tumbling solution whose periods are not possible for the inertia of the shape
-            raises it when the body is built.
+            `shape` is not a Shape. A tumbling solution that is impossible for the moments of inertia of the shape
+            raises it later, when the body is built.
         """
         if not isinstance(shape, Shape):
             raise InvalidInput("shape", shape, "a flybystab.Shape")
@@ -193,19 +194,19 @@ class Asteroid(Record):
         return replace(self, row=row)
 
     def with_physical(self, *files: str | Path) -> Asteroid:
-        """The same asteroid with the physical parameters of files in place of its own, each with its source.
+        """The same asteroid with its physical parameters replaced by those in files, each with its source.
 
         Parameters
         ----------
         *files : str or Path
-            Of any format of :mod:`flybystab.catalogues.physical`: an SBDB answer with ``phys_par``, a card of SsODNet,
-            a spin file of DAMIT, a table of the LCDB or of spin solutions. Spin solutions of all files are rivals
-            (:attr:`spin_solutions`).
+            Files in a format of :mod:`flybystab.catalogues.physical`: an SBDB answer with ``phys_par``, a card of
+            SsODNet, a spin file of DAMIT, a table of the LCDB or of spin solutions. The spin solutions of all files are
+            alternatives (:attr:`spin_solutions`).
 
         Raises
         ------
         InvalidInput
-            A file cannot be read, or has no data of this asteroid.
+            A file cannot be read, or does not contain this asteroid.
         """
         from flybystab.catalogues.physical import with_physical
 
@@ -213,7 +214,7 @@ class Asteroid(Record):
 
     @cached_property
     def spin_solutions(self) -> tuple[SpinSolution, ...]:
-        """Rival spin solutions, with weights; a screening draws one for each sample. Empty where there are none."""
+        """Alternative spin solutions with weights, from which a screening draws; empty if there are none."""
         return solutions_of(self.row)
 
     @check_arguments
@@ -225,16 +226,17 @@ class Asteroid(Record):
         *,
         inertia: tuple[float, float] | None = None,
     ) -> Asteroid:
-        """The same asteroid with another tumbling solution, for alternative solutions of its lightcurves.
+        """The same asteroid with another tumbling solution of its lightcurves.
 
         Parameters
         ----------
         precession_period, rotation_period : Quantity
+            Periods ``P_phi`` and ``P_psi`` (:mod:`flybystab.catalogues.tumbling`).
         mode : str
-            "SAM" or "LAM".
+            "SAM" (short-axis mode) or "LAM" (long-axis mode).
         inertia : (float, float), optional
-            Ratios ``J1/J3`` and ``J2/J3`` of the moments of inertia: the semi-axes become those of the homogeneous
-            ellipsoid with these ratios and the same volume.
+            Ratios ``J1/J3`` and ``J2/J3`` of the moments of inertia. The semi-axes are replaced by those of the
+            homogeneous ellipsoid with these ratios and the same volume.
         """
         row = dict(self.row)
         for column, value in (
@@ -255,7 +257,7 @@ class Asteroid(Record):
         return replace(self, row=row)
 
     def __reduce__(self) -> tuple[type[Asteroid], tuple[object, ...]]:
-        # Without the cached orbit and body, which are rebuilt from the new row.
+        # Excludes the cached orbit and body, which are rebuilt when needed.
         return Asteroid, (dict(self.row), self.material, self.file, self.covariance, self.own_orbit)
 
     def __repr__(self) -> str:
@@ -263,11 +265,11 @@ class Asteroid(Record):
 
     @check_arguments
     def completed(self, other: Asteroid) -> Asteroid:
-        """The same asteroid with unknown physical values and names completed from another row."""
+        """The same asteroid with missing physical values and names taken from another row."""
         row = dict(self.row)
         if other.row.get("name") and row.get("name", "") in ("", row.get("designation"), row.get("number")):
             row["name"] = other.row["name"]
-        # A size or a period from another row would be inconsistent with the shape and the spin state of this one.
+        # Columns of size, shape and spin are replaced together: mixing two rows would be inconsistent.
         for c, v in other.row.items():
             if c not in ORBITAL and (not row.get(c) or c in BODILY):
                 row[c] = v
@@ -280,12 +282,12 @@ class Asteroid(Record):
 
     @cached_property
     def orbit(self) -> Orbit:
-        """The orbit, from the elements of the row with every digit, with A1, A2, A3, DT, AMRAT (zero if not known).
+        """The orbit, from the elements of the row and A1, A2, A3, DT, AMRAT (zero if unknown).
 
         The elements are a, e, i, node, peri, M, or q and the time of perihelion in place of a and M.
 
-        Its covariance is the first of these that exists: that given for the asteroid; that in the package; the diagonal
-        of the 1-sigmas of the row, marked as uncorrelated; an estimate from digits and U
+        The covariance is the first available of: the one given for the asteroid; the one included in the package; a
+        diagonal matrix from the 1-sigmas of the row, marked as uncorrelated; an estimate from printed digits and U
         (:mod:`flybystab.catalogues.orbit_errors`). Otherwise it is None.
         """
         from flybystab.orbit.forces import NonGravitational, au_per_day2
@@ -300,17 +302,17 @@ class Asteroid(Record):
         )
         delay = self._number("DT_d") * DAY if self.row.get("DT_d") else 0.0
         area = self._number("AMRAT_m2_kg") if self.row.get("AMRAT_m2_kg") else 0.0
-        push = NonGravitational((a1, a2, a3), self.row.get("nongrav_law") or "asteroid", delay, area)
-        _ = push.constants  # refuses an unknown law
+        nongrav = NonGravitational((a1, a2, a3), self.row.get("nongrav_law") or "asteroid", delay, area)
+        _ = nongrav.constants  # raises for an unknown law
         if self.knows(*PERIHELION) and not self.knows("a_au", "M_deg"):
             state = self._state_by_perihelion()
             r, v = state[:3] * u.m, state[3:] * u.m / u.s
-            return Orbit(epoch, r, v, nongrav=push, name=self.name, covariance=self.covariance)
+            return Orbit(epoch, r, v, nongrav=nongrav, name=self.name, covariance=self.covariance)
         elements = [self._number(c) * unit for c, unit in zip(ORBIT[1:], ORBIT_SI.tolist(), strict=True)]
-        return Orbit._from_si_elements(epoch, elements, push, self.name, self._covariance(epoch))
+        return Orbit._from_si_elements(epoch, elements, nongrav, self.name, self._covariance(epoch))
 
     def _state_by_perihelion(self) -> Array:
-        """Heliocentric state (m, m/s), shape (6,), by the distance and the time of perihelion; any conic."""
+        """Heliocentric state (m, m/s), shape (6,), from perihelion distance and time, for any conic."""
         from flybystab.constants import AU
         from flybystab.orbit.elements import state_from_elements
 
@@ -324,9 +326,8 @@ class Asteroid(Record):
         if self.file.startswith("embedded") and (known := embedded_covariance(self.row.get("number", ""))):
             return known
         sigmas = tuple("sigma_" + c for c in ORBIT[1:])
-        if not self.knows(*sigmas) or not any(
-            self._number(c) for c in sigmas
-        ):  # zeros mean that they are not given
+        # Sigmas that are all zero denote unknown errors.
+        if not self.knows(*sigmas) or not any(self._number(c) for c in sigmas):
             from flybystab.catalogues.orbit_errors import error_of
 
             return error_of(self.row, epoch)
@@ -355,27 +356,27 @@ class Asteroid(Record):
 
     @cached_property
     def body(self) -> Body:
-        """The body, of the asteroid's `material`; a tumbler at phase zero of its rotation."""
+        """The body, with the `material` of the asteroid; for a tumbler at phase zero of its rotation."""
         return self.body_with()
 
     @check_arguments
     def body_with(self, material: Material | None = None, *, phase: float = 0.0) -> Body:
-        """The body.
+        """The body with a given material and, for a tumbler, at a given phase.
 
         Parameters
         ----------
         material : Material, optional
-            Replaces that of the asteroid.
+            By default that of the asteroid.
         phase : float
-            For a tumbler: fraction of its rotation period, which determines the direction of the spin vector in the
-            body.
+            For a tumbler: phase as a fraction of its rotation period, which determines the direction of the spin vector
+            in the body.
 
         Returns
         -------
         Body
-            Spinning about its short axis, or with the angular velocity of the tumbling solution (a
-            homogeneous ellipsoid with the two observed periods). A tumbler without a solution spins about
-            its short axis with its main lightcurve period: this is listed in `assumptions`.
+            Homogeneous ellipsoid, spinning about its short axis or with the angular velocity of the tumbling solution
+            (that with the two observed periods). A tumbler without a solution spins about its short axis with its main
+            lightcurve period, which is listed in `assumptions`.
         """
         material = material or self.material
         missing = [c for c in (*SHAPE, "density_kg_m3") if not self.row.get(c)]
@@ -385,8 +386,8 @@ class Asteroid(Record):
             raise InvalidInput(
                 ", ".join(missing),
                 "(empty)",
-                f"values for {self.label} in {self.file}: give them (--axes, --density, --period; "
-                "Asteroid(body=...)), or let --assume or screen() draw them from a population",
+                f"values for {self.label} in {self.file}: specify them (--axes, --density, --period; "
+                "Asteroid(body=...)), or take them from a population (--assume, screen())",
             )
         density = self.quantity("density_kg_m3")
         if not self.tumbles:
@@ -399,7 +400,7 @@ class Asteroid(Record):
     def angular_velocities(self, phase: Array) -> Array:
         """Angular velocities along the body axes, rad/s, shape (n, 3), at phases of the rotation, shape (n,).
 
-        They are all equal for a body that does not tumble.
+        All rows are equal for a body that does not tumble.
         """
         if self.tumbles:
             moments, momentum, j = self._tumbling
@@ -418,7 +419,7 @@ class Asteroid(Record):
 
     @property
     def pole(self) -> Array | None:
-        """Unit vector, ICRF, of the spin pole (angular momentum of a tumbler); None where not known."""
+        """Unit vector (ICRF) of the spin pole, or of the angular momentum of a tumbler; None if unknown."""
         if not self.knows("pole_ecl_lon_deg", "pole_ecl_lat_deg"):
             return None
         lon, lat = (np.radians(self._number(c)) for c in ("pole_ecl_lon_deg", "pole_ecl_lat_deg"))
@@ -433,9 +434,9 @@ class Asteroid(Record):
         Parameters
         ----------
         angle : Quantity
-            Rotation angle about the pole. It cannot be predicted for a date decades away.
+            Rotation angle about the pole; unpredictable for a date decades away.
         phase : float
-            Phase of a tumbler, as given to `body_with`.
+            Phase of a tumbler, as in `body_with`.
         pole : ndarray (3,), optional
             Direction, ICRF, of the angular momentum instead of the catalogued one.
 
@@ -470,7 +471,7 @@ class Asteroid(Record):
         if self.spin_solutions:
             total = sum(s.weight for s in self.spin_solutions)
             weight = max(s.weight for s in self.spin_solutions) / total
-            out.append(f"one of {len(self.spin_solutions)} rival spin solutions (weight {weight:.0%})")
+            out.append(f"one of {len(self.spin_solutions)} alternative spin solutions (weight {weight:.0%})")
         if self.pole is None:
             out.append("pole unknown")
         if "spin_state" in self.assumed:

@@ -1,4 +1,4 @@
-"""The embedded catalogue of near-Earth asteroids, and files in its format or another known one."""
+"""The embedded catalogue of near-Earth asteroids, and files in its format or any other known format."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ __all__ = ["CATALOGUE_DATE", "TEXTS", "UNITS", "Asteroid", "catalogue", "catalog
 
 
 def find(asteroids: Sequence[Asteroid], name: str | int, where: str) -> Asteroid:
-    """The asteroid with this name, or UnknownName with near matches."""
+    """The asteroid with this name; raises UnknownName with near matches if there is none."""
     index: dict[str, Asteroid] = {}
     for a in asteroids:
         for n in a.names:
@@ -48,7 +48,7 @@ def find(asteroids: Sequence[Asteroid], name: str | int, where: str) -> Asteroid
 
 
 def _other_names(text: str) -> list[str]:
-    """Names in a text such as ``Bennu (101955)``, and the number of an identifier of JPL (20101955, a0101955)."""
+    """Names in a text such as ``Bennu (101955)``, and the number in a JPL identifier (20101955, a0101955)."""
     parts = name_columns(text)
     found = [parts[c] for c in ("number", "designation", "name") if parts.get(c)]
     if after := re.fullmatch(r"(.*\S)\s*\((\d+)\)", text.strip()):
@@ -61,7 +61,7 @@ def _other_names(text: str) -> list[str]:
 def _read(text: str, file: str, name: str) -> tuple[Asteroid, ...]:
     """Asteroids of a text, read by the reader of its format."""
     found = READERS.of(text)
-    material = Material()  # checked once, which takes longer than reading a row
+    material = Material()  # one for all rows: checking it takes longer than reading a row
     if found is None:
         return tuple(Asteroid(row, material, file) for row, _ in read_native(text, file))
     source = {"frame": FRAME, "orbit_source": f"{found.name} ({name})"}
@@ -78,22 +78,22 @@ def _embedded() -> tuple[Asteroid, ...]:
 
 
 def catalogue(path: object = None) -> tuple[Asteroid, ...]:
-    """All asteroids of the embedded catalogue, or of a file, in their order.
+    """All asteroids of the embedded catalogue or of a file, in the order of its rows.
 
-    The format is recognised from the content of the file (:mod:`flybystab.catalogues.readers`), which may be
-    gzipped: the catalogue's own columns, or those of an agency or program (``docs/inputs.md``). Objects of astroquery
-    and sbpy are accepted as well (:mod:`flybystab.catalogues.objects`).
+    The format of a file is recognised from its content (:mod:`flybystab.catalogues.readers`): the columns of the
+    embedded catalogue, or a format of an agency or program (``docs/inputs.md``). Files may be gzipped. Objects of
+    astroquery and sbpy are accepted as well (:mod:`flybystab.catalogues.objects`).
 
-    The catalogue's own format needs only the columns that are used: a name,
+    In the format of the embedded catalogue only the columns in use are required: a name,
     ``epoch_jd_tdb, a_au, e, i_deg, node_deg, peri_deg, M_deg`` for orbits,
     ``semi_axis_{a,b,c}_m, density_kg_m3, spin_period_h`` for bodies.
 
     Raises
     ------
     InvalidInput
-        The file cannot be read or a row has the wrong number of cells.
+        The file cannot be read, or a row has the wrong number of cells.
     UnknownName
-        A column is not one of the catalogue's.
+        A column has an unknown name.
     """
     if path is None:
         return _embedded()
@@ -103,12 +103,12 @@ def catalogue(path: object = None) -> tuple[Asteroid, ...]:
 
 
 def catalogue_table(path: str | Path | None = None) -> QTable:
-    """The catalogue as a table with units; nan where a number is not known.
+    """The catalogue as a table with units; unknown numbers are nan.
 
     Returns
     -------
     QTable
-        One row per asteroid and the columns of the file; its provenance in ``meta``.
+        One row per asteroid and one column per property; provenance in ``meta``.
     """
     asteroids = catalogue(path)
     table = QTable()

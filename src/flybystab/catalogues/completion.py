@@ -1,4 +1,4 @@
-"""Bodies of asteroids in tables of orbits, completed from the embedded tables."""
+"""Completion of orbits from files with the physical properties in the embedded tables."""
 
 from __future__ import annotations
 
@@ -12,9 +12,10 @@ if TYPE_CHECKING:
 
 
 def with_physical_data(asteroids: Sequence[Asteroid]) -> tuple[Asteroid, ...]:
-    """Asteroids whose empty physical columns are filled from the embedded tables.
+    """Asteroids with empty physical columns filled from the embedded tables.
 
-    First from the embedded catalogue; then spin period and amplitude from the LCDB.
+    Values come from the embedded catalogue or, for asteroids that it does not contain, from the LCDB (spin period and
+    amplitude).
     """
     from flybystab.catalogues.asteroid import identity
     from flybystab.catalogues.catalogue import catalogue, key_of
@@ -41,8 +42,8 @@ def with_physical_data(asteroids: Sequence[Asteroid]) -> tuple[Asteroid, ...]:
 
 
 def foreign(asteroid: Asteroid) -> bool:
-    """Whether an orbit comes from a file of another publisher, so that its body is completed from the embedded tables.
+    """Whether an orbit comes from a file in a foreign format, so that its body is completed from the embedded tables.
 
-    Sources of such orbits end with the name of the file (:func:`flybystab.catalogues.catalogue.catalogue`).
+    The source of such an orbit ends with the name of the file (:func:`flybystab.catalogues.catalogue.catalogue`).
     """
     return asteroid.row.get("orbit_source", "").endswith(f"({Path(asteroid.file).name})")

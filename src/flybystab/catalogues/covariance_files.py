@@ -1,4 +1,4 @@
-"""Orbit covariances in the package, by number of the asteroid (``data/covariances``)."""
+"""Orbit covariances included in the package, by number of the asteroid (``data/covariances``)."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @lru_cache(maxsize=64)
 def embedded_covariance(number: str) -> Covariance | None:
-    """Published covariance of the orbit of a numbered asteroid; None if the package has none."""
+    """Published covariance of the orbit of a numbered asteroid; None if the package does not include one."""
     if not number.isdigit():
         return None
     for suffix, read in ((".json", from_sbdb_answer), (".ke1", from_neocc)):

@@ -19,7 +19,7 @@ def _table() -> dict[str, tuple[str, str]]:
 
 
 def names_of(number: str) -> tuple[str, str]:
-    """Name and designation of a number (``data/names.csv``), each empty where there is none."""
+    """Name and designation of a numbered asteroid (``data/names.csv``); each is empty if unknown."""
     return _table().get(number, ("", ""))
 
 
@@ -29,7 +29,7 @@ _LETTERS = "ABCDEFGHJKLMNOPQRSTUVWXYZ"
 
 
 def unpacked(text: str) -> str:
-    """Number or designation from its packed form; any other text is returned unchanged.
+    """Number or designation from its packed form; other texts are returned unchanged.
 
     ``K04M04N`` is 2004 MN4, ``a0001`` 360001, ``~0K8Q`` 697402 (620000 and a number in base 62), ``_QC0000``
     2026 CA620, ``PLS2040`` 2040 P-L, ``CK20F030`` C/2020 F3, ``0001P`` 1P
@@ -56,7 +56,7 @@ def unpacked(text: str) -> str:
         if number:
             return f"{int(number)}{kind}" + (f"-{body[6].upper()}" if body[6].islower() else "")
         order = 10 * _DIGITS.index(body[4]) + int(body[5])
-        if body[6].isupper():  # first named as a minor planet: C/2016 AA1
+        if body[6].isupper():  # designated as a minor planet first: C/2016 AA1
             return f"{kind}/{_year(body)} {body[3]}{body[6]}{order or ''}"
         fragment = f"-{body[6].upper()}" if body[6] != "0" else ""
         return f"{kind}/{_year(body)} {body[3]}{order}{fragment}"
@@ -86,7 +86,7 @@ def name_columns(text: str) -> dict[str, str]:
     """
     full = " ".join(text.split())
     plain = unpacked(full)
-    # Without a space, or with an underscore: 2010TU149, 2010_TU149, 2040P-L.
+    # Designations without a space or with an underscore: 2010TU149, 2010_TU149, 2040P-L.
     if compact := re.fullmatch(r"(\d{4})_?([A-HJ-Y][A-HJ-Z]\d{0,3}|P-L|T-[123])", plain):
         plain = f"{compact[1]} {compact[2]}"
     if hyperbolic := re.match(r"(A/\d{4} [A-Z]{1,2}\d*)", plain):
@@ -99,11 +99,8 @@ def name_columns(text: str) -> dict[str, str]:
             return {"number": "", "name": plain, "designation": plain}
         fragment = re.search(r"/.*-([A-Z]{1,2})$", plain) if "-" not in kept[1] else None
         designation = f"{kept[1]}-{fragment[1]}" if fragment and kept[1][:1].isdigit() else kept[1]
-        return {
-            "number": "",
-            "name": plain,
-            "designation": designation,
-        }  # many comets are called LINEAR or SOHO
+        # The full name identifies a comet: many are called LINEAR or SOHO.
+        return {"number": "", "name": plain, "designation": designation}
     provisional = r"(?:[A-Z]?\d{3,4} [A-Z]{2}\d*|\d{4} (?:P-L|T-[123]))"
     if bare := re.fullmatch(rf"\(?({provisional})\)?", plain):
         return {"number": "", "name": bare[1], "designation": bare[1]}

@@ -17,7 +17,7 @@ from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.osculating_state import heliocentric
 from flybystab.units import to_si
 
-#: Quantities that can have an error or a source: unit, and stem of the column names.
+#: Unit, and stem of the column names, of each quantity that can have an error or a source.
 QUANTITIES: Mapping[str, tuple[u.UnitBase, str]] = {
     "axes": (u.m, "semi_axes"),
     "diameter": (u.m, "diameter"),
@@ -26,7 +26,7 @@ QUANTITIES: Mapping[str, tuple[u.UnitBase, str]] = {
     "pole": (u.deg, "pole"),
     "orbit": (u.dimensionless_unscaled, "orbit"),
 }
-#: Quantities whose error has a column.
+#: Quantities with a column for their error.
 _ERRORS = ("axes", "density", "period")
 
 
@@ -49,7 +49,7 @@ def body_columns(body: Body) -> dict[str, str]:
     Raises
     ------
     InvalidInput
-        For any other rotation.
+        The body rotates about another axis.
     """
     check_body(body)
     axes = np.asarray(body.semi_axes.to_value(u.m), dtype=float)

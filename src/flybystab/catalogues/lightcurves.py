@@ -1,4 +1,4 @@
-"""Reliable spin periods of near-Earth asteroids (LCDB: Warner, Harris & Pravec 2009, release 2021)."""
+"""Reliable spin periods of near-Earth asteroids (LCDB, Warner, Harris & Pravec 2009; release of 2021)."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ NEIGHBOURS = 200
 
 @lru_cache(maxsize=1)
 def lightcurves() -> dict[str, dict[str, str]]:
-    """Rows of ``data/lightcurves.csv`` by number, or by designation without one."""
+    """Rows of ``data/lightcurves.csv`` by number, or by designation for unnumbered asteroids."""
     text = resources.files("flybystab.data").joinpath("lightcurves.csv").read_text(encoding="utf-8")
     return {r["number"] or r["designation"]: r for r in csv.DictReader(io.StringIO(text, newline=""))}
 
@@ -32,10 +32,10 @@ def _by_size() -> tuple[Array, Array]:
 
 @lru_cache(maxsize=4096)
 def periods_like(magnitude: float | None) -> Array:
-    """Periods, h, in ascending order, of the bodies nearest in absolute magnitude; of all bodies for None.
+    """Periods (h), in ascending order, of the bodies nearest in absolute magnitude; of all bodies for None.
 
-    Small bodies rotate faster, hence the selection by size. The bias towards fast rotators, whose periods are easier to
-    measure, is not corrected.
+    Bodies are selected by size because small ones rotate faster. The observational bias towards fast rotators, whose
+    periods are easier to measure, is not corrected.
     """
     size, period = _by_size()
     if magnitude is None:

@@ -5,7 +5,7 @@
 - ``astroquery.mpc.MPC.query_object(...)``: a list of mappings;
 - tables with the columns of a JPL query; ``sbpy.data.Orbit``, with ``sbpy.data.Phys`` for the body.
 
-Mappings and lists are read by the readers of the JSON files of the agencies.
+Mappings and lists are passed to the readers of the JSON files with the same content.
 """
 
 from __future__ import annotations
@@ -39,12 +39,12 @@ def asteroids_of(orbit: object, phys: object = None) -> tuple[Asteroid, ...]:
     orbit : mapping, list of mappings, Table or sbpy.data.Orbit
         As listed in :mod:`flybystab.catalogues.objects`.
     phys : sbpy.data.Phys, Table or mapping, optional
-        Physical parameters, one row or one for each orbit: H, diameter, density, rot_per, extent, pole with units.
+        Physical parameters with units: H, diameter, density, rot_per, extent, pole; one row, or one for each orbit.
 
     Raises
     ------
     InvalidInput
-        The object is none of these, or its content is invalid.
+        The object has another type, or its content is invalid.
     """
     from flybystab.catalogues.asteroid import Asteroid
 
@@ -105,14 +105,14 @@ def _csv(table: Table) -> str:
 
 
 def _plain(value: object) -> object:
-    """A number of a Quantity, array or numpy scalar, for JSON."""
+    """Value of a Quantity, array or numpy scalar as a number or list for JSON."""
     if isinstance(value, Quantity):
         value = value.value
     return value.tolist() if hasattr(value, "tolist") else str(value)
 
 
 def _items(values: Mapping[str, object]) -> list[Document]:
-    """Values with their ``_sig`` and ``_ref`` as the list that the API of JPL gives."""
+    """Values with their ``_sig`` and ``_ref`` as a list of items as in answers of JPL's API."""
     out = []
     for name, value in values.items():
         if name.endswith(("_sig", "_ref", "_note", "_kind")) or value is None:
@@ -130,7 +130,7 @@ def _printed(value: object) -> str:
 
 
 def _answer(given: Document) -> Document:
-    """An answer of SBDB in the form of the API, from the mapping made by astroquery."""
+    """The mapping made by astroquery converted back to the answer of the SBDB API."""
     orbit = dict(given["orbit"])
     if isinstance(orbit.get("elements"), list):
         return dict(given)
@@ -148,7 +148,7 @@ def _answer(given: Document) -> Document:
     return dict(given) | {"orbit": orbit, "phys_par": _items(given.get("phys_par") or {})}
 
 
-#: Unit of the physical parameters of SBDB, and other names of them in sbpy.
+#: Units of the physical parameters of the SBDB, and their names in sbpy.
 _PHYSICAL = {"H": "mag", "diameter": "km", "rot_per": "h", "density": "g/cm3", "extent": "", "pole": ""}
 _SBPY = {"absmag": "H", "d": "diameter", "D": "diameter", "diam": "diameter", "period": "rot_per"}
 
@@ -159,7 +159,7 @@ def _physical_rows(phys: object) -> list[dict[str, str]]:
     Raises
     ------
     InvalidInput
-        A value without its unit.
+        A value has no unit.
     """
     from astropy.table import Table
 

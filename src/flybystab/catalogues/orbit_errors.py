@@ -1,16 +1,16 @@
-"""Uncertainty of an orbit without a published covariance: the digits of its elements, and its parameter U.
+"""Uncertainty of an orbit without a published covariance, from the digits of its elements and the parameter U.
 
 The Minor Planet Center gives elements to the decimals of MPCORB, without errors. U (JPL: condition code) is a class of
-the runoff in longitude after ten years (https://minorplanetcenter.net/iau/info/UValue.html). Here two thirds of the
-runoff at the centre of its class are taken as one sigma of the mean motion, for an orbit through the observed position
-in the middle of the arc. The factor was chosen on half of the asteroids with a later orbit of JPL, as the least of 1/3,
-1/2, 2/3 and 1 for which three sigma cover 99 % within the error of the sample. On the other half they cover 99 %
-(``python benchmarks/orbit_errors.py factor``). The errors have wider tails than a normal distribution, so that one
-sigma covers more than 68 %.
+the in-orbit longitude runoff per decade (https://minorplanetcenter.net/iau/info/UValue.html). Here the 1-sigma error of
+the mean motion is two thirds of the runoff at the centre of its class, for an orbit whose position in the middle of the
+observed arc is exact. The factor was chosen on half of the asteroids that have a later orbit by JPL: it is the smallest
+of 1/3, 1/2, 2/3 and 1 for which 3 sigma cover 99 % of the errors within the sampling error. On the other half 3 sigma
+cover 99 % as well (``python benchmarks/orbit_errors.py factor``). The errors have wider tails than a normal
+distribution, so that 1 sigma covers more than 68 %.
 
-For weak orbits (one opposition, or U of 3 and more) from observations that are years old, U is not reliable: with no
-such factor do three sigma cover 99 %. Their sigma is the whole runoff, which covers 68 %, and the covariance is marked
-as unreliable, so that none of their encounters is classified as determined.
+For poorly determined orbits (one opposition, or U of 3 and more) from observations that are years old, U is not
+reliable: 3 sigma do not cover 99 % with any of these factors. Their 1-sigma error is the whole runoff, which covers
+68 %, and the covariance is marked as unreliable, so that none of their encounters is classified as determined.
 """
 
 from __future__ import annotations
@@ -29,10 +29,10 @@ from flybystab.typing import Array
 #: Half a unit in the last decimal of MPCORB: a (from the mean motion, deg/d), e, i, node, peri, M (deg).
 _HALF_UNITS = {"n": 5e-9, "e": 5e-8, "angle": 5e-6}
 _STEP = np.log(648000.0) / 9.0
-#: One sigma in units of the runoff: of an orbit, and of one for which U is not reliable.
-SHARE, SHARE_UNRELIABLE = 2.0 / 3.0, 1.0
-#: Age of observations (middle of the arc to epoch of the elements, s) beyond which U of a weak orbit is not reliable,
-#: and the largest U of an orbit that is not weak.
+#: One sigma of the mean motion in units of the runoff; the second where U is not reliable.
+FACTOR, FACTOR_UNRELIABLE = 2.0 / 3.0, 1.0
+#: Age of observations (middle of the arc to epoch of the elements, s) beyond which U of a poorly determined orbit is
+#: not reliable, and the largest U of a well-determined orbit.
 _RECENT, _WELL_KNOWN = 4.0 * YEAR, 2
 
 
@@ -42,16 +42,16 @@ def runoff(u: int) -> float:
 
 
 def error_of(row: Mapping[str, str], epoch: Time) -> Covariance | None:
-    """A covariance from the uncertainty parameter and the printed digits of a catalogue row; None without either.
+    """Covariance from the uncertainty parameter and the printed digits of a catalogue row; None without either.
 
     Parameters
     ----------
     row : mapping
-        A catalogue row. ``condition_code`` is U; ``observed_jd`` the middle of the observed arc (the epoch if
-        unknown); ``single_opposition`` is "Y" for an arc of one opposition; digits are used where the row comes from
+        A catalogue row. ``condition_code`` is U; ``observed_jd`` is the middle of the observed arc (the epoch if
+        unknown); ``single_opposition`` is "Y" for an arc of one opposition. Printed digits are used only for rows from
         the MPC or the SBDB.
     epoch : Time
-        Of its elements.
+        Epoch of the elements.
     """
     axis, ecc = float(row["a_au"]) * AU, float(row["e"])
     if axis <= 0.0 or not 0.0 <= ecc < 1.0:
@@ -76,7 +76,7 @@ def error_of(row: Mapping[str, str], epoch: Time) -> Covariance | None:
     if row.get("condition_code", "").isdigit():
         ago = (epoch.tdb.jd - float(row.get("observed_jd") or epoch.tdb.jd)) * DAY
         reliable = u_is_reliable(row, ago)
-        drift = runoff(int(row["condition_code"])) * (SHARE if reliable else SHARE_UNRELIABLE)
+        drift = runoff(int(row["condition_code"])) * (FACTOR if reliable else FACTOR_UNRELIABLE)
         modes.append(_kicked(middle, axis, ago, -drift / motion) - middle)
         bases.append("U")
     if not bases:
@@ -89,15 +89,15 @@ def error_of(row: Mapping[str, str], epoch: Time) -> Covariance | None:
 
 
 def u_is_reliable(row: Mapping[str, str], ago: float) -> bool:
-    """True if U covers the error of an orbit; the middle of its arc is `ago` s before the epoch."""
-    weak = row.get("single_opposition") == "Y" or int(row["condition_code"]) > _WELL_KNOWN
-    return not weak or ago < _RECENT
+    """Whether U covers the error of an orbit; the middle of its arc is `ago` s before the epoch."""
+    poor = row.get("single_opposition") == "Y" or int(row["condition_code"]) > _WELL_KNOWN
+    return not poor or ago < _RECENT
 
 
 def printed_half_units(row: Mapping[str, str]) -> Array:
     """Half a unit in the last printed digit of a, e, i, node, peri, M (m, rad), shape (6,).
 
-    All angles are assigned the largest number of decimals of the four, since tables omit trailing zeros.
+    All four angles are given the largest number of decimals among them, since tables omit trailing zeros.
     """
     a, e, *angles = (_decimals(row[c]) for c in ("a_au", "e", "i_deg", "node_deg", "peri_deg", "M_deg"))
     angle = np.radians(0.5 * 10.0 ** -max(angles))
@@ -110,13 +110,13 @@ def _decimals(text: str) -> int:
 
 
 def _state(elements: Array) -> Array:
-    """State, shape (6,), m and m/s, ICRF axes, of a, e, i, node, peri, M (m, rad)."""
+    """State (m, m/s; ICRF axes), shape (6,), from a, e, i, node, peri, M (m, rad)."""
     a, e, i, node, peri, mean = elements
     return np.array(state_from_elements(a * (1.0 - e), e, i, node, peri, mean * np.sqrt(a**3 / GM_SUN)))
 
 
 def _kicked(state: Array, axis: float, ago: float, slower: float) -> Array:
-    """The state for the same position ``ago`` s before, with a mean motion that is smaller by a given fraction."""
+    """State of an orbit with the same position `ago` s earlier and a mean motion smaller by the fraction `slower`."""
     then = np.array(two_body(GM_SUN, state, -ago))
     v = np.linalg.norm(then[3:])
     then[3:] *= 1.0 + slower * GM_SUN / (3.0 * axis * v * v)

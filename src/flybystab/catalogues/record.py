@@ -1,6 +1,6 @@
-"""The record of an asteroid: the values of a row of a catalogue with their units and sources.
+"""Record of an asteroid: the values of a catalogue row with their units and sources.
 
-A value that was not measured is flagged as assumed. The columns are explained in ``data/README.md``.
+Values that were not measured are flagged as assumed. The columns are explained in ``data/README.md``.
 """
 
 from __future__ import annotations
@@ -68,9 +68,9 @@ TEXTS = (
 #: Epoch and elements, and the factors of the elements to SI.
 ORBIT = ("epoch_jd_tdb", "a_au", "e", "i_deg", "node_deg", "peri_deg", "M_deg")
 ORBIT_SI = np.array([UNITS[c].si.scale for c in ORBIT[1:]])
-#: Perihelion distance and time, which replace a and M in rows without them (parabolas).
+#: Perihelion distance and time of perihelion, in place of a and M for parabolas.
 PERIHELION = ("q_au", "tp_jd_tdb")
-#: Columns of an orbit, which are not changed when a row is completed from another.
+#: Columns of an orbit, which are kept when a row is completed from another.
 ORBITAL = frozenset(
     {
         *ORBIT,
@@ -88,7 +88,7 @@ ORBITAL = frozenset(
     | {"sigma_" + c for c in ORBIT[1:]}
     | {"orbit_solution", "orbit_source", "condition_code", "condition_code_source"}
 )
-#: Groups of columns that are copied together from the completing row.
+#: Columns of size, shape and spin, which are taken together from the completing row to remain consistent.
 BODILY = frozenset(
     c for c in (*UNITS, *TEXTS) if c.startswith(("semi_axis", "semi_axes", "diameter", "spin_"))
 )
@@ -96,7 +96,7 @@ BODILY = frozenset(
 SHAPE = ("semi_axis_a_m", "semi_axis_b_m", "semi_axis_c_m")
 
 
-#: Smallest and largest value of each column; a value outside is an error, usually of the unit.
+#: Smallest and largest valid value of each column; values outside usually have the wrong unit.
 LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType(
     dict.fromkeys(_LENGTH, (0.05, 5e6))
     | dict.fromkeys(_HOURS, (1e-4, 1e5))
@@ -113,7 +113,7 @@ LIMITS: Mapping[str, tuple[float, float]] = MappingProxyType(
 
 
 def key_of(name: object) -> str:
-    """A name for comparisons: without case, accents, spaces, brackets and apostrophes; every dash is a hyphen."""
+    """Normalised name for comparisons: no case, accents, spaces, brackets, apostrophes; all dashes are hyphens."""
     text = unicodedata.normalize("NFKD", str(name).casefold())
     kept = (
         c for c in text if not unicodedata.combining(c) and not c.isspace() and c not in "()_'`\u2019\u02bb"
@@ -137,7 +137,7 @@ class Record:
 
     @property
     def name(self) -> str:
-        """Name, or designation where there is none."""
+        """Name; for unnamed asteroids the designation."""
         return self.row.get("name") or self.row.get("designation") or self.row.get("number") or "unnamed"
 
     @property
@@ -169,7 +169,7 @@ class Record:
 
     @cached_property
     def assumed(self) -> tuple[str, ...]:
-        """Columns with assumed, not measured, values."""
+        """Columns whose values are assumed, not measured."""
         return tuple(c for c in self.row.get("assumed", "").split(";") if c)
 
     @cached_property
@@ -185,7 +185,7 @@ class Record:
 
     @cached_property
     def record(self) -> Mapping[str, Quantity | str | None]:
-        """The whole row: a Quantity where the column has a unit, text otherwise, None where unknown."""
+        """All columns of the row: a Quantity for numeric columns (None where unknown), text for the others."""
         return MappingProxyType(
             {
                 c: (self.quantity(c) if self.row.get(c) else None) if c in UNITS else self.row.get(c, "")
@@ -199,7 +199,7 @@ class Record:
         Raises
         ------
         InvalidInput
-            The cell is empty, not a finite number, or out of its :data:`LIMITS`.
+            The cell is empty, not a finite number, or outside its :data:`LIMITS`.
         """
         if not isinstance(column, str) or column not in UNITS:
             raise InvalidInput("column", column, "the name of a numeric column")

@@ -1,4 +1,4 @@
-"""Registry of file formats: each module of a package of readers registers its format."""
+"""Registry of file formats, to which the modules of a package of readers add theirs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Generic, Protocol, TypeVar
 
 
 class Format(Protocol):
-    """A file format that is recognised by the content of a file."""
+    """A file format that is recognised from the content of a file."""
 
     @property
     def name(self) -> str:
@@ -18,14 +18,14 @@ class Format(Protocol):
 
     @property
     def identify(self) -> Callable[[str], bool]:
-        """Test of a text for this format, which must not raise."""
+        """Whether a text has this format; must not raise."""
 
 
 F = TypeVar("F", bound=Format)
 
 
 class Formats(Generic[F]):
-    """The formats of a package, by name; its modules are imported when the formats are first needed.
+    """The formats of a package by name; its modules are imported on first use.
 
     Parameters
     ----------
@@ -39,7 +39,7 @@ class Formats(Generic[F]):
         self._imported: set[str] = set()
 
     def add(self, entry: F) -> None:
-        """Register a format; one of the same name is replaced."""
+        """Register a format, replacing any of the same name."""
         self._found[entry.name] = entry
 
     def _load(self) -> None:
@@ -62,5 +62,5 @@ class Formats(Generic[F]):
         return tuple(entry.name for entry in self)
 
     def of(self, text: str) -> F | None:
-        """The format of a text; None if no format recognises it."""
+        """The format of a text; None if it has no known format."""
         return next((entry for entry in self if entry.identify(text)), None)

@@ -1,8 +1,8 @@
-"""Rival spin solutions of an asteroid: periods and poles that fit its lightcurves, with weights.
+"""Alternative spin solutions of an asteroid: periods and poles that fit its lightcurves, with weights.
 
-A row of a catalogue holds them in one column, ``spin_solutions``, as ``period sigma longitude latitude weight`` (h, h,
-deg, deg, ecliptic J2000; ``-`` if not known) separated by semicolons. The columns of period and pole have the solution
-of the largest weight. A screening draws a solution for each sample.
+A catalogue row lists them in one column, ``spin_solutions``, as ``period sigma longitude latitude weight`` (h, h, deg,
+deg, ecliptic J2000; ``-`` if unknown), separated by semicolons. The columns of period and pole contain the solution
+with the largest weight. A screening draws one solution for each sample.
 """
 
 from __future__ import annotations
@@ -21,18 +21,18 @@ COLUMN = "spin_solutions"
 
 @dataclass(frozen=True)
 class SpinSolution:
-    """One solution.
+    """One spin solution.
 
     Attributes
     ----------
     period : float
         Sidereal rotation period, h.
     sigma : float
-        Its 1-sigma error, h; zero if not known.
+        1-sigma error of the period, h; zero if unknown.
     pole : tuple of float, or None
         Ecliptic longitude and latitude, deg, J2000.
     weight : float
-        Relative to the other solutions.
+        Weight relative to that of the other solutions.
     source : str
     """
 
@@ -54,7 +54,7 @@ class SpinSolution:
 
 
 def solution_columns(solutions: Sequence[SpinSolution]) -> dict[str, str]:
-    """Columns of period and pole of the solution of the largest weight, and of all solutions if there are rivals."""
+    """Columns of period and pole for the solution with the largest weight, and of all if there are several."""
     if not solutions:
         return {}
     best = max(solutions, key=lambda s: s.weight)
@@ -72,7 +72,7 @@ def solution_columns(solutions: Sequence[SpinSolution]) -> dict[str, str]:
 
 
 def solutions_of(row: Mapping[str, str]) -> tuple[SpinSolution, ...]:
-    """The rival solutions of a row; empty where there are none.
+    """The alternative solutions of a row; empty if there are none.
 
     Raises
     ------

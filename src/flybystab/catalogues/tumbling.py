@@ -31,11 +31,11 @@ def free_spin(moments: Array, momentum: float, j: float, phase: Array) -> tuple[
     moments : ndarray (3,)
         ``J1 < J2 < J3``, in any unit.
     momentum : float
-        ``L``, that unit per second.
+        ``L``, in the unit of `moments` per second.
     j : float
         ``L^2/(2E)``, between ``J1`` and ``J3``: short-axis mode above ``J2``, long-axis mode below.
     phase : ndarray (n,)
-        Fraction of the period; at 0 the middle component is zero and grows.
+        Phase as a fraction of the period; at 0 the middle component is zero and increasing.
 
     Returns
     -------
@@ -96,7 +96,7 @@ def tumbling_state(
     Raises
     ------
     InvalidInput
-        The two periods are impossible for these moments of inertia.
+        No free rotation with these moments of inertia has the two periods.
     """
     from scipy.optimize import brentq
 
@@ -155,9 +155,9 @@ def attitude_matrices(momentum: Array, pole: Array, angle: Array) -> Array:
     momentum : ndarray (3,) or (n, 3)
         Angular momentum along the body's axes, any length; ``(0, 0, 1)`` for rotation about the short axis.
     pole : ndarray (3,) or (n, 3)
-        Its direction in the outer frame, any length.
+        Direction of the angular momentum in the outer frame, any length.
     angle : ndarray (n,)
-        Turn about the pole, rad: together with `momentum` and `pole` it fixes the attitude.
+        Rotation about the pole, rad; `momentum` and `pole` alone leave it free.
 
     Returns
     -------
@@ -176,7 +176,7 @@ def attitude_matrices(momentum: Array, pole: Array, angle: Array) -> Array:
 
 
 def isotropic_directions(uniform: Array) -> Array:
-    """Unit vectors, shape (n, 3), uniform on the sphere, from uniform numbers in [0, 1), shape (n, 2)."""
+    """Unit vectors, shape (n, 3), isotropically distributed, from uniform numbers in [0, 1), shape (n, 2)."""
     z = 2.0 * uniform[:, 0] - 1.0
     rho = np.sqrt(1.0 - z * z)
     longitude = 2.0 * np.pi * uniform[:, 1]
@@ -184,7 +184,7 @@ def isotropic_directions(uniform: Array) -> Array:
 
 
 def isotropic_rotations(turn: Array, uniform: Array) -> Array:
-    """Rotations, shape (n, 3, 3), uniform over all rotations: isotropic third columns, turned by ``2 pi turn[n]``."""
+    """Rotations, shape (n, 3, 3), uniform over SO(3): isotropic third columns, rotated about them by ``2 pi turn``."""
     frame = _basis(isotropic_directions(uniform))
     c, s = np.cos(2.0 * np.pi * turn)[:, None], np.sin(2.0 * np.pi * turn)[:, None]
     x, y = frame[:, :, 0], frame[:, :, 1]
@@ -192,5 +192,5 @@ def isotropic_rotations(turn: Array, uniform: Array) -> Array:
 
 
 def isotropic_direction(uniform: Array) -> Array:
-    """Unit vector uniform on the sphere from two uniform numbers in [0, 1)."""
+    """Isotropically distributed unit vector from two uniform numbers in [0, 1)."""
     return isotropic_directions(np.asarray(uniform)[None])[0]

@@ -1,8 +1,8 @@
 """Shell commands, one module each.
 
-A command is a module with ``HELP`` and ``EXAMPLE`` (text), ``arguments(sub)``, which adds its arguments to an argparse
-parser, and ``run(options)``, which executes it. Slow imports belong inside ``run``. A new command is one new
-module and one new entry in :data:`COMMANDS`.
+The module of a command has ``HELP`` and ``EXAMPLE`` (text), ``arguments(sub)``, which adds its arguments to an argparse
+parser, and ``run(options)``, which executes it. Slow imports belong inside ``run``. To add a command, add a module and
+an entry in :data:`COMMANDS`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Checks of a command line that need neither catalogue nor files; a failure is wrong usage (exit status 2)."""
+"""Checks of arguments that require neither catalogue nor files; a failure is wrong usage (exit status 2)."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from flybystab.cli.body_options import check_body_options
 from flybystab.cli.common import material_of, tdb
 from flybystab.errors import InvalidInput, UnknownName, WrongUsage
 
-#: Smallest allowed integer by argument.
+#: Smallest valid integer for each argument.
 _LEAST = {"samples": 1, "jobs": 1, "attitudes": 1, "clones": 0, "seed": 0}
 
 
 @contextmanager
 def usage() -> Iterator[None]:
-    """Raise WrongUsage for an invalid value."""
+    """Convert errors of invalid values within the block to WrongUsage."""
     try:
         yield
     except (InvalidInput, UnknownName) as error:
@@ -30,6 +30,7 @@ def check_arguments(options: argparse.Namespace) -> None:
     Raises
     ------
     WrongUsage
+        A value is invalid.
     """
     given = vars(options)
     with usage():

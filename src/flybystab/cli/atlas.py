@@ -19,7 +19,7 @@ def arguments(sub: argparse.ArgumentParser) -> None:
         "--output",
         default="atlas",
         metavar="FOLDER",
-        help="new folder (atlas); its index.html opens from disk",
+        help="new folder (atlas); open its index.html in a browser",
     )
     sub.add_argument("--overwrite", action="store_true", help="replace an existing atlas")
 

@@ -19,13 +19,13 @@ _VALUE = re.compile(rf"\s*({_NUMBER})\s*(?:(?:\+-|\+/-|±)\s*({_NUMBER}))?\s*(.*
 
 
 class Measured(float):
-    """A number with its 1-sigma error, 0 if none is given."""
+    """A number with its 1-sigma error; zero if none is given."""
 
     sigma: float = 0.0
 
 
 def measured(text: str, unit: str, name: str) -> Measured:
-    """Read ``35``, ``35 deg`` or ``35+-5 deg``; a bare number is in `unit`.
+    """Read ``35``, ``35 deg`` or ``35+-5 deg``; a number without a unit is in `unit`.
 
     Raises
     ------
@@ -71,12 +71,14 @@ def body_arguments(sub: argparse.ArgumentParser) -> None:
         "--phys",
         action="append",
         metavar="FILE",
-        help="physical parameters: SBDB answer, SsODNet card, DAMIT spin.txt, LCDB or spin solutions as CSV; "
+        help="file of physical parameters: SBDB answer, SsODNet card, DAMIT spin.txt, LCDB or spin solutions as CSV; "
         "may be repeated",
     )
-    sub.add_argument("--axes", metavar="AxBxC", help="semi-axes, with errors: '200x170x150+-10 m', '0.2 km'")
-    sub.add_argument("--diameter", metavar="D", help="diameter, which scales a known shape: '340+-40 m'")
-    sub.add_argument("--H", metavar="H", help="absolute magnitude, from which --assume derives a size")
+    sub.add_argument("--axes", metavar="AxBxC", help="semi-axes: '200x170x150+-10 m', '0.2 km' for a sphere")
+    sub.add_argument(
+        "--diameter", metavar="D", help="diameter; known semi-axes are scaled to it: '340+-40 m'"
+    )
+    sub.add_argument("--H", metavar="H", help="absolute magnitude, from which --assume derives the size")
     sub.add_argument("--density", metavar="RHO", help="density: '2000+-300 kg/m3', '2 g/cm3'")
     sub.add_argument("--period", metavar="P", help="spin period: '5.3+-0.1 h'")
     sub.add_argument(
@@ -85,17 +87,17 @@ def body_arguments(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
         "--assume",
         action="store_true",
-        help="take missing properties from the priors of screen: their medians, in a report samples",
+        help="take missing properties from the priors of screen: medians, or samples in a report",
     )
 
 
 def check_body_options(options: argparse.Namespace) -> None:
-    """Check the values of the options; raises InvalidInput for invalid ones."""
+    """Check the values of the options; raises InvalidInput if one is invalid."""
     _given(options)
 
 
 def _axes(text: str) -> tuple[list[float], list[float]]:
-    """Semi-axes and their errors, m; an error or unit at the end applies to all."""
+    """Semi-axes and their errors (m); an error or unit at the end applies to all of them."""
     parts = re.split(r"\s*[x×]\s*", text.strip())
     if len(parts) not in (1, 3):
         raise InvalidInput("--axes", text, "one or three semi-axes: '200x170x150+-10 m'")

@@ -1,4 +1,4 @@
-"""``flybystab cite [FILE]``: BibTeX of the methods and data."""
+"""``flybystab cite [FILE]``: BibTeX entries for the methods and data used."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import argparse
 
 from flybystab.cli.common import document, show
 
-HELP = "BibTeX of the methods and data used, for one result or for the whole package"
+HELP = "BibTeX entries for the methods and data used in a result, or in the whole package"
 EXAMPLE = "flybystab cite screening.ecsv > flybystab.bib"
 
 
@@ -15,7 +15,7 @@ def arguments(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
         "file",
         nargs="?",
-        help="table (.ecsv, .parquet) or JSON document (.json) of a command",
+        help="table (.ecsv, .parquet) or JSON document (.json) written by a command",
     )
 
 

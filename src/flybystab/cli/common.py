@@ -1,4 +1,4 @@
-"""Shared by several commands: arguments, dates, asteroids, and printing as text or JSON."""
+"""Code shared by several commands: arguments, dates, asteroids, and output as text or JSON."""
 
 from __future__ import annotations
 
@@ -30,12 +30,16 @@ SURFACES = (DEFAULT, *(name for name in NAMES if name != DEFAULT))
 
 
 def material_arguments(sub: argparse.ArgumentParser) -> None:
-    """Add the options of the material: friction angle, cohesion, yield surface."""
+    """Add the options --friction, --cohesion and --surface of the material."""
     sub.add_argument(
-        "--friction", type=friction, default=35.0, metavar="DEG", help="friction angle (35 deg), e.g. 35+-5"
+        "--friction",
+        type=friction,
+        default=35.0,
+        metavar="DEG",
+        help="friction angle, e.g. 38 or 35+-5 (35 deg)",
     )
     sub.add_argument(
-        "--cohesion", type=cohesion, default=0.0, metavar="PA", help="cohesion (0 Pa), e.g. '20+-10 Pa'"
+        "--cohesion", type=cohesion, default=0.0, metavar="PA", help="cohesion, e.g. '20+-10 Pa' (0 Pa)"
     )
     surface_argument(sub)
 
@@ -62,7 +66,7 @@ def span_arguments(sub: argparse.ArgumentParser, start: str, stop: str) -> None:
 
 
 def figure_argument(sub: argparse.ArgumentParser, films: bool = False) -> None:
-    """Add the option --output for a figure, or for an animation too."""
+    """Add the options --output and --style for a figure; `films` allows an animation as well."""
     film = f" or an animation ({', '.join(FILMS)})" if films else ""
     sub.add_argument("--output", metavar="FILE", help=f"write a figure ({', '.join(FIGURES)}){film}")
     style_argument(sub)
@@ -74,7 +78,7 @@ def style_argument(sub: argparse.ArgumentParser) -> None:
         "--style",
         choices=("default", "paper", "talk"),
         default="default",
-        help="of the figure: paper (8 pt, width of journal columns) or talk (large text and lines)",
+        help="style of the figure: paper (8 pt, width of journal columns) or talk (large text and lines)",
     )
 
 
@@ -84,7 +88,7 @@ def movie_argument(sub: argparse.ArgumentParser) -> None:
 
 
 def show(options: argparse.Namespace, document: Callable[[], object], lines: Callable[[], list[str]]) -> None:
-    """Print a result: one JSON document with ``--json``, else text."""
+    """Print a result: one JSON document with ``--json``, text otherwise."""
     if options.json:
         print(json.dumps(document(), indent=1, allow_nan=False))
     else:
@@ -99,9 +103,10 @@ def document(kind: str, **content: object) -> Document:
 
 
 def printable(text: str) -> str:
-    """The text with control characters and changes of writing direction as escapes: names come from files.
+    """The text with control characters and changes of writing direction escaped.
 
-    Without this an ESC sequence in the name of an asteroid could change the terminal or hide other text.
+    Names come from files; without this, an escape sequence in the name of an asteroid could control the terminal or
+    hide other text.
     """
     return "".join(
         c
@@ -119,7 +124,7 @@ def check_computed(rows: int, failed: int, reasons: Mapping[str, int]) -> None:
 
 
 def _coloured(line: str) -> str:
-    """The line, in bold if it is the verdict and stdout is a terminal that allows colours."""
+    """The line; in bold if it is the verdict and stdout is a terminal, unless NO_COLOR is set."""
     if not line.startswith("verdict") or os.environ.get("NO_COLOR") or not sys.stdout.isatty():
         return line
     return f"\033[1m{line}\033[0m"
@@ -133,7 +138,7 @@ def tdb(text: str, name: str) -> Time:
 
 
 def material_of(options: argparse.Namespace) -> Material:
-    """Material given by the options."""
+    """Material specified by the options."""
     import astropy.units as u
 
     from flybystab.body.body import Material
@@ -148,7 +153,7 @@ def material_of(options: argparse.Namespace) -> Material:
 def sampling_arguments(
     sub: argparse.ArgumentParser, samples: int, what: str, *, population: str, grains: str
 ) -> None:
-    """Add the options --samples, --seed, --population and --grains of commands that draw bodies from priors."""
+    """Add the options --samples, --seed, --population and --grains of commands that sample bodies from priors."""
     sub.add_argument("--samples", type=int, default=samples, metavar="N", help=f"{what} ({samples})")
     sub.add_argument("--seed", type=int, default=0, help="random seed (0)")
     sub.add_argument("--population", metavar="FILE", help=population)
@@ -156,10 +161,10 @@ def sampling_arguments(
 
 
 def names_a_file(word: str) -> bool:
-    """True if an argument, the name of an asteroid or of a file, is that of a file.
+    """Whether an argument that may be an asteroid or a file is the name of a file.
 
-    It is one if the file exists, if it ends like a file name, or if it lies in a folder that exists. Comet
-    designations such as C/2020 F3 are names.
+    It is a file name if the file exists, if it has a suffix, or if it is a path in an existing folder. Comet
+    designations such as C/2020 F3 are not file names.
     """
     from pathlib import Path
 
@@ -174,12 +179,12 @@ def catalogue_argument(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
         "--catalogue",
         metavar="FILE",
-        help="catalogue file (own CSV or a format of docs/inputs.md) instead of the embedded catalogue",
+        help="catalogue file in any format of docs/inputs.md, instead of the embedded catalogue",
     )
 
 
 def asteroid_named(options: argparse.Namespace) -> Asteroid:
-    """The asteroid, from the embedded catalogue, from --catalogue, or the only one of a file of orbits."""
+    """The asteroid from the embedded catalogue, from --catalogue, or from a file with a single orbit."""
     from pathlib import Path
 
     from flybystab.catalogues.asteroid import Asteroid
@@ -192,7 +197,7 @@ def asteroid_named(options: argparse.Namespace) -> Asteroid:
         if len(found) != 1:
             names = ", ".join(a.name for a in found[:5]) + (", ..." if len(found) > 5 else "")
             raise WrongUsage(
-                f"{options.name} has {len(found)} asteroids ({names}): NAME --catalogue {options.name}"
+                f"{options.name} contains {len(found)} asteroids ({names}): expected NAME --catalogue {options.name}"
             )
         return found[0]
     return (
@@ -203,7 +208,10 @@ def asteroid_named(options: argparse.Namespace) -> Asteroid:
 
 
 def asteroid_of(options: argparse.Namespace, *, assume: bool = True) -> Asteroid:
-    """The asteroid with the body and the material of the options; `assume` allows --assume to complete it."""
+    """The asteroid with body and material of the options; missing properties are completed if --assume is given.
+
+    With ``assume=False`` they are left missing, for commands that sample them.
+    """
     from flybystab.cli.shape_options import shaped
 
     asteroid = with_body_options(asteroid_named(options), options).with_material(material_of(options))
@@ -215,7 +223,7 @@ def asteroid_of(options: argparse.Namespace, *, assume: bool = True) -> Asteroid
 
 
 def check_picture(path: str | None, endings: tuple[str, ...] = FIGURES, option: str = "--output") -> None:
-    """Check before a computation that its figure or page can be written."""
+    """Check, before the computation, that its figure or page can be written."""
     if path is None:
         return
     from pathlib import Path
@@ -228,7 +236,7 @@ def check_picture(path: str | None, endings: tuple[str, ...] = FIGURES, option: 
 
 
 def check_table(path: str | None, formats: tuple[str, ...] = ()) -> None:
-    """Check before a computation that its table can be written."""
+    """Check, before the computation, that its table can be written."""
     if path is None:
         return
     from flybystab.screening.results import WRITTEN
@@ -243,13 +251,13 @@ def check_table(path: str | None, formats: tuple[str, ...] = ()) -> None:
 def grains_arguments(sub: argparse.ArgumentParser) -> None:
     """Add the options --grains and --piles."""
     sub.add_argument(
-        "--grains", type=int, metavar="N", help="follow piles of N grains where the ellipsoid ends (500)"
+        "--grains", type=int, metavar="N", help="continue with piles of N grains beyond the ellipsoid model"
     )
-    sub.add_argument("--piles", type=int, default=8, metavar="N", help="piles of grains (8)")
+    sub.add_argument("--piles", type=int, default=8, metavar="N", help="number of piles of grains (8)")
 
 
 def write_picture(result: FlybyResult, title: str, path: str) -> None:
-    """Write the panels of a flyby or of its grains, or the animation, depending on the suffix."""
+    """Write the figure of a flyby or of its piles of grains, or an animation, depending on the suffix."""
     if result.grains is not None:
         from flybystab.plots.grains import grains_animation, grains_figure
 

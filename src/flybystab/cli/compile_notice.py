@@ -1,4 +1,4 @@
-"""Compilation notice of shell commands."""
+"""Notice printed by shell commands while kernels are compiled."""
 
 from __future__ import annotations
 
@@ -22,7 +22,8 @@ def announced(stream: TextIO, *, elsewhere: bool = False) -> Iterator[None]:
     ----------
     stream : text file
     elsewhere : bool
-        Other processes compute: the notice is written at once unless the cache holds a kernel of a screening.
+        The computation runs in other processes. The notice is then written at once, unless the cache contains the first
+        kernel of a screening.
     """
     listener = Announcement(stream)
     if elsewhere and not _cached():
@@ -35,7 +36,7 @@ def announced(stream: TextIO, *, elsewhere: bool = False) -> Iterator[None]:
 
 
 def _cached() -> bool:
-    """True if the cache holds the first kernel of a screening, or there is no cache."""
+    """Whether the cache contains the first kernel of a screening; also true without a cache."""
     from flybystab.core.ellipsoid.yield_bound import quick_margins
 
     folder = quick_margins.stats.cache_path

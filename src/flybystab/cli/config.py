@@ -1,4 +1,4 @@
-"""Defaults of the user: a TOML file with options by command.
+"""User defaults: a TOML file with default values of options, by command.
 
 ::
 
@@ -10,9 +10,9 @@
     [flyby]
     friction = "38+-4"
 
-The file is the one named by the environment variable ``FLYBYSTAB_CONFIG``, else
-``~/.config/flybystab/config.toml`` (``$XDG_CONFIG_HOME``). Its options are put before those of the command line, which
-take precedence. The table ``[all]`` holds options for every command that has them.
+The file is that named by the environment variable ``FLYBYSTAB_CONFIG``, otherwise
+``~/.config/flybystab/config.toml`` (``$XDG_CONFIG_HOME``). Its options are inserted before those of the command line,
+which take precedence. Options in the table ``[all]`` apply to every command that has them.
 """
 
 from __future__ import annotations
@@ -34,16 +34,16 @@ LIMIT = 1_000_000
 
 
 def config_file() -> Path | None:
-    """The file of defaults; None where there is none.
+    """The file of defaults; None if there is none.
 
     Raises
     ------
     WrongUsage
-        The file that the environment variable names does not exist.
+        The file named by the environment variable does not exist.
     """
     named = os.environ.get(VARIABLE)
     if named is not None:
-        if not named:  # an empty variable turns the defaults off
+        if not named:  # an empty variable disables the defaults
             return None
         if not Path(named).is_file():
             raise WrongUsage(f"{VARIABLE} = {named}: expected a file of defaults")
@@ -54,7 +54,7 @@ def config_file() -> Path | None:
 
 
 def default_words(command: str, parsers: dict[str, argparse.ArgumentParser], given: list[str]) -> list[str]:
-    """Arguments of the command line for the defaults of a command.
+    """Default values for a command as command-line arguments.
 
     Parameters
     ----------
@@ -103,7 +103,7 @@ def _options(*parsers: argparse.ArgumentParser) -> dict[str, argparse.Action]:
 
 
 def _words(path: Path, key: str, value: object, action: argparse.Action) -> list[str]:
-    if action.nargs == 0:  # a switch
+    if action.nargs == 0:  # a flag
         if not isinstance(value, bool):
             raise WrongUsage(f"{path}: {key} = {value!r}: expected true or false")
         return [f"--{key}"] if value else []

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from flybystab.encounter.distribution import EncounterDistribution
 
 HELP = "close approaches of an asteroid or of a catalogue"
-#: Number of encounters printed at most: the closest ones.
+#: Largest number of encounters printed; of more, only the closest are printed.
 SHOWN = 100
 EXAMPLE = (
     "flybystab encounters Apophis --to 2030-01-01 --clones 1000\n"
@@ -28,13 +28,13 @@ def arguments(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
         "name",
         nargs="*",
-        help="numbers, names or designations, and files of orbits (docs/inputs.md)",
+        help="numbers, names or designations, or files of orbits (docs/inputs.md)",
     )
     catalogue_argument(sub)
     sub.add_argument(
         "--all",
         action="store_true",
-        help="the whole embedded catalogue, or that of --catalogue, or all files, without predictability",
+        help="all asteroids of the embedded catalogue, of --catalogue or of the files, without predictability",
     )
     span_arguments(sub, "2020-01-01", "2050-01-01")
     sub.add_argument(
@@ -60,7 +60,7 @@ def run(options: argparse.Namespace) -> None:
     if not options.name and not options.all:
         raise WrongUsage("NAME: expected an asteroid, or --all for the whole catalogue")
     if options.clones and options.all:
-        raise WrongUsage("--clones: expected one asteroid or a file of a few, not --all")
+        raise WrongUsage("--clones: expected with named asteroids or files, not with --all")
     check_table(options.output)
     asteroids = _asteroids(options.name, options.catalogue)
     bar = Bar(len(asteroids), "asteroids") if len(asteroids) > SHOWN else None
@@ -97,7 +97,7 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _asteroids(words: list[str], file: str | None) -> list[Asteroid]:
-    """Asteroids of names and files; without any, all of a catalogue file or of the embedded catalogue."""
+    """Asteroids of the names and files; without names, those of a catalogue file or of the embedded catalogue."""
     from pathlib import Path
 
     from flybystab.catalogues.asteroid import Asteroid
@@ -147,9 +147,9 @@ def _lines(table: QTable, many: bool) -> list[str]:
         table = table[np.sort(np.argsort(table["distance"])[:SHOWN])]
     out = [_head(many, known, clones), *(_line(row, many, known, clones) for row in table)]
     if any(v == 0.0 for v in table["v_inf"].value):
-        out.append("bound: slower than the escape speed at closest approach, without an asymptote")
+        out.append("bound: slower than the escape speed at closest approach, so that v_inf is not defined")
     if count > SHOWN:
-        out.append(f"the closest {SHOWN} of {count}; --output FILE writes all")
+        out.append(f"the closest {SHOWN} of {count} are shown; --output FILE writes all")
     return [*out, *_notes(table, clones)] if known else out
 
 
@@ -195,7 +195,7 @@ def _notes(table: QTable, clones: bool) -> list[str]:
     """Explanation of the errors in the table."""
     out = [
         f"sigma: displacement at the encounter of an orbit {'; '.join(table.meta['neighbours'])}; "
-        "model: error by ephemeris, tolerance and omitted forces"
+        "model: error due to ephemeris, tolerance and omitted forces"
     ]
     if clones:
         lost = int((table["clones"] - table["clones_found"]).max())

@@ -1,4 +1,4 @@
-"""``flybystab ephemeris NAME``: positions of an asteroid in the sky from a place on the Earth."""
+"""``flybystab ephemeris NAME``: apparent positions of an asteroid for an observer on the Earth."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from astropy.table import QTable
     from astropy.time import Time
 
-HELP = "positions of an asteroid in the sky"
+HELP = "apparent positions of an asteroid in the sky"
 EXAMPLE = "flybystab ephemeris Apophis --from 2029-04-10 --to 2029-04-15 --step 6h --observer 568"
 #: Largest number of positions in one table.
 LARGEST = 100_000
@@ -23,13 +23,13 @@ def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
     sub.add_argument("name", help="number, name or designation")
     dates_arguments(sub, "2029-04-01", "2029-05-01")
-    sub.add_argument("--step", default="1d", metavar="TIME", help="interval, as 1d, 6h, 10m, 30s (1d)")
+    sub.add_argument("--step", default="1d", metavar="TIME", help="interval, such as 6h, 10m, 30s (1d)")
     sub.add_argument(
         "--observer",
         default="500",
         metavar="PLACE",
-        help="MPC code, or LAT,LON[,ALT] in deg, deg east, m (500, the geocentre); write --observer=-30.2,-70.8,2200 "
-        "for a southern latitude",
+        help="MPC code, or LAT,LON[,ALT] in deg, deg east, m (500, the geocentre); southern latitudes need an equals "
+        "sign: --observer=-30.2,-70.8,2200",
     )
     sub.add_argument("--output", metavar="FILE", help="write the table (.ecsv, .parquet, .csv)")
 
@@ -56,7 +56,7 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _seconds(text: str) -> float:
-    """An interval such as 6h in s."""
+    """An interval such as ``6h`` in seconds."""
     try:
         value = float(text[:-1]) * _UNITS[text[-1:].lower()]
     except (ValueError, KeyError):

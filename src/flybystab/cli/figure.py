@@ -25,10 +25,10 @@ def arguments(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
         "name",
         nargs="?",
-        help="asteroid of the barrier figure (a body of 1400 x 850 x 750 m, 2 g/cm3, 6 h)",
+        help="asteroid of the figure barrier (a body with semi-axes 1400 x 850 x 750 m, 2 g/cm3, 6 h)",
     )
     material_arguments(sub)
-    sub.add_argument("--output", metavar="FILE", help=f"file ({', '.join(FIGURES)}; WHAT.png)")
+    sub.add_argument("--output", metavar="FILE", help=f"figure file, {', '.join(FIGURES)} (WHAT.png)")
     style_argument(sub)
 
 

@@ -20,15 +20,15 @@ if TYPE_CHECKING:
     from flybystab.flybys.result import FlybyResult
     from flybystab.flybys.spin_sample import SpinSample
 
-#: Dates searched for the closest encounter if none is given; all supported ephemerides cover them.
+#: Time span of the search for the closest encounter without --date; covered by all supported ephemerides.
 SPAN = ("2000-01-01", "2050-01-01")
 
 
 def encounter_arguments(sub: argparse.ArgumentParser) -> None:
-    """Add the arguments of asteroid, encounter, material and sampled attitudes."""
+    """Add the arguments for asteroid, encounter, material and sampled attitudes."""
     sub.add_argument(
         "name",
-        help="number, name or designation in the embedded catalogue or in --catalogue, or a file of one orbit",
+        help="number, name or designation in the embedded catalogue or in --catalogue, or a file with one orbit",
     )
     catalogue_argument(sub)
     sub.add_argument(
@@ -46,7 +46,7 @@ def encounter_arguments(sub: argparse.ArgumentParser) -> None:
 
 
 def attitude_words(asteroid: Asteroid) -> str:
-    """Description of the nominal attitude; the sampled attitudes show how far the result depends on it."""
+    """Description of the nominal attitude."""
     if asteroid.pole is None:
         return "nominal: pole unknown, spin axis along the orbital angular momentum"
     return "nominal: catalogued pole, arbitrary rotation phase"

@@ -1,4 +1,4 @@
-"""``flybystab impacts NAME``: possible impacts along the line of variations; Palermo and Torino scales at the Earth."""
+"""``flybystab impacts NAME``: possible impacts along the line of variations, with hazard scales for the Earth."""
 
 from __future__ import annotations
 
@@ -14,31 +14,41 @@ if TYPE_CHECKING:
 
     from flybystab.catalogues.asteroid import Asteroid
 
-HELP = "possible impacts of an asteroid whose orbit is uncertain"
+HELP = "possible impacts of an asteroid with an uncertain orbit"
 EXAMPLE = "flybystab impacts 2024YR4.ke1 --planet moon --from 2032-12-15 --to 2032-12-30"
 
 
 def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
-    sub.add_argument("name", help="number, name or designation; or a file of one orbit (docs/inputs.md)")
+    sub.add_argument("name", help="number, name or designation, or a file with one orbit (docs/inputs.md)")
     catalogue_argument(sub)
     dates_arguments(sub, "2026-01-01", "2076-01-01")
     sub.add_argument("--planet", default="earth", help="planet or moon (earth)")
     sub.add_argument("--within", type=float, default=0.1, metavar="AU", help="maximum distance (0.1 au)")
     sub.add_argument(
-        "--orbits", type=int, default=1001, metavar="N", help="orbits on the line of variations (1001)"
+        "--orbits",
+        type=int,
+        default=1001,
+        metavar="N",
+        help="number of orbits on the line of variations (1001)",
     )
     sub.add_argument(
-        "--sigmas", type=float, default=5.0, metavar="S", help="half length of the line, in sigma (5)"
+        "--sigmas",
+        type=float,
+        default=5.0,
+        metavar="S",
+        help="half length of the line of variations, in sigma (5)",
     )
     sub.add_argument(
-        "--least", type=float, default=1e-12, metavar="P", help="least impact probability listed (1e-12)"
+        "--least", type=float, default=1e-12, metavar="P", help="smallest impact probability listed (1e-12)"
     )
     sub.add_argument(
-        "--mass", type=float, metavar="KG", help="for the hazard scales (kg; of the body in the catalogue)"
+        "--mass", type=float, metavar="KG", help="mass for the hazard scales (from the catalogue)"
     )
     sub.add_argument(
-        "--date", metavar="DATE", help="date from which the time of the Palermo scale counts (today)"
+        "--date",
+        metavar="DATE",
+        help="date from which the time to impact in the Palermo scale is counted (today)",
     )
     sub.add_argument("--output", metavar="FILE", help="write the table (.ecsv, .parquet, .csv)")
 
@@ -91,7 +101,7 @@ def run(options: argparse.Namespace) -> None:
 
 
 def _mass(asteroid: Asteroid, mass: float | None) -> Quantity | None:
-    """Mass of the option or of the body in the catalogue; None where it is not known."""
+    """Mass from the option or of the body in the catalogue; None if unknown."""
     import astropy.units as u
 
     from flybystab.errors import FlybystabError, InvalidInput
@@ -107,7 +117,7 @@ def _mass(asteroid: Asteroid, mass: float | None) -> Quantity | None:
 
 
 def _add_scales(table: QTable, mass: Quantity, date: Time) -> None:
-    """Add the energy (megatons of TNT) and the Palermo and Torino scales; the time counts from `date`."""
+    """Add the energy (megatons of TNT) and the Palermo and Torino scales; the time to impact starts at `date`."""
     import astropy.units as u
     import numpy as np
 

@@ -1,4 +1,4 @@
-"""``flybystab infer NAME``: bounds on the material from the encounters an asteroid has survived."""
+"""``flybystab infer NAME``: bounds on the material from the encounters that an asteroid has survived."""
 
 from __future__ import annotations
 
@@ -91,7 +91,7 @@ def _lines(asteroid: Asteroid, table: QTable) -> list[str]:
     phi = body.material.friction_angle
     needed = rest.required_friction_angle.to_value(u.deg)
     lines = [
-        f"{asteroid.label}: bounds on its material, assuming that it kept its shape",
+        f"{asteroid.label}: bounds on its material, assuming that its shape has not changed",
         f"shape and spin, at {rho:.0f} kg/m3"
         + (" (assumed)" if "density_kg_m3" in asteroid.assumed else "")
         + ": "
@@ -117,14 +117,14 @@ def _lines(asteroid: Asteroid, table: QTable) -> list[str]:
         )
     if not table.meta["passages"]:
         lines.append("no encounter in this time span within this distance")
-    telling = any(p["adds_at_worst_attitude_deg"] >= small for p in table.meta["passages"])
+    constraining = any(p["adds_at_worst_attitude_deg"] >= small for p in table.meta["passages"])
     cohesions = np.unique(table["cohesion"].to_value(u.Pa))
     for name, title in (
         ("friction_equilibrium", "from shape and spin"),
         ("friction_any_attitude", "with encounters, necessary at any attitude"),
         ("friction_every_attitude", "with encounters, sufficient at every attitude"),
     ):
-        if name != "friction_equilibrium" and not telling:
+        if name != "friction_equilibrium" and not constraining:
             continue
         lines.append(f"minimum friction angle (deg), {title}; columns: cohesion (Pa)")
         lines.append(f"{'kg/m3':>8s} " + " ".join(f"{c:8g}" for c in cohesions))

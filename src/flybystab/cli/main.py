@@ -1,8 +1,8 @@
-"""The command line: ``flybystab COMMAND --help`` describes each command, with an example.
+"""Command line interface; ``flybystab COMMAND --help`` describes each command, with an example.
 
-Exit status: 0 success, 1 cannot be computed (the reason is on stderr), 2 wrong usage: an unknown argument, or a
-value that is invalid for any asteroid or file. With ``--json`` stdout holds one JSON document and nothing else.
-Slow imports are left to the command that needs them.
+Exit status: 0 success, 1 the result cannot be computed (the reason is on stderr), 2 wrong usage: an unknown argument,
+or a value that is invalid whatever the asteroid or file. With ``--json``, stdout contains one JSON document and nothing
+else. Slow imports are left to the commands that need them.
 """
 
 from __future__ import annotations
@@ -84,7 +84,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 
 def _run(options: argparse.Namespace) -> None:
-    """Run the command, in the style of its figure."""
+    """Run the command, with the style of the option --style if it has one."""
     if getattr(options, "style", "default") == "default":
         COMMANDS[options.command].run(options)
         return
@@ -95,7 +95,7 @@ def _run(options: argparse.Namespace) -> None:
 
 
 class _Parser(argparse.ArgumentParser):
-    """Marks arguments for tab completion: FILE is completed with files, ``name`` also with asteroids."""
+    """Parser that marks arguments for tab completion: FILE with files, ``name`` with files and asteroids."""
 
     def add_argument(self, *args: Any, **kwargs: Any) -> argparse.Action:
         """Add an argument."""
@@ -108,7 +108,7 @@ class _Parser(argparse.ArgumentParser):
 
 
 class _Help(argparse.RawDescriptionHelpFormatter):
-    """Keep the examples as written, and names of commands on the line of their description."""
+    """Formatter that keeps examples as written, and each command on one line with its description."""
 
     def __init__(self, prog: str) -> None:
         super().__init__(prog, max_help_position=26)
@@ -128,7 +128,7 @@ def command_parser() -> argparse.ArgumentParser:
         description="Do rubble-pile asteroids survive their close planetary encounters?",
         epilog="examples:\n  flybystab flyby Apophis --output apophis.png\n  flybystab scenario p2.toml --json\n"
         "  flybystab screen --from 2026-01-01 --to 2036-01-01\n"
-        "defaults of options by command: ~/.config/flybystab/config.toml, or the file in FLYBYSTAB_CONFIG",
+        "default values of options can be set in ~/.config/flybystab/config.toml, or in the file FLYBYSTAB_CONFIG",
         formatter_class=_Help,
     )
     parser.add_argument("--version", action="version", version=f"flybystab {__version__}")
@@ -142,7 +142,7 @@ def command_parser() -> argparse.ArgumentParser:
             formatter_class=_Help,
         )
         sub.add_argument(
-            "--json", action="store_true", help="print one JSON document (units are in its keys)"
+            "--json", action="store_true", help="print one JSON document, with units in its keys"
         )
         command.arguments(sub)
     return parser

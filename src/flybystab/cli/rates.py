@@ -1,4 +1,4 @@
-"""``flybystab rates [FILE]``: encounter rates of a population, and rates of the verdicts."""
+"""``flybystab rates [FILE]``: rates of encounters, or of their verdicts, for a population."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     from flybystab.population.rates import Orbits
     from flybystab.typing import Document
 
-HELP = "encounter rates of a population, and the rates of the verdicts"
+HELP = "rates of encounters, or of their verdicts, for a population"
 EXAMPLE = "flybystab rates --planet earth --within 0.05"
 #: Planets by default.
 PLANETS = ("mercury", "venus", "earth", "mars")
@@ -26,7 +26,7 @@ def arguments(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
         "file",
         nargs="?",
-        help="catalogue, table with columns a, e, i (and H, weight) of a model population, or law (.toml); "
+        help="catalogue, table of a model population with columns a, e, i (and H, weight), or distribution (.toml); "
         "default: the known near-Earth asteroids brighter than --limit",
     )
     sub.add_argument(
@@ -34,30 +34,34 @@ def arguments(sub: argparse.ArgumentParser) -> None:
         type=float,
         default=17.75,
         metavar="H",
-        help="faintest known asteroid, without FILE (17.75: 1 km)",
+        help="without FILE: largest absolute magnitude (17.75, about 1 km)",
     )
     sub.add_argument(
         "--columns",
         metavar="NAMES",
-        help="columns of a table without header, such as H,a,e,i (others are skipped)",
+        help="columns of a table without a header, such as H,a,e,i (others are ignored)",
     )
-    sub.add_argument("--planet", action="append", help=f"planet, repeatable ({', '.join(PLANETS)})")
-    sub.add_argument("--within", type=float, metavar="AU", help="largest periapsis distance (au; surface)")
+    sub.add_argument("--planet", action="append", help=f"planet; may be repeated ({', '.join(PLANETS)})")
     sub.add_argument(
-        "--verdicts", action="store_true", help="rates of the verdicts within 5 radii of each planet"
+        "--within", type=float, metavar="AU", help="largest periapsis distance (radius of the planet)"
+    )
+    sub.add_argument(
+        "--verdicts",
+        action="store_true",
+        help="rates of the verdicts of encounters within 5 radii of each planet",
     )
     sub.add_argument(
         "--diameter",
         metavar="KM",
         default="1",
-        help="of every body, for --verdicts (1 km); H: from H and the albedo",
+        help="with --verdicts: diameter of all bodies, or H for sizes from H and the albedo (1 km)",
     )
     sampling_arguments(
         sub,
         800,
         "encounters sampled per planet",
         population="priors of the bodies, TOML, as for screen",
-        grains="with --verdicts: follow bodies beyond the ellipsoid with piles of N grains",
+        grains="with --verdicts: continue bodies beyond the ellipsoid model with piles of N grains",
     )
     surface_argument(sub)
     sub.add_argument(
@@ -83,7 +87,7 @@ def run(options: argparse.Namespace) -> None:
         what = f"verdicts of {size} within 5 radii"
     elif options.output or options.grains:
         name = "output" if options.output else "grains"
-        raise InvalidInput(f"--{name}", getattr(options, name), "--verdicts with it")
+        raise InvalidInput(f"--{name}", getattr(options, name), "this option only with --verdicts")
     else:
         within = None if options.within is None else options.within * u.au
         rows, lines, count = [], [], 0
@@ -92,8 +96,8 @@ def run(options: argparse.Namespace) -> None:
             count = len(rates.rate)
             met = rates.rate.value > 0.0
             total = float(rates.total.to_value(1 / u.yr))
-            share = rates.weight[met] * rates.rate.value[met]
-            speed = float((share * rates.v_inf.value[met]).sum() / total) if total > 0.0 else None
+            weight = rates.weight[met] * rates.rate.value[met]
+            speed = float((weight * rates.v_inf.value[met]).sum() / total) if total > 0.0 else None
             rows.append(
                 {
                     "planet": rates.planet.name,
@@ -191,12 +195,12 @@ def _diameter(text: str) -> Quantity | None:
 
 
 def _interval(rate: float) -> str:
-    """A rate per year, and the mean time between two events."""
+    """A rate per year, and the mean interval between events."""
     return f"{rate:9.3e} /yr   one in {1.0 / rate:.3g} yr" if rate > 0.0 else f"{rate:9.3e} /yr"
 
 
 def _orbits(options: argparse.Namespace) -> Orbits:
-    """Orbits of a file: a population (table or law), or any catalogue; the known asteroids without a file."""
+    """Orbits of a population file or a catalogue; without a file, the known near-Earth asteroids."""
     from flybystab.catalogues.catalogue import catalogue
     from flybystab.population.model_population import is_population, known_population, read_population
 

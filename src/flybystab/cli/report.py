@@ -22,7 +22,7 @@ def arguments(sub: argparse.ArgumentParser) -> None:
         type=int,
         default=200,
         metavar="N",
-        help="samples of the uncertain inputs (200; 1: none)",
+        help="samples of the uncertain inputs; 1 for none (200)",
     )
     sub.add_argument("--output", default="report.html", metavar="FILE", help="HTML file (report.html)")
 

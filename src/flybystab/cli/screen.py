@@ -40,9 +40,11 @@ def arguments(sub: argparse.ArgumentParser) -> None:
         help="output table, .ecsv or .parquet (screening.ecsv)",
     )
     sub.add_argument(
-        "--overwrite", action="store_true", help="replace finished tables (not needed to resume a run)"
+        "--overwrite", action="store_true", help="replace existing tables (not needed to resume a run)"
     )
-    sub.add_argument("--samples-output", metavar="FILE", help="table of all samples, .ecsv or .parquet")
+    sub.add_argument(
+        "--samples-output", metavar="FILE", help="also write a table of all samples, .ecsv or .parquet"
+    )
 
 
 def study_arguments(sub: argparse.ArgumentParser) -> None:
@@ -51,7 +53,7 @@ def study_arguments(sub: argparse.ArgumentParser) -> None:
         "asteroids",
         nargs="*",
         metavar="FILE",
-        help="catalogue files (own CSV or a format of docs/inputs.md) or names (default: the embedded catalogue)",
+        help="catalogue files in any format of docs/inputs.md, or names (default: the embedded catalogue)",
     )
     span_arguments(sub, "2026-01-01", "2036-01-01")
     material_arguments(sub)
@@ -61,7 +63,7 @@ def study_arguments(sub: argparse.ArgumentParser) -> None:
         1,
         "samples of the uncertain inputs; 1 for the nominal values only",
         population="priors of the uncertain inputs, TOML; omitted ones keep their defaults",
-        grains="follow samples beyond the ellipsoid with piles of N grains",
+        grains="continue samples beyond the ellipsoid model with piles of N grains",
     )
     sub.add_argument("--jobs", type=int, default=1, metavar="N", help="number of processes (1)")
     sub.add_argument("--dask", metavar="ADDRESS", help="dask scheduler to use instead of processes")
@@ -114,7 +116,7 @@ def run_study(
     asteroids = listed(names or None)
     if options.shape:
         if len(asteroids) != 1:
-            raise WrongUsage(f"--shape: expected one asteroid with it, not {len(asteroids)}")
+            raise WrongUsage(f"--shape: expected with a single asteroid, not with {len(asteroids)}")
         asteroids = (shaped(asteroids[0], options),)
     screening = Screening(
         asteroids,
@@ -143,5 +145,8 @@ def run_study(
             )
     except KeyboardInterrupt:
         bar.end()
-        print(f"flybystab: {output} holds the rows so far; the same command resumes the run", file=sys.stderr)
+        print(
+            f"flybystab: {output} contains the rows computed so far; rerun with the same arguments to resume",
+            file=sys.stderr,
+        )
         raise

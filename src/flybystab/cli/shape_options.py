@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from flybystab.catalogues.asteroid import Asteroid
     from flybystab.flybys.result import FlybyResult
 
-#: Value of --shape-unit for shape models without a size: the volume of the catalogue.
+#: Value of --shape-unit for shape models without a scale: the shape is given the catalogued volume.
 CATALOGUE = "catalogue"
 
 
@@ -26,13 +26,13 @@ def shape_arguments(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
         "--shape",
         metavar="FILE",
-        help="shape of the asteroid (OBJ, PLY, STL, PDS or ICQ table, DAMIT shape.txt)",
+        help="shape model of the asteroid (OBJ, PLY, STL, PDS or ICQ table, DAMIT shape.txt)",
     )
     sub.add_argument(
         "--shape-unit",
         metavar="UNIT",
         default="km",
-        help=f"unit of the coordinates in --shape (km; {CATALOGUE}: scaled to the catalogued volume)",
+        help=f"unit of the coordinates in --shape; {CATALOGUE}: scale to the catalogued volume (km)",
     )
 
 
@@ -41,12 +41,12 @@ def map_argument(sub: argparse.ArgumentParser) -> None:
     sub.add_argument(
         "--map",
         metavar="FILE",
-        help="with --shape: map of the slopes (.png, .svg, .pdf) or mesh with fields (.vtk, .ply)",
+        help="with --shape: write a map of the slopes (.png, .svg, .pdf) or a mesh with fields (.vtk, .ply)",
     )
 
 
 def shaped(asteroid: Asteroid, options: argparse.Namespace) -> Asteroid:
-    """The asteroid with the shape of the options, if there is one."""
+    """The asteroid with the shape of the options, if one is given."""
     if getattr(options, "shape", None) is None:
         return asteroid
     return asteroid.with_shape(shape_of(options, asteroid.body))
@@ -67,11 +67,11 @@ def _read(path: str, unit: str) -> Shape:
 
 
 def check_map(options: argparse.Namespace) -> None:
-    """Check before a computation that the map can be written."""
+    """Check, before the computation, that the map can be written."""
     from flybystab.cli.common import check_picture
 
     if options.map is not None and options.shape is None:
-        raise WrongUsage("--map: expected --shape with it")
+        raise WrongUsage("--map: expected only with --shape")
     check_picture(options.map, (*FIGURES, ".vtk", ".ply"))
 
 

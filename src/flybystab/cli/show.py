@@ -1,4 +1,4 @@
-"""``flybystab show FILE``: summary and plot of a screening table, or the same as CSV."""
+"""``flybystab show FILE``: summary and figure of a screening table, or its conversion to CSV."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import argparse
 from flybystab.cli.common import check_picture, check_table, show, style_argument
 from flybystab.plots.formats import FIGURES
 
-HELP = "summary and plot of a screening table"
+HELP = "summary and figure of a screening table"
 EXAMPLE = "flybystab show screening.ecsv --output screening.png"
 
 

@@ -29,12 +29,12 @@ EXAMPLE = "flybystab stability Anteros --friction 30"
 
 def arguments(sub: argparse.ArgumentParser) -> None:
     """Add the arguments of the command."""
-    sub.add_argument("name", nargs="?", help="number, name or designation; with --all a catalogue file")
+    sub.add_argument("name", nargs="?", help="number, name or designation; with --all, a catalogue file")
     catalogue_argument(sub)
     sub.add_argument(
         "--all",
         action="store_true",
-        help="classify the embedded catalogue or a file (own CSV or a format of docs/inputs.md)",
+        help="classify the embedded catalogue, or a file in any format of docs/inputs.md",
     )
     material_arguments(sub)
     body_arguments(sub)
@@ -45,17 +45,17 @@ def arguments(sub: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> None:
     """Execute the command."""
     if options.all and options.shape:
-        raise WrongUsage("--shape: expected one NAME with it, not --all")
+        raise WrongUsage("--shape: expected with a single asteroid, not with --all")
     if options.all and options.catalogue:
         raise WrongUsage(
-            "--catalogue: expected one NAME with it; --all takes its file as stability --all FILE"
+            "--catalogue: expected with a single asteroid; for a whole file use stability --all FILE"
         )
     if options.all:
         _catalogue(options)
     elif options.name is None:
         raise WrongUsage("NAME: expected an asteroid, or --all for the whole catalogue")
     elif options.output:
-        raise WrongUsage("--output: expected --all with it; without --all the result is printed")
+        raise WrongUsage("--output: expected only with --all; otherwise the result is printed")
     else:
         _asteroid(options)
 
@@ -97,8 +97,11 @@ def _catalogue(options: argparse.Namespace) -> None:
             )
         for angle, found in counts(table).items():
             out.append(f"{angle}: " + ", ".join(f"{n} {name}" for name, n in found.items()))
-        held = " (0 inadmissible, 1 admissible, 2 stable to infinitesimal, 3 to finite perturbations at second order)"
-        return [*out, "levels" + held, *([f"table      {options.output}"] if options.output else [])]
+        levels = (
+            "levels: 0 inadmissible, 1 admissible, 2 stable to infinitesimal perturbations, "
+            "3 to finite ones at second order"
+        )
+        return [*out, levels, *([f"table      {options.output}"] if options.output else [])]
 
     show(options, lambda: table_document(table), lines)
     reasons = Counter(str(e) for e in table["error"] if e)
@@ -175,5 +178,5 @@ def _period_range(limits: Array) -> str:
     slowest, fastest = sorted(float(w) for w in limits)
     shortest = f"{2.0 * np.pi / fastest / 3600.0:.3f} h" if fastest > 0.0 else "infinite"
     if slowest == 0.0:
-        return f"{shortest} and longer, also without spin, about the short axis"
+        return f"{shortest} and longer, including no spin, about the short axis"
     return f"{shortest} to {2.0 * np.pi / slowest / 3600.0:.3f} h about the short axis"

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import shlex
 
-#: Shells that shtab writes scripts for.
+#: Shells with completion scripts.
 SHELLS = ("bash", "zsh")
 
 #: Shell function that completes the name of an asteroid, for the ``complete`` attribute of an argument.
@@ -37,7 +37,7 @@ def script(shell: str, parser: argparse.ArgumentParser) -> str:
 
 
 def _names() -> list[str]:
-    """Names of the embedded catalogue that need no quotes in a shell."""
+    """Names in the embedded catalogue that need no quoting in a shell."""
     from flybystab.catalogues.catalogue import catalogue
 
     return sorted(a.name for a in catalogue() if a.name.isalnum())

@@ -1,7 +1,8 @@
 """Atlas of a screening: a static web site with a list of all encounters and a page for each.
 
-The site opens from disk: style and script are files beside the pages, and nothing is loaded from the network. The list
-is complete without scripts; the script adds search, filters and sorting. Templates: ``templates/atlas``.
+The site can be opened from disk: style sheet and script are files beside the pages, and nothing is loaded from the
+network. Without scripts the list is complete; the script adds search, filters and sorting. Templates:
+``templates/atlas``.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from flybystab.screening.results import read_results
 from flybystab.screening.tables import write_table
 from flybystab.typing import Document
 
-#: Columns of the list, and whether they hold numbers.
+#: Columns of the list, and whether they are numeric.
 COLUMNS = (
     ("Asteroid", False),
     ("Date (TDB)", False),
@@ -44,7 +45,7 @@ COLUMNS = (
     ("P(yield)", True),
     ("Margin (deg)", True),
 )
-#: Colour of each verdict (Okabe & Ito), which is also given as text.
+#: Colour of each verdict (Okabe & Ito); verdicts are also printed as text.
 COLOURS = {
     Verdict.INTACT: "#009E73",
     Verdict.RESHAPED: "#F0E442",
@@ -75,7 +76,7 @@ def atlas(
     results : QTable, str or Path
         Table of encounters of :func:`flybystab.screen`, or its file.
     folder : str or Path
-        New or empty.
+        New or empty folder.
     title : str, optional
         Heading of the list.
     overwrite : bool
@@ -86,8 +87,8 @@ def atlas(
     Raises
     ------
     InvalidInput
-        The folder holds other files, the file cannot be read, or the table has no encounters or is no table of
-        encounters.
+        The folder contains other files, the file cannot be read, or the table is not a table of encounters or is
+        empty.
     """
     table = results if isinstance(results, QTable) else read_results(results)
     missing = [
@@ -137,17 +138,18 @@ def atlas(
 
 
 def check_folder(place: Path, overwrite: bool) -> None:
-    """Raise InvalidInput, before anything is computed, for a folder in which no atlas can be written.
+    """Check, before any computation, that an atlas can be written into a folder.
 
     Raises
     ------
     InvalidInput
+        The path is not a folder, or the folder contains other files or an atlas that must not be replaced.
     """
     if place.is_symlink() or (place.exists() and not place.is_dir()):
         raise InvalidInput("folder", str(place), "a folder")
     if place.exists() and any(place.iterdir()):
         if not (place / MARK).is_file() or not (place / "index.html").is_file():
-            raise InvalidInput("folder", str(place), "a new or empty folder: this one holds other files")
+            raise InvalidInput("folder", str(place), "a new or empty folder: this one contains other files")
         if not overwrite:
             raise InvalidInput(
                 "folder", str(place), "a new folder; overwrite=True (--overwrite) replaces this atlas"
@@ -155,7 +157,7 @@ def check_folder(place: Path, overwrite: bool) -> None:
 
 
 def _empty_folder(place: Path, overwrite: bool) -> Path:
-    """The folder, made or emptied."""
+    """The folder, created or emptied."""
     check_folder(place, overwrite)
     shutil.rmtree(place / "encounters", ignore_errors=True)
     for name in ("index.html", MARK, "encounters.csv", "encounters.ecsv", *_FILES):
@@ -168,7 +170,7 @@ def _empty_folder(place: Path, overwrite: bool) -> Path:
 
 
 def _templates() -> jinja2.Environment:
-    """Templates in which every value is escaped."""
+    """Environment of the templates, with autoescaping."""
     return jinja2.Environment(
         loader=jinja2.PackageLoader("flybystab.io", "templates/atlas"),
         autoescape=True,
@@ -184,9 +186,9 @@ def _index(pages: jinja2.Environment, table: QTable, entries: list[Document], ti
     settings = settings if isinstance(settings, dict) else {}
     span = f"{dates[0]} to {dates[-1]}" if dates else "no dates"
     summary = (
-        f"{len(entries)} encounters of {asteroids} asteroids, {span}. P(intact) is the fraction of the samples of the "
-        "uncertain inputs, P(yield) that among the samples in equilibrium; yielding includes reaching the planet. The "
-        "verdict is that for the catalogue values and the chosen material."
+        f"{len(entries)} encounters of {asteroids} asteroids, {span}. P(intact) is the fraction of INTACT among all "
+        "samples of the uncertain inputs, P(yield) the fraction that yields or reaches the planet among the samples in "
+        "equilibrium before the encounter. The verdict applies to the catalogue values and the chosen material."
     )
     return pages.get_template("index.html").render(
         title=title or f"Encounters of asteroids, {span}",
@@ -214,7 +216,7 @@ def _plain_text(value: object) -> str:
 
 
 def _entry(row: Row, position: int) -> Document:
-    """All values of one encounter that the pages show."""
+    """All values of one encounter shown on the pages."""
     name, verdict = str(row["asteroid"]), str(row["verdict"])
     when = str(row["time_tdb"])[:16].replace("T", " ")
     planet = str(row["planet"]).capitalize()
@@ -270,13 +272,13 @@ def _number(value: u.Quantity | float, unit: u.UnitBase | None = None) -> float 
 def _margin_text(row: Row, margin: float | None, verdict: str) -> str:
     if margin is None:
         return "none suffices" if verdict and float(row["margin"].value) == -np.inf else ""
-    if verdict == Verdict.NOT_IN_EQUILIBRIUM:  # there is no margin before the encounter
+    if verdict == Verdict.NOT_IN_EQUILIBRIUM:  # a margin is not defined
         return ""
     return ("≥ " if str(row["decided_by"]) == "bound" else "") + f"{margin:.2f}"
 
 
 def _headline(row: Row, verdict: str, probability: float | None) -> tuple[str, str]:
-    """The probability first where the inputs are uncertain, and the verdict for the nominal values."""
+    """Headline and explanation: the probability of yielding if inputs were sampled, and the nominal verdict."""
     if not verdict:
         return "not computed", str(row["error"])
     nominal = f"With the catalogue values and the chosen material the body {MEANING[verdict]}."
@@ -297,7 +299,7 @@ def _headline(row: Row, verdict: str, probability: float | None) -> tuple[str, s
 def _sections(
     row: Row, distance: float | None, speed: float | None
 ) -> list[tuple[str, list[tuple[str, str]]]]:
-    """Facts by heading; unknown ones are left out."""
+    """Facts by heading; unknown values are omitted."""
 
     def text(column: str, unit: u.UnitBase | None = None, form: str = ".4g", suffix: str = "") -> str:
         number = _number(row[column], unit)
@@ -335,7 +337,7 @@ def _sections(
 
 
 def _forces(text: str) -> list[tuple[str, str]]:
-    """Forces on the orbit and sources of the tide, each as one list."""
+    """Forces on the orbit and sources of the tide, each as one entry."""
     groups: dict[str, list[str]] = {}
     for part in filter(None, text.split("; ")):
         kind, _, name = part.rpartition(": ")
@@ -345,7 +347,7 @@ def _forces(text: str) -> list[tuple[str, str]]:
 
 
 def _csv(rows: list[Document]) -> str:
-    """Rows as CSV; a missing value is empty."""
+    """Rows as CSV, with empty cells for missing values."""
     names = list(dict.fromkeys(k for row in rows for k in row))
     cells = ([row.get(k) for k in names] for row in rows)
     return csv_text(names, (["" if x is None else x for x in values] for values in cells))

@@ -1,4 +1,4 @@
-"""BibTeX of the methods and data behind a result."""
+"""BibTeX references for the methods and data used in a result."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ BIBTEX = _entries_of(resources.files("flybystab.io").joinpath("references.bib").
 #: Cited for every result: equations of motion and of stability, gravity of an ellipsoid, units.
 ALWAYS = ("Sharma2013", "SharmaJenkinsBurns2006", "Carlson1995", "Astropy2022")
 
-#: Entries by value in a result: ephemerides, yield surfaces, catalogues.
+#: References by value in a result: ephemerides, yield surfaces, catalogues.
 BY_WORD = {
     "de421": ("Folkner2009",),
     "de440": ("Park2021",),
@@ -33,7 +33,7 @@ BY_WORD = {
     "asteroids.csv": ("JPLSBDB", "WarnerHarrisPravec2009"),
 }
 
-#: Entries by key of a result: the methods that produce this quantity.
+#: References by key in a result: methods that produce the quantity.
 BY_KEY = {
     "encounter": ("Steinebach2023",),
     "verdict_class": ("RichardsonBottkeLove1998",),
@@ -43,23 +43,23 @@ BY_KEY = {
     "time_scale": ("HairerNorsettWanner1993",),
 }
 
-#: Cited where an orbit was integrated through an encounter: the Sun is among its forces.
+#: Cited if an orbit was integrated through an encounter, that is, if the Sun is among its forces.
 ORBIT = ("ReinLiu2012", "ReinSpiegel2015")
 
 
 def cite(result: FlybyResult | QTable | Mapping[str, object] | None = None) -> str:
-    """BibTeX of the methods and data, as one text.
+    """BibTeX entries for the methods and data used, as one text.
 
     Parameters
     ----------
     result : FlybyResult, QTable or mapping, optional
         Result of :func:`flybystab.flyby`, :func:`flybystab.screen` or :func:`flybystab.find_encounters`, or the JSON
-        document of a command: entries for the methods and data that it used. By default all entries.
+        document of a command. By default all entries.
 
     Raises
     ------
     InvalidInput
-        For anything else.
+        `result` is none of these.
     """
     return "\n\n".join(BIBTEX[key] for key in cited(result))
 
@@ -90,7 +90,7 @@ def cited(result: FlybyResult | QTable | Mapping[str, object] | None = None) -> 
 
 
 def _entries(value: object, key: str = "") -> list[tuple[str, object]]:
-    """Every key with its value, at any depth; the entries of a list have its key."""
+    """All keys with their values, at any depth; the items of a list have the key of the list."""
     if isinstance(value, Mapping):
         return [e for k, v in value.items() for e in [(str(k), None), *_entries(v, str(k))]]
     if isinstance(value, list | tuple):

@@ -10,7 +10,7 @@ from flybystab.flybys.result import FlybyResult
 
 
 def grains_lines(r: FlybyResult, most: int = 6) -> list[str]:
-    """Distribution over piles and the fragments of the median one; empty for a result without grains."""
+    """Outcomes of the piles, and the fragments of the median pile; empty for a result without grains."""
     if r.grains is None:
         return []
     low, high = r.grains.largest_range

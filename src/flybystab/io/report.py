@@ -75,15 +75,15 @@ def report(
     result : FlybyResult
         Flyby of the asteroid on its real orbit, with history.
     sample : SpinSample
-        The same encounter at other attitudes.
+        The same encounter at sampled attitudes.
     path : str or Path
-        The file, ``.html``.
+        File to write, ``.html``.
     screened : Row, optional
-        Row of :func:`flybystab.screen` for the encounter, with sampled inputs.
+        Row of :func:`flybystab.screen` for the same encounter, with sampled inputs.
     command : str
-        Command line that made the report, shown under Provenance.
+        Command line that produced the report, shown under Provenance.
     surface : SurfaceHistory, optional
-        Surface of the shape through the encounter (:func:`flybystab.surface_history`).
+        Slopes on the shape through the encounter (:func:`flybystab.surface_history`).
     """
     encounter = result.encounter
     when = "" if encounter.time is None else encounter.time.tdb.iso[:19] + " TDB"
@@ -115,7 +115,7 @@ def report(
 
 
 def _template() -> jinja2.Template:
-    """The page, in which every value is escaped."""
+    """Template of the page, with autoescaping."""
     environment = jinja2.Environment(
         loader=jinja2.PackageLoader("flybystab.io"),
         autoescape=True,
@@ -169,7 +169,7 @@ def _encounter_rows(r: FlybyResult, when: str) -> Rows:
 
 
 def _margin_rows(r: FlybyResult, s: SpinSample) -> Rows:
-    """Nominal values, each with its range over the sampled attitudes where it depends on the attitude."""
+    """Nominal values; those that depend on the attitude with their range over the sampled attitudes."""
     m = r.body.material
     phi = m.friction_angle.to_value(u.deg)
     needed, none = s.max_required_friction_angle.to_value(u.deg), "no friction angle suffices"
@@ -230,7 +230,7 @@ def _probability_rows(row: Row) -> Rows:
     return [
         (
             "samples",
-            f"{int(row['samples'])} ({int(row['samples_dynamic'])} integrated, the others decided by a bound)",
+            f"{int(row['samples'])} ({int(row['samples_dynamic'])} integrated, the others decided by the bound)",
         ),
         (
             "probability of yielding",
@@ -248,7 +248,7 @@ def _probability_rows(row: Row) -> Rows:
     ]
 
 
-#: Columns of the catalogue shown on the page.
+#: Catalogue columns shown on the page.
 _INPUTS = {
     "semi_axis_a_m": "long semi-axis",
     "semi_axis_b_m": "intermediate semi-axis",
@@ -310,9 +310,9 @@ def _embedded(figure: Figure) -> str:
     return "data:image/svg+xml;base64," + base64.b64encode(stream.getvalue()).decode()
 
 
-#: A figure as a data URL, and the same drawn anew for a narrow screen.
+#: A figure as a data URL, and the same figure drawn for a narrow screen.
 _Pictures = tuple[str, str]
-#: Width of a figure on a phone, inches: 390 px with text of its full size.
+#: Width of a figure on a phone, inches: about 390 px with text at full size.
 _PHONE = 4.0
 
 
@@ -331,7 +331,7 @@ def _twice(
     narrow: float,
     encode: Callable[[Figure], str],
 ) -> _Pictures:
-    """A figure in its size, and as wide as a phone with the height `narrow`."""
+    """A figure of the size `wide`, and one with the width of a phone and the height `narrow`."""
     out = []
     for width, height in (wide, (_PHONE, narrow)):
         figure = _blank(width, height)
@@ -347,7 +347,7 @@ def _history_picture(r: FlybyResult) -> _Pictures:
 
 
 def _bitmap(figure: Figure) -> str:
-    """A figure of many small parts, for which a bitmap is smaller than vectors."""
+    """A figure as a bitmap, which is smaller than vector graphics if it has many elements."""
     stream = io.BytesIO()
     figure.savefig(stream, format="png", dpi=130)
     return "data:image/png;base64," + base64.b64encode(stream.getvalue()).decode()

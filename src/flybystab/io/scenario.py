@@ -1,4 +1,4 @@
-"""Scenario files (TOML): a body, a material and an encounter. Quantities are text with a unit; all keys are checked."""
+"""Scenario files (TOML) with a body, a material and an encounter; quantities are texts with units, keys are checked."""
 
 from __future__ import annotations
 
@@ -66,9 +66,9 @@ def scenario(path: str | Path) -> Scenario:
     Raises
     ------
     InvalidInput
-        The file cannot be read or a value is wrong.
+        The file cannot be read, or a value is invalid.
     UnknownName
-        A table or key is unknown; the message lists similar ones.
+        A table or key is unknown; the message lists similar names.
     UnitMismatch
         A value has the wrong unit or no unit.
     """
@@ -131,7 +131,7 @@ def _need(section: Document, table: str, key: str) -> Any:
 
 
 def _typed(section: Document, table: str, key: str, kind: type, default: Any) -> Any:
-    """A value that is not a quantity, with its TOML type checked: the text ``"no"`` is not false."""
+    """A value that is not a quantity; its TOML type is checked, so that the text ``"no"`` is not taken as false."""
     if key not in section:
         return default
     value = section[key]

@@ -1,4 +1,4 @@
-"""JSON schemas of the documents that commands print with ``--json`` (draft 2020-12), one file each in ``schema/``."""
+"""JSON schemas (draft 2020-12) of the documents printed by commands with ``--json``, one file each in ``schema/``."""
 
 from __future__ import annotations
 

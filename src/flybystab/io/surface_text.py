@@ -9,14 +9,14 @@ from flybystab.body.surface_history import SurfaceHistory
 from flybystab.body.surface_slope import SurfaceSlopes
 from flybystab.typing import Document
 
-#: Angle of repose for which fractions of the area are given.
+#: Angle of repose for which area fractions are given.
 REPOSE = 35 * u.deg
-#: Rises of the slope for which shares of the area are stated, deg.
+#: Increases of the slope (deg) for which area fractions are given.
 RISES = (0.5, 1.0, 2.0)
 
 
 def surface_rows(surface: SurfaceHistory) -> list[tuple[str, str]]:
-    """Labels and values of the slopes of a surface through an encounter."""
+    """Labels and values for the slopes of a surface through an encounter."""
     before = surface.slope[0].to_value(u.deg)
     pressing = -surface.outward.value
     shape = surface.shape
@@ -45,7 +45,7 @@ def surface_rows(surface: SurfaceHistory) -> list[tuple[str, str]]:
 
 
 def surface_lines(surface: SurfaceHistory) -> list[str]:
-    """Lines of a surface through an encounter, for the printed result of a flyby."""
+    """The same for the printed result of a flyby."""
     rows = dict(surface_rows(surface))
     return [
         f"shape      {rows.pop('shape')}",
@@ -54,7 +54,7 @@ def surface_lines(surface: SurfaceHistory) -> list[str]:
 
 
 def surface_document(surface: SurfaceHistory) -> Document:
-    """Part of a JSON document."""
+    """The same for a JSON document."""
     past = surface.share_past(REPOSE)
     return {
         "facets": len(surface.shape.facets),
@@ -72,12 +72,12 @@ def surface_document(surface: SurfaceHistory) -> Document:
 
 
 def extra(surface: SurfaceHistory | None) -> Document:
-    """Entries that a surface adds to the document of a flyby."""
+    """Entries for the surface in the document of a flyby; empty without a surface."""
     return {} if surface is None else {"surface": surface_document(surface)}
 
 
 def slopes_text(slopes: SurfaceSlopes) -> str:
-    """Slopes at one instant."""
+    """Slopes at one instant as text."""
     past = _percent(slopes.share_above(REPOSE))
     lifted = _percent(slopes.share_above(90 * u.deg))
     return (
@@ -87,7 +87,7 @@ def slopes_text(slopes: SurfaceSlopes) -> str:
 
 
 def slopes_document(slopes: SurfaceSlopes) -> Document:
-    """Part of a JSON document."""
+    """Slopes at one instant for a JSON document."""
     return {
         "facets": len(slopes.slope),
         "slope_deg": _quantiles(slopes.slope.value, slopes.area.value),
@@ -98,10 +98,10 @@ def slopes_document(slopes: SurfaceSlopes) -> Document:
 
 
 def _quantiles(slope: np.ndarray, area: np.ndarray) -> dict[str, float]:
-    """Median by area, and the largest."""
+    """Area-weighted median and maximum of the slope."""
     order = np.argsort(slope)
-    share = np.cumsum(area[order]) / area.sum()
-    return {"median": float(slope[order][np.searchsorted(share, 0.5)]), "most": float(slope.max())}
+    fraction = np.cumsum(area[order]) / area.sum()
+    return {"median": float(slope[order][np.searchsorted(fraction, 0.5)]), "most": float(slope.max())}
 
 
 def _slopes(slope: np.ndarray, area: np.ndarray) -> str:
@@ -109,5 +109,5 @@ def _slopes(slope: np.ndarray, area: np.ndarray) -> str:
     return f"median {found['median']:.1f} deg, at most {found['most']:.1f} deg"
 
 
-def _percent(share: float) -> str:
-    return f"{100.0 * share:.2g} %"
+def _percent(fraction: float) -> str:
+    return f"{100.0 * fraction:.2g} %"

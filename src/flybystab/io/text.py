@@ -1,4 +1,4 @@
-"""Text summaries for the terminal."""
+"""Summaries of results as text for the terminal."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from flybystab.flybys.result import FlybyResult
 from flybystab.flybys.spin_sample import SpinSample
 from flybystab.orbit.ephemeris import BELT, BODIES
 
-#: Completes "The body ..." for each verdict.
+#: Predicate of the sentence "The body ..." for each verdict.
 MEANING = {
     "INTACT": "never yields",
     "RESHAPED": "yields and is deformed; all of its mass stays bound",
     "MASS LOSS": "loses mass",
     "DISRUPTED": "loses at least half of its mass",
     "IMPACT": "reaches the planet",
-    "BEYOND MODEL": "is stretched beyond an axis ratio of 6:1, where the homogeneous ellipsoid ceases to apply",
-    "NOT IN EQUILIBRIUM": "is not in equilibrium, even far from any planet",
+    "BEYOND MODEL": "is stretched beyond an axis ratio of 6:1, the limit of the homogeneous ellipsoid",
+    "NOT IN EQUILIBRIUM": "is not in equilibrium even far from any planet",
 }
 
 
@@ -50,7 +50,7 @@ def encounter_lines(e: Encounter) -> list[str]:
 
 
 def entry(e: Encounter) -> str:
-    """Time and place of the entry of an impact on a real orbit."""
+    """Time and place of entry for an impact on a real orbit; empty for other encounters."""
     if e.entry_time is None:
         return ""
     top = "enters the atmosphere" if e.planet.atmosphere else "reaches the surface"
@@ -72,7 +72,7 @@ def grade(predictability: str) -> str:
 
 
 def known(e: Encounter) -> str:
-    """Predictability of an encounter on a real orbit, with the displacement that it is derived from."""
+    """Predictability of an encounter on a real orbit, with the displacement from which it follows."""
     assert e.displacement is not None
     km = f"{e.displacement.to_value(u.km):,.3g} km"
     sigma, caveat = e.neighbour.startswith("one sigma"), e.neighbour.partition(", ")[2]
@@ -82,7 +82,7 @@ def known(e: Encounter) -> str:
 
 
 def contact(r: FlybyResult) -> str:
-    """Description of the contact with the planet in an IMPACT: kind and time."""
+    """Kind and time of the contact with the planet in an IMPACT."""
     e = r.encounter
     top = "the top of the atmosphere" if e.planet.atmosphere else "the ground"
     before = -(e.t_start + r.end_time.to_value(u.s))
@@ -95,7 +95,7 @@ def contact(r: FlybyResult) -> str:
 
 
 def flyby_lines(r: FlybyResult) -> list[str]:
-    """Verdict, margins and error."""
+    """Verdict, margins and error of a flyby."""
     m = r.body.material
     letter = f" (class {r.verdict_class})" if r.verdict_class else ""
     out = [f"verdict    {r.verdict}{letter}: the body {MEANING[str(r.verdict)]}"]
@@ -127,12 +127,12 @@ def flyby_lines(r: FlybyResult) -> list[str]:
         known = r.margins
         reach = f"{known.axis_ratio:.3g}" if math.isfinite(known.axis_ratio) else "not known"
         out.append(
-            f"beyond     axis ratio {reach} (followed past {known.limit:.3g}), strain {known.strain:.2f} up to there; "
-            f"bound mass fraction at most {known.bound_fraction_upper:.1%}"
+            f"beyond     axis ratio {reach} (integrated beyond the limit {known.limit:.3g}), strain "
+            f"{known.strain:.2f} at the limit; bound mass fraction at most {known.bound_fraction_upper:.1%}"
         )
     if not r.settled:
         out.append(
-            "settled    no: the body still moves when the run ends, the verdict is that of one instant"
+            "settled    no: the body still deforms at the end of the run, so that the verdict may change later"
         )
     out.append(f"spin       {spin_change(r)}")
     if r.robust is not None:
@@ -148,7 +148,7 @@ def flyby_lines(r: FlybyResult) -> list[str]:
 
 
 def extent(values: np.ndarray, digits: int, unit: str = "", missing: str = "not defined") -> str:
-    """Least and greatest finite value of a sample, as text; `missing` describes the others, which are counted."""
+    """Range of the finite values of a sample; `missing` describes the others, whose number is given."""
     finite = values[np.isfinite(values)]
     if not len(finite):
         return missing
@@ -158,13 +158,13 @@ def extent(values: np.ndarray, digits: int, unit: str = "", missing: str = "not 
 
 
 def median(values: np.ndarray, digits: int) -> str:
-    """Median of the finite values of a sample in brackets; empty if there are none."""
+    """Median of the finite values of a sample, in parentheses; empty if there are none."""
     finite = values[np.isfinite(values)]
     return f" (median {np.median(finite):.{digits}f})" if len(finite) else ""
 
 
 def friction_extent(s: SpinSample, digits: int = 2) -> str:
-    """Friction angles over a sample of attitudes: those mobilised, or those that equilibrium would need."""
+    """Range of the friction angles mobilised over a sample of attitudes, or required for equilibrium."""
     needed = s.max_required_friction_angle.to_value(u.deg)
     held = s.verdict != "NOT IN EQUILIBRIUM"
     none = "no friction angle suffices"
@@ -194,7 +194,7 @@ def sample_lines(s: SpinSample) -> list[str]:
 
 
 def spin_change(r: FlybyResult) -> str:
-    """Spin after an encounter against that before it."""
+    """Change of the spin by an encounter."""
     if not math.isfinite(r.spin_ratio):
         rate = r.spin.to_value(u.rad / u.h)
         return (
@@ -206,7 +206,7 @@ def spin_change(r: FlybyResult) -> str:
 
 
 def modelled(r: FlybyResult) -> dict[str, str]:
-    """Description of the model of ``orbit``, ``tide`` and ``body``; small perturbers are counted."""
+    """Effects modelled for ``orbit``, ``tide`` and ``body``; of more than two asteroids only the number is given."""
     groups: dict[str, list[str]] = {}
     for entry in r.modelled:
         head, _, rest = entry.partition(": ")
@@ -224,18 +224,18 @@ def modelled(r: FlybyResult) -> dict[str, str]:
 
 
 def capital(name: str) -> str:
-    """A force or its source with a capital: ``earth J2`` is Earth J2."""
+    """Name of a force with its source capitalised: ``earth J2`` becomes Earth J2."""
     first, space, rest = name.partition(" ")
     return (first.capitalize() if first in (*BODIES, *BELT) else first) + space + rest
 
 
 def left_out(r: FlybyResult, most: int = 4) -> str:
-    """The largest neglected effects with their relative size, and the number of the others."""
+    """The largest neglected effects with their relative sizes, and the number of others."""
     largest = sorted(r.left_out, key=lambda x: -x[1])
     words = []
-    for name, share in largest[:most]:
+    for name, size in largest[:most]:
         head, colon, rest = name.rpartition(": ")
-        words.append(f"{head}{colon}{capital(rest).removesuffix(' point mass')} ({share:.0e})")
+        words.append(f"{head}{colon}{capital(rest).removesuffix(' point mass')} ({size:.0e})")
     if len(largest) > most:
         words.append(f"{len(largest) - most} smaller effects")
     return "; ".join(words)

@@ -169,16 +169,18 @@ class SampledInputs:
         if self.asteroid.tumbles:
             omega = self.asteroid.angular_velocities(phase)
             return SampledSpins(2.0 * np.pi / np.linalg.norm(omega, axis=1), omega, phase, none)
-        rivals = () if self.keep else self.asteroid.spin_solutions
-        solution = chosen(rivals, self.x[:, _SOLUTION]) if rivals else none
-        period = self._rival_periods(rivals, solution) if rivals else self._periods()
+        alternatives = () if self.keep else self.asteroid.spin_solutions
+        solution = chosen(alternatives, self.x[:, _SOLUTION]) if alternatives else none
+        period = self._alternative_periods(alternatives, solution) if alternatives else self._periods()
         omega = np.column_stack([np.zeros(n), np.zeros(n), 2.0 * np.pi / period])
         return SampledSpins(period, omega, phase, solution)
 
-    def _rival_periods(self, rivals: tuple[SpinSolution, ...], solution: NDArray[np.int64]) -> Array:
+    def _alternative_periods(
+        self, alternatives: tuple[SpinSolution, ...], solution: NDArray[np.int64]
+    ) -> Array:
         """Periods (s) of the chosen solutions within their errors."""
         period = np.empty(len(solution))
-        for k, s in enumerate(rivals):
+        for k, s in enumerate(alternatives):
             u01 = self.x[solution == k, _PERIOD]
             hours = truncated_normal(u01, s.period, s.sigma, 0.2 * s.period, 5.0 * s.period)
             period[solution == k] = 3600.0 * hours

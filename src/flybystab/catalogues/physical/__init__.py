@@ -1,6 +1,6 @@
-"""Readers of files with physical parameters of asteroids, one module per publisher, chosen by the content of a file.
+"""Readers of physical parameters of asteroids, one module per publisher; the format is detected from the content.
 
-A module of this package registers a function with :func:`physical_reader`; a further format is one further module.
+A module registers its function with :func:`physical_reader`; adding a format means adding a module.
 """
 
 from __future__ import annotations
@@ -27,11 +27,11 @@ class PhysicalData:
     Attributes
     ----------
     names : tuple of str
-        Number, name, designation as far as the file gives them; none where it does not name its body.
+        Number, name and designation, as far as the file gives them; empty if it does not name its body.
     row : mapping of str to str
-        Columns of a catalogue, with their sources.
+        Catalogue columns, including those of the sources.
     spins : tuple of SpinSolution
-        One solution, or rivals.
+        Spin solutions; several are alternatives.
     """
 
     names: tuple[str, ...]
@@ -47,9 +47,9 @@ class PhysicalReader:
     ----------
     name : str
     identify : callable
-        Test of a text for this format, which must not raise.
+        Whether a text has this format; must not raise.
     read : callable
-        Bodies of a text; the second argument is the name of the file.
+        Returns the bodies in a text; the second argument is the name of the file.
     physical, spin : str
         Parameters that are read, for the table in ``docs/inputs.md``.
     """
@@ -97,15 +97,16 @@ def read_physical(path: str | Path) -> list[PhysicalData]:
 
 
 def with_physical(asteroid: Asteroid, *paths: str | Path) -> Asteroid:
-    """An asteroid with the values of files in place of its own.
+    """An asteroid with its physical parameters replaced by those of files.
 
-    A file without names is assumed to be of this asteroid; of a table, the rows with one of its names are used. Later
-    files replace values of earlier ones; their spin solutions are rivals. A new diameter scales known semi-axes.
+    A file without names is assumed to describe this asteroid; from a table, the rows with one of its names are used.
+    Values in later files replace those in earlier ones, except spin solutions, which are all kept as alternatives. A
+    new diameter scales known semi-axes.
 
     Raises
     ------
     InvalidInput
-        A file has no data of this asteroid.
+        A file does not contain this asteroid.
     """
     from flybystab.catalogues.record import key_of
 
@@ -133,7 +134,7 @@ def with_physical(asteroid: Asteroid, *paths: str | Path) -> Asteroid:
 
 
 def body_of(asteroid: Asteroid, given: Mapping[str, str]) -> dict[str, str]:
-    """Columns of new values of a body: known semi-axes scaled to a new diameter, errors of replaced values empty."""
+    """Columns for new values of a body: known semi-axes are scaled to a new diameter, errors of old values removed."""
     from flybystab.catalogues.record import SHAPE
 
     out = dict(given)
@@ -154,6 +155,6 @@ def body_of(asteroid: Asteroid, given: Mapping[str, str]) -> dict[str, str]:
 
 
 def source_of(publisher: str, items: Sequence[Mapping[str, object]], file: str) -> str:
-    """Source of a value: publisher, references by ``shortbib``, file."""
+    """Text for the source of a value: publisher, references (``shortbib``) and file."""
     refs = ", ".join(str(x.get("shortbib")) for x in items if x.get("shortbib"))
     return f"{publisher}: {refs} ({file})" if refs else f"{publisher} ({file})"

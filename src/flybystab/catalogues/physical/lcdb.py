@@ -1,14 +1,13 @@
-"""Rows of the Asteroid Lightcurve Database (LCDB) as CSV, and tables of rival spin solutions.
+"""Tables of the Asteroid Lightcurve Database (LCDB) as CSV, and tables of alternative spin solutions.
 
 Columns of the LCDB: its ``readme.pdf``, section 4 (Warner, Harris & Pravec 2009, Icarus 202, 134;
 https://minplanobs.org): Number, Name, Desig, Class, Diam (km), H, Period (h), AmpMax (mag), U (quality of the period, 3
 is unambiguous), Notes (``T``: tumbling); ``-`` and -9.99 are missing values. A period or an amplitude with the flag
-``<`` or ``>`` (PFlag, AmpFlag) is a bound and is not read. Copies with numbers before the names of columns
-(``19-Period``) are read too. Of several rows of one asteroid those of the best quality are rival solutions of the same
-weight.
+``<`` or ``>`` (PFlag, AmpFlag) is a bound and is not read. Column names with a numeric prefix (``19-Period``) are
+accepted. If an asteroid has several rows, those of the best quality are alternative solutions with equal weights.
 
-A table of spin solutions has the columns ``period_h``, and as far as known ``sigma_h``, ``lon_deg``, ``lat_deg``
-(ecliptic J2000), ``weight``, ``source``, ``name``.
+A table of spin solutions has the column ``period_h`` and, optionally, ``sigma_h``, ``lon_deg``, ``lat_deg`` (ecliptic
+J2000), ``weight``, ``source``, ``name``.
 """
 
 from __future__ import annotations
@@ -41,7 +40,7 @@ def _is_lcdb(text: str) -> bool:
     "periods of the best quality; tumbling",
 )
 def read_lcdb(text: str, file: str) -> list[PhysicalData]:
-    """Rows of a table, one for each asteroid.
+    """The asteroids in a table.
 
     Raises
     ------
@@ -51,7 +50,7 @@ def read_lcdb(text: str, file: str) -> list[PhysicalData]:
 
 
 def bodies_of(rows: Iterable[Mapping[str, str]], file: str) -> list[PhysicalData]:
-    """Rows by the names of the columns, grouped by asteroid."""
+    """The asteroids in rows keyed by column name; rows of one asteroid are merged."""
     bodies: dict[tuple[str, ...], list[dict[str, str]]] = {}
     for raw in rows:
         row = {c: v for c, v in raw.items() if v not in _MISSING}
@@ -62,7 +61,7 @@ def bodies_of(rows: Iterable[Mapping[str, str]], file: str) -> list[PhysicalData
 
 
 def _quality(row: Mapping[str, str]) -> float:
-    """U as a number: 3-, 2+ are a third below and above."""
+    """U as a number; a minus or plus (3-, 2+) subtracts or adds a third."""
     found = re.match(r"(\d)([-+]?)", row.get("U", ""))
     if found is None:
         return -1.0
@@ -103,7 +102,7 @@ def _is_solutions(text: str) -> bool:
 
 @physical_reader("spin solutions (CSV)", _is_solutions, "none", "periods with errors, poles, weights")
 def read_solutions(text: str, file: str) -> list[PhysicalData]:
-    """Rival solutions, by the name of their asteroid if there is such a column.
+    """Alternative solutions, grouped by the column ``name`` if there is one.
 
     Raises
     ------

@@ -1,11 +1,11 @@
-"""The summary of the Asteroid Lightcurve Database in fixed columns: ``lc_summary_pub.txt`` (``LC_SUM_PUB.TXT``).
+"""Summary table of the Asteroid Lightcurve Database in fixed columns: ``lc_summary_pub.txt`` (``LC_SUM_PUB.TXT``).
 
-Columns of the releases since 2020, counted from 1 with both ends included: number 1-7, name 11-40, designation 42-61,
+Columns of the releases since 2020, counted from 1, both ends inclusive: number 1-7, name 11-40, designation 42-61,
 taxonomic class 74-83, diameter 89-96 (km), H 100-105, flag of the period 144, period 146-158 (h), flag of the amplitude
 176, largest amplitude 183-186 (mag), U 188-189, notes 191-195. They are those of section 4.1.3 of the ``readme.pdf`` of
 the release of October 2023 (https://minplanobs.org), as quoted by public programs that read the file. The rows follow
-a title, a date and a line with the names of the columns. The columns have changed between releases; the positions of
-these names show whether a file has the columns given here.
+a title, a date and a line of column names. Since the columns differ between releases, the positions of these names are
+compared with the columns given here.
 """
 
 from __future__ import annotations
@@ -19,12 +19,12 @@ _COLUMNS = {
     "PFlag": (143, 144), "Period": (145, 158), "AmpFlag": (175, 176), "AmpMax": (182, 186), "U": (187, 189),
     "Notes": (190, 195),
 }  # fmt: skip
-#: Names in the line of titles, with the columns in which each must stand.
+#: Column names in the header line, with the range of columns in which each must be.
 _TITLES = {"NAME": (10, 40), "DESIG": (41, 61), "PERIOD": (143, 158), "AMAX": (181, 187), "NOTES": (189, 196)}
 
 
 def _titles(text: str) -> str:
-    """The line with the names of the columns; empty if there is none among the first."""
+    """The line of column names among the first ten lines; empty if there is none."""
     lines = text[:5000].splitlines()[:10]
     return next((s for s in lines if s.lstrip().startswith("NUMBER") and "PERIOD" in s and "AMAX" in s), "")
 
@@ -36,12 +36,12 @@ def _titles(text: str) -> str:
     "periods of the best quality; tumbling",
 )
 def read_summary(text: str, file: str) -> list[PhysicalData]:
-    """Rows of the summary.
+    """The asteroids in the summary.
 
     Raises
     ------
     InvalidInput
-        The columns are those of another release, or a value is not a number.
+        The file has the columns of another release, or a value is not a number.
     """
     titles = _titles(text).upper()
     for title, (first, last) in _TITLES.items():

@@ -1,6 +1,6 @@
-"""Physical parameters of the JPL Small-Body Database: the answer for one object, with ``phys-par=1`` (JSON).
+"""Physical parameters from an answer of the JPL Small-Body Database for one object, with ``phys-par=1`` (JSON).
 
-Fields: https://ssd-api.jpl.nasa.gov/doc/sbdb.html (``phys_par``). An orbit in the answer is not used.
+Fields: https://ssd-api.jpl.nasa.gov/doc/sbdb.html (``phys_par``). The orbit in the answer is not used.
 """
 
 from __future__ import annotations

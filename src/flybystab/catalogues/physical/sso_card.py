@@ -1,9 +1,9 @@
-"""Cards of SsODNet (``ssoCard``, JSON): the best values of one asteroid, with their references.
+"""Cards of SsODNet (``ssoCard``, JSON): best estimates of the parameters of one asteroid, with references.
 
 Fields: https://doc.ssodnet.imcce.fr/ssocard.html and the cards in the tests of https://github.com/maxmahlke/rocks;
 Berthier et al. (2023), A&A 671, A151. Diameter in km, mass in kg, density in kg/m3, periods in h, poles ecliptic J2000
-in deg; errors as ``min`` and ``max``, whose mean size is taken. Several entries of ``spins`` are rival solutions of the
-same weight.
+in deg. The 1-sigma error is the mean of the absolute values of ``min`` and ``max``. Several entries of ``spins`` are
+alternative solutions with equal weights.
 """
 
 from __future__ import annotations
@@ -51,7 +51,7 @@ def read_card(text: str, file: str) -> list[PhysicalData]:
 
 
 def _value(item: object, name: str, file: str) -> tuple[float, float]:
-    """Value and error of a quantity; the error is zero if it is not given."""
+    """Value and error of a quantity; the error is zero if not given."""
     if not isinstance(item, Mapping):
         return number(item, name, file), 0.0
     error = item.get("error") or {}

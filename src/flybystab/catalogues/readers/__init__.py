@@ -1,6 +1,6 @@
 """Readers of catalogue and orbit files, one module per publisher; the format is detected from the content.
 
-A module of this package registers its function with :func:`reader`; a further format is one more module.
+A module registers its function with :func:`reader`; adding a format means adding a module.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ FRAME = "heliocentric, ecliptic J2000, TDB"
 
 @dataclass(frozen=True)
 class Contents:
-    """What is read from a format: a row of the table in ``docs/inputs.md``, which ``python docs/formats.py`` makes.
+    """Content that is read from a format: a row of the table in ``docs/inputs.md``, made by ``docs/formats.py``.
 
     Attributes
     ----------
     elements, covariance, nongravitational, physical : str
         Cells of the table.
     files : str
-        Names of files, or what else shows that a file has the format.
+        Usual names of such files, or another feature by which they are known.
     """
 
     elements: str
@@ -51,11 +51,11 @@ class Reader:
     Attributes
     ----------
     name : str
-        Shown in messages.
+        Name in messages.
     identify : callable
-        Whether a text has this format; it must not raise.
+        Whether a text has this format; must not raise.
     read : callable
-        Rows of a text; the second argument is the name of the file.
+        Returns the rows of a text; the second argument is the name of the file.
     contents : Contents
     """
 
@@ -94,23 +94,23 @@ def text_of(path: str | Path) -> str:
         raise InvalidInput(
             "catalogue file",
             path,
-            "a file of orbits: an SPK kernel is a trajectory, made with forces that it does not name; "
-            "fs.Encounter.from_spk(path, target, planet, time) follows it",
+            "a file of orbits; an SPK kernel contains a trajectory without its force model: use "
+            "fs.Encounter.from_spk(path, target, planet, time)",
         )
     if re.match(rb"\s*CCSDS_OEM_VERS", raw):
         raise InvalidInput(
             "catalogue file",
             path,
-            "a file of orbits: an orbit ephemeris message is a trajectory; fs.Encounter.from_oem(path, planet) "
-            "follows it",
+            "a file of orbits; an orbit ephemeris message contains a trajectory: use "
+            "fs.Encounter.from_oem(path, planet)",
         )
     return decoded(raw, "catalogue file", path)
 
 
 def decoded(raw: bytes, what: str, path: str | Path) -> str:
-    """Text of the bytes of a file, with lines that end with a line feed, from the first that is not blank.
+    """Text of a file from its bytes, with line feeds as line ends and without blank lines at the beginning.
 
-    The encoding is UTF-8 or, with a mark, UTF-16; otherwise Latin-1 if the text has no control characters.
+    The encoding is UTF-8, or UTF-16 with a byte order mark; otherwise Latin-1 if the text has no control characters.
 
     Raises
     ------
@@ -124,12 +124,12 @@ def decoded(raw: bytes, what: str, path: str | Path) -> str:
             raise InvalidInput(what, path, f"a readable text file ({error})") from None
     if "\r" in text:
         text = text.replace("\r\n", "\n").replace("\r", "\n")
-    text = text.rstrip("\x1a")  # the end of a file in DOS
+    text = text.rstrip("\x1a")  # end-of-file mark of DOS
     return re.sub(r"\A(?:[ \t]*\n)+", "", text)
 
 
 def header_of(text: str) -> Sequence[str]:
-    """Column names of the first line of a CSV text; none if it is not a line of CSV."""
+    """Column names in the first line of a CSV text; empty if it is not valid CSV."""
     if text[:1] in "{[":
         return []
     try:
@@ -139,12 +139,12 @@ def header_of(text: str) -> Sequence[str]:
 
 
 def rows_of(text: str, file: str) -> list[dict[str, str]]:
-    """Rows of a CSV text without surrounding spaces.
+    """Rows of a CSV text by column name; spaces around the cells are removed.
 
     Raises
     ------
     InvalidInput
-        A row has another number of cells than the header, a cell is too long, or the quoting is wrong.
+        The number of cells in a row differs from that in the header, a cell is too long, or quotes are unbalanced.
     """
     rows = csv_rows(text, "catalogue file", file)
     columns = [c.strip() for c in next(rows, [])]

@@ -1,10 +1,10 @@
-"""Observed arcs of orbits: the middle of the arc, and whether it is one opposition."""
+"""Observed arcs: middle of the arc, and whether it is limited to one opposition."""
 
 from __future__ import annotations
 
 from datetime import date
 
-#: Days of an arc that is taken for one opposition where the number of oppositions is not given.
+#: Longest arc (d) that is taken as one opposition if the number of oppositions is not given.
 _ONE_OPPOSITION = 300
 
 
@@ -26,7 +26,7 @@ def arc_columns(first: object, last: object) -> dict[str, str]:
     Parameters
     ----------
     first, last : object
-        Dates as text; the result is empty if one of them is not known.
+        Dates as text; the result is empty if either is unknown.
     """
     begin, end = _day(str(first or "")), _day(str(last or ""))
     if begin is None or end is None or end < begin:

@@ -1,7 +1,7 @@
 """Comets of the Minor Planet Center: ``CometEls.txt`` and ``cometels.json``.
 
-Columns: https://minorplanetcenter.net/iau/info/CometOrbitFormat.html. Times are TT. A line without an epoch has
-unperturbed elements, which are taken to osculate at perihelion.
+Columns: https://minorplanetcenter.net/iau/info/CometOrbitFormat.html. Times are TT. Lines without an epoch contain
+unperturbed elements, which are taken as osculating at perihelion.
 """
 
 from __future__ import annotations
@@ -50,7 +50,7 @@ def read_comets(text: str, file: str) -> list[Entry]:
     Raises
     ------
     InvalidInput
-        A line has other columns.
+        A line does not have these columns.
     """
     out = []
     for line in text.splitlines():
@@ -69,7 +69,7 @@ def read_comets(text: str, file: str) -> list[Entry]:
 
 
 def _day(year: str, month: str, day: str, file: str) -> tuple[float, str]:
-    """Julian date of midnight, and the printed day whose fraction follows."""
+    """Julian date at the preceding midnight, and the printed fraction of the day."""
     whole, _, fraction = day.partition(".")
     try:
         midnight = date(int(year), int(month), 1).toordinal() + int(whole) - 1 + 1721424.5
@@ -90,7 +90,7 @@ def _entry(
     row = name_columns(label) | {"orbit_source": source, "orbit_class": "COM"}
     row |= perihelion_row(jd, elements, jd - tp)
     if magnitude:
-        row["notes"] = f"total magnitude {magnitude} at 1 au: of the coma, not of the nucleus"
+        row["notes"] = f"total magnitude {magnitude} at 1 au: that of the coma, not of the nucleus"
     texts = [*(cells[n] for n in COMETARY[:5]), fraction]
     return row, printed_covariance(jd, COMETARY, texts, jd - midnight, source)
 

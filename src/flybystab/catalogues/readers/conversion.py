@@ -1,7 +1,7 @@
-"""Conversion of the elements, states and matrices of orbit files to catalogue rows and covariances.
+"""Conversion of elements and states in orbit files to catalogue rows.
 
-Rows hold heliocentric elements of the J2000 ecliptic. States relative to another centre or with other axes are
-converted; their covariances become those of a state with ICRF axes.
+Rows contain heliocentric elements with axes of the J2000 ecliptic. States relative to another centre or with other axes
+are converted.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ if TYPE_CHECKING:
 
     from flybystab.orbit.covariance import Covariance
 
-#: Day number of Modified Julian Dates, d.
+#: Julian date of MJD 0, d.
 MJD = 2400000.5
-#: Sets of elements in the order of the rows of a catalogue, and a state.
+#: Names of the elements in the order of the catalogue columns, and of the components of a state.
 KEPLERIAN = ("a", "e", "i", "node", "peri", "M")
 COMETARY = ("q", "e", "i", "node", "peri", "tp")
 CARTESIAN = ("x", "y", "z", "vx", "vy", "vz")
@@ -31,22 +31,22 @@ CARTESIAN = ("x", "y", "z", "vx", "vy", "vz")
 COLUMN_OF: Mapping[str, str] = dict(
     zip(KEPLERIAN, ("a_au", "e", "i_deg", "node_deg", "peri_deg", "M_deg"), strict=True)
 )
-#: Radians of a degree.
+#: One degree, rad.
 DEGREE = np.pi / 180.0
-#: Semi-major axes beyond this are left out of a row: q and the time of perihelion preserve the digits, au.
+#: Largest semi-major axis in a row, au; for larger ones q and the time of perihelion lose fewer digits.
 _LARGEST_AXIS = 1e5
-#: Displacement, m, below which the printed digits of an orbit are not counted as its error.
+#: Displacement (m) below which rounding errors of the printed elements are neglected.
 _NEGLIGIBLE = 1e3
 
 
 def julian(text: str) -> tuple[float, float]:
-    """Whole and fractional day of a printed Julian date: differences keep all printed digits."""
+    """Whole and fractional day of a printed Julian date, so that differences keep all printed digits."""
     whole, _, fraction = text.strip().partition(".")
     return float(whole), float("0." + (fraction or "0"))
 
 
 def number(text: object, name: str, file: str) -> float:
-    """A finite number of a file.
+    """Convert a text of a file to a finite number.
 
     Raises
     ------
@@ -62,12 +62,12 @@ def number(text: object, name: str, file: str) -> float:
 
 
 def epoch_row(jd: float) -> dict[str, str]:
-    """Column of the epoch. TT and TDB, which differ by less than 2 ms, are not distinguished."""
+    """Column of the epoch; TT and TDB, which differ by less than 2 ms, are not distinguished."""
     return {"epoch_jd_tdb": repr(float(jd))}
 
 
 def perihelion_row(jd: float, elements: Sequence[float], since: float) -> dict[str, str]:
-    """Columns of an orbit by its perihelion.
+    """Columns of an orbit given by its perihelion distance and time.
 
     Parameters
     ----------
@@ -90,21 +90,21 @@ def perihelion_row(jd: float, elements: Sequence[float], since: float) -> dict[s
 
 
 def since_perihelion(mean: float, axis: float) -> float:
-    """Days since perihelion of a mean anomaly (deg) and a semi-major axis (au)."""
+    """Days since perihelion for a mean anomaly (deg) and a semi-major axis (au)."""
     from flybystab.orbit.elements import GM_SUN
 
     return float(mean * DEGREE * np.sqrt(abs(axis * AU) ** 3 / GM_SUN) / DAY)
 
 
 def axis_of(motion: float) -> float:
-    """Semi-major axis (au) of a mean motion (deg/d)."""
+    """Semi-major axis (au) for a mean motion (deg/d)."""
     from flybystab.orbit.elements import GM_SUN
 
     return float(np.cbrt(GM_SUN / (motion * DEGREE / DAY) ** 2) / AU)
 
 
 def equatorial_to_ecliptic(right_ascension: float, declination: float) -> tuple[float, float]:
-    """Longitude and latitude (deg, J2000) of a direction of the equator (deg)."""
+    """Ecliptic longitude and latitude (deg, J2000) of a direction given by right ascension and declination (deg)."""
     from flybystab.orbit.elements import ecliptic_to_icrf
 
     alpha, delta = right_ascension * DEGREE, declination * DEGREE
@@ -125,7 +125,7 @@ def state_row(jd: float, state: Array) -> dict[str, str]:
 def elements_row(
     jd: float, names: Sequence[str], texts: Sequence[str], values: Sequence[float] | Array
 ) -> dict[str, str]:
-    """Columns of a heliocentric orbit by any set of elements of the J2000 ecliptic.
+    """Columns of a heliocentric orbit from any set of elements with axes of the J2000 ecliptic.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def elements_row(
     names, values : sequences
         Elements as in :func:`state_of`.
     texts : sequence of str
-        The elements as printed: the digits of Keplerian elements are kept.
+        The elements as printed; Keplerian elements are copied with all digits.
     """
     if set(names) == set(KEPLERIAN):
         return epoch_row(jd) | {COLUMN_OF[n]: t for n, t in zip(names, texts, strict=True)}
@@ -145,7 +145,7 @@ def elements_row(
 
 
 def rotated(state: Array, *, to_ecliptic: bool = False) -> Array:
-    """State, or matrix of its columns, from the axes of the ecliptic to those of the ICRF, or back, shape (6, ...)."""
+    """Rotate states, shape (6, ...), from ecliptic to ICRF axes, or back with `to_ecliptic`."""
     from flybystab.orbit.elements import ecliptic_to_icrf
 
     turn = ecliptic_to_icrf().T if to_ecliptic else ecliptic_to_icrf()
@@ -173,7 +173,7 @@ def _centre_offset(jd: float, centre: str, barycentre: str) -> tuple[float, ...]
 
 
 def heliocentric_state(jd: float, state: Array, centre: str, barycentre: str = "de440") -> Array:
-    """State (m, m/s, ICRF) relative to the Sun, from one relative to a centre.
+    """State (m, m/s, ICRF axes) relative to the Sun, from a state relative to another centre.
 
     Parameters
     ----------
@@ -187,16 +187,16 @@ def heliocentric_state(jd: float, state: Array, centre: str, barycentre: str = "
 
 
 def state_of(names: Sequence[str], values: Sequence[float] | Array, gm: float | None = None) -> Array:
-    """State (m, m/s, ICRF axes) of elements of the ecliptic in au, au/d, days and degrees.
+    """State (m, m/s, ICRF axes) from elements with ecliptic axes, in au, au/d, days and degrees.
 
     Parameters
     ----------
     names : sequence of str
-        Those of a set of :data:`flybystab.orbit.covariance.SETS`; a cartesian state has axes of the ecliptic here.
+        Names of a set in :data:`flybystab.orbit.covariance.SETS`; here a cartesian state has ecliptic axes.
     values : sequence of float
-        ``tp`` is the time of perihelion less the epoch.
+        Elements; ``tp`` is the time of perihelion minus the epoch.
     gm : float, optional
-        m3/s2; that of the Sun by default.
+        GM of the centre, m3/s2; by default that of the Sun.
     """
     from flybystab.orbit.covariance import keplerian_angles
     from flybystab.orbit.elements import GM_SUN, state_from_elements
@@ -231,7 +231,7 @@ def cartesian_covariance(
 ) -> Covariance:
     """Covariance of the state with ICRF axes, from that of elements (au, days, degrees) to first order.
 
-    Parameters are those of :func:`state_of`; A1, A2, A3 (au/d2), DT (d), AMRAT (m2/kg) may follow the elements.
+    The arguments are those of :func:`state_of`; A1, A2, A3 (au/d2), DT (d), AMRAT (m2/kg) may follow the elements.
     """
     from flybystab.orbit.covariance import NONGRAV_PARAMETERS, SETS, Covariance
 
@@ -242,7 +242,7 @@ def cartesian_covariance(
     sigma = np.sqrt(np.diag(matrix))
     for k in range(len(elements)):
         step = np.zeros(len(elements))
-        # A step of a part in 1e5 of the angle, length or time balances rounding and curvature.
+        # The step balances rounding errors against the truncation error of the central difference.
         step[k] = max(1e-6 * abs(middle[k]), min(float(sigma[k]), 1e-3), 1e-9)
         difference = state_of(elements, middle + step, gm) - state_of(elements, middle - step, gm)
         jacobian[:6, k] = difference / (2.0 * step[k])
@@ -283,7 +283,7 @@ _UNITS: Mapping[str, str] = (
     | {"tp": "d", "DT": "d", "AMRAT": "m2/kg"}
 )
 
-#: SI units of these.
+#: SI value of each unit.
 _SI: Mapping[str, float] = {
     "au": AU, "au/d": AU / DAY, "deg": DEGREE, "": 1.0, "au/d2": AU / DAY**2, "d": DAY, "m2/kg": 1.0,
 }  # fmt: skip
@@ -299,9 +299,9 @@ def covariance_of(
     *,
     correlated: bool = True,
 ) -> Covariance:
-    """Covariance of heliocentric elements of the ecliptic, in au, days, degrees, au/d2 and m2/kg.
+    """Covariance of heliocentric elements with ecliptic axes, in au, days, degrees, au/d2 and m2/kg.
 
-    A cartesian state has the axes of the ecliptic.
+    A cartesian state has ecliptic axes as well.
 
     Raises
     ------
@@ -326,10 +326,10 @@ def covariance_of(
 def printed_covariance(
     jd: float, names: Sequence[str], texts: Sequence[str], offset: float, source: str, gm: float | None = None
 ) -> Covariance | None:
-    """Covariance by the printed digits of elements, or None where these displace the asteroid by less than 1 km.
+    """Covariance of the rounding errors of printed elements; None if they displace the asteroid by less than 1 km.
 
-    Each element is uniform within half a unit of its last digit; angles have the most decimals of all, since some
-    tables leave out trailing zeros. The result does not include the error of the orbit itself.
+    Each element is uniformly distributed within half a unit of its last digit. All angles are given the largest number
+    of decimals among them, since some tables omit trailing zeros. The error of the orbit itself is not included.
 
     Parameters
     ----------
@@ -338,7 +338,7 @@ def printed_covariance(
     names, texts : sequences of str
         Elements as in :func:`state_of`, as printed.
     offset : float
-        Number that is subtracted from the text of ``tp``.
+        Number to be subtracted from the printed ``tp``.
     """
     values = [float(t) - (offset if n == "tp" else 0.0) for n, t in zip(names, texts, strict=True)]
     _check_conic(dict(zip(names, values, strict=True)), source)
@@ -360,7 +360,7 @@ def printed_covariance(
 
 
 def _check_conic(at: Mapping[str, float], source: str) -> None:
-    """Refuse eccentricities that no conic with this axis or perihelion distance has."""
+    """Raise InvalidInput for an eccentricity that is inconsistent with the axis or the perihelion distance."""
     e = at.get("e", 0.0)
     if e < 0.0 or at.get("q", 1.0) <= 0.0 or ("a" in at and (at["a"] == 0.0 or (at["a"] > 0.0) != (e < 1.0))):
         given = ", ".join(f"{n} = {at[n]:g}" for n in ("a", "q", "e") if n in at)
@@ -370,7 +370,7 @@ def _check_conic(at: Mapping[str, float], source: str) -> None:
 
 
 def _displacement(names: Sequence[str], values: Sequence[float], sigma: Array) -> float:
-    """Largest displacement, m, along the orbit that results from errors of the elements."""
+    """Displacement (m) of the asteroid that results from errors of the elements; an estimate of its order."""
     at = dict(zip(names, sigma, strict=True))
     if "x" in at:
         return float(np.linalg.norm([at[c] for c in "xyz"])) * AU
@@ -381,7 +381,7 @@ def _displacement(names: Sequence[str], values: Sequence[float], sigma: Array) -
 
 
 def printed_sigmas(names: Sequence[str], texts: Sequence[str]) -> Array:
-    """1-sigmas of elements that are uniform within half a unit of their last printed digit."""
+    """1-sigma errors of elements that are uniformly distributed within half a unit of their last printed digit."""
     decimals = [decimals_of(t) for t in texts]
     angular = [d for n, d in zip(names, decimals, strict=True) if _UNITS[n] == "deg"]
     shown = [max(angular) if _UNITS[n] == "deg" else d for n, d in zip(names, decimals, strict=True)]
@@ -389,6 +389,6 @@ def printed_sigmas(names: Sequence[str], texts: Sequence[str]) -> Array:
 
 
 def decimals_of(text: str) -> int:
-    """Number of decimals of a printed number, with its exponent applied."""
+    """Number of decimals of a printed number, taking its exponent into account."""
     mantissa, _, exponent = text.strip().lower().partition("e")
     return len(mantissa.partition(".")[2]) - int(exponent or 0)

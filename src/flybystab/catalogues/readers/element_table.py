@@ -1,8 +1,8 @@
-"""Tables of elements with units: Horizons elements of astroquery, sbpy ``Orbit``, ECSV files of either.
+"""Tables of elements with units: Horizons elements of astroquery, sbpy ``Orbit``, and ECSV files of either.
 
-Names of columns are those of https://sbpy.readthedocs.io/en/stable/sbpy/data/fieldnames.html and of astroquery's
-``Horizons.elements``. Elements are heliocentric, J2000 ecliptic: the tables do not name their centre, so that the mean
-motion or the period, where given, is compared with the semi-major axis.
+Column names are those of https://sbpy.readthedocs.io/en/stable/sbpy/data/fieldnames.html and of astroquery's
+``Horizons.elements``. Elements are taken to be heliocentric, with axes of the J2000 ecliptic. Since the tables do not
+state their centre, it is checked by comparing the mean motion or the period, if given, with the semi-major axis.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ _OTHER = frozenset({"H", "G", "M", "M1", "M2", "K1", "K2", "P", "Q", "ID", "TJ",
     Contents("a and M, or q and Tp, with units", "none", "none", "H"),
 )
 def read_ecsv(text: str, file: str) -> list[Entry]:
-    """Rows of an ECSV file: elements with units, or the columns of the catalogue.
+    """Rows of an ECSV file with elements and units, or with the columns of the embedded catalogue.
 
     Raises
     ------
@@ -70,7 +70,7 @@ def entries_of(table: Table, file: str) -> list[Entry]:
     Raises
     ------
     InvalidInput
-        Elements are missing, have no unit, refer to another centre, or come with parameters of a force model.
+        Elements are missing, have no unit or are not heliocentric, or the table has non-gravitational parameters.
     """
     columns = {key: next((c for c in names if c in table.colnames), "") for key, names in _ALIASES.items()}
     if not (columns["e"] and columns["i"] and columns["node"] and columns["peri"] and columns["epoch"]):
@@ -78,7 +78,7 @@ def entries_of(table: Table, file: str) -> list[Entry]:
             raise InvalidInput(
                 "table",
                 "vectors",
-                "elements: a table of vectors names neither centre nor axes; fs.Orbit.from_state",
+                "elements; a table of vectors states neither centre nor axes: use fs.Orbit.from_state",
             )
         raise InvalidInput("columns", ", ".join(table.colnames), "epoch, e, i, node, w and a, M or q, Tp")
     known = {*columns.values(), *_OTHER}
@@ -90,7 +90,7 @@ def entries_of(table: Table, file: str) -> list[Entry]:
 
 
 def _known(value: Any) -> bool:
-    """Whether a cell has a value: it is neither masked nor not a number."""
+    """Whether a cell has a value, neither masked nor nan."""
     return not (
         value is None or bool(np.any(getattr(value, "mask", False))) or _text(value) in ("", "nan", "--")
     )
@@ -113,7 +113,7 @@ def _value(cells: Mapping[str, tuple[Any, Any]], name: str, unit: str) -> float:
 
 
 def _day(cells: Mapping[str, tuple[Any, Any]], name: str) -> float:
-    """Julian date, TDB, of a Time or of a Julian date in days."""
+    """Julian date (TDB) from a Time, or from a Julian date in days."""
     from astropy.time import Time
 
     value, _ = cells[name]
@@ -151,7 +151,7 @@ def _entry(cells: Mapping[str, tuple[Any, Any]], file: str) -> Entry:
 
 
 def _check_centre(cells: Mapping[str, tuple[Any, Any]], a: float, file: str) -> None:
-    """Raise InvalidInput for elements whose mean motion is not that of an orbit about the Sun."""
+    """Raise InvalidInput if axis and mean motion are not those of an orbit about the Sun."""
     from flybystab.orbit.elements import GM_SUN
 
     if "n" in cells:
@@ -164,6 +164,6 @@ def _check_centre(cells: Mapping[str, tuple[Any, Any]], a: float, file: str) -> 
     if abs(gm / GM_SUN - 1.0) > 1e-4:
         raise InvalidInput(
             "elements",
-            f"GM = {gm:.6g} m3/s2 by axis and mean motion",
-            f"heliocentric elements in {file} (ask Horizons for location='@10')",
+            f"GM = {gm:.6g} m3/s2 from axis and mean motion",
+            f"heliocentric elements in {file} (location='@10' in a query of Horizons)",
         )

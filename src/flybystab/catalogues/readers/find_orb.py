@@ -2,9 +2,9 @@
 
 Keys: ``elements_in_json_format`` and ``covar.json`` in https://github.com/Bill-Gray/find_orb (``elem_out.cpp``
 and ``orb_func.cpp``).
-Epochs are Julian dates (TT); a state is heliocentric with axes of the J2000 ecliptic, au and au/d. Non-gravitational
-models are described in ``nongravs.txt``; the comet model has the constants of water ice unless ``environ.dat`` of
-the user has others, which the files do not list.
+Epochs are Julian dates (TT); a state is heliocentric with axes of the J2000 ecliptic, in au and au/d. Non-gravitational
+models are described in ``nongravs.txt``. The comet model has the constants of water ice, unless the user has changed
+them in ``environ.dat``; the files do not list them.
 """
 
 from __future__ import annotations
@@ -35,9 +35,9 @@ if TYPE_CHECKING:
 
 _ELEMENTS = {"a": "a", "e": "e", "i": "i", "asc_node": "node", "arg_per": "peri", "M": "M"}
 _COMETARY = {"q": "q", "e": "e", "i": "i", "asc_node": "node", "arg_per": "peri", "Tp": "tp"}
-#: Sets of parameters that belong to one model alone (``FORCE_MODEL_...`` of ``mpc_obs.h``), and its law: Yarkovsky A2
-#: (au/d2), area over mass (m2/kg), and the comet model with a delay (d), which ``elem_out.cpp`` writes as T0.
-#: A1, A2 and A1, A2, A3 belong to a law of comets or to 1/r2.
+#: Sets of parameters that occur in a single model (``FORCE_MODEL_...`` of ``mpc_obs.h``), and its law: Yarkovsky A2
+#: (au/d2), area-to-mass ratio (m2/kg), and the comet model with a delay (d), which ``elem_out.cpp`` writes as T0.
+#: A1, A2 and A1, A2, A3 occur both with the law of comets and with 1/r2.
 _MODELS: Mapping[frozenset[str], str] = {
     frozenset({"A2"}): "asteroid",
     frozenset({"AMR"}): "asteroid",
@@ -74,7 +74,7 @@ def read_elements(text: str, file: str) -> list[Entry]:
     Raises
     ------
     InvalidInput
-        Another centre or frame, or parameters that are not modelled.
+        The elements refer to another centre or frame, or there are parameters that are not modelled.
     """
     document = parse_json(text, "orbit file", file)
     try:
@@ -127,7 +127,7 @@ def _entry(name: str, elements: Document, file: str) -> Entry:
 
 
 def _is_parameter(key: str) -> bool:
-    if key in ("dx", "dy", "dz", "T0"):  # a change of velocity at a time
+    if key in ("dx", "dy", "dz", "T0"):  # an impulsive change of velocity
         return True
     return looks_like_parameter(key) and key not in _OTHER
 
@@ -138,12 +138,12 @@ def _is_parameter(key: str) -> bool:
     Contents("cartesian", "full matrix", "none", "none", files="`covar.json`"),
 )
 def read_covariance(text: str, file: str) -> list[Entry]:
-    """The orbit of ``covar.json``, which contains no name: the name of the file is used.
+    """The orbit in ``covar.json``, named after the file since it contains no name.
 
     Raises
     ------
     InvalidInput
-        The covariance has more than six parameters: the file does not name the additional ones.
+        The covariance has more than six parameters, since the file does not name the additional ones.
     """
     document = parse_json(text, "orbit file", file)
     try:

@@ -1,9 +1,9 @@
 """Tables of orbits with a column FORMAT: Sorcha, layup and OpenOrb (``.csv``, ``.des``).
 
 The column FORMAT determines centre, axes and elements: COM, KEP, CART (CAR) are heliocentric, BCOM, BKEP, BCART
-barycentric, all with the ecliptic of J2000; BCART_EQ and CAREQ have axes of the equator. Barycentric elements have the
-GM of the whole solar system. Units au, au/d, deg; epochs and times of perihelion in MJD, TDB (OpenOrb: TT). Columns and
-conversions: ``parse_orbit_row`` of https://github.com/dirac-institute/sorcha, ``element_order`` of
+barycentric, all with axes of the J2000 ecliptic; BCART_EQ and CAREQ have equatorial axes. Barycentric elements refer to
+the GM of the whole solar system. Units: au, au/d, deg; epochs and times of perihelion in MJD, TDB (OpenOrb: TT).
+Columns and conversions: ``parse_orbit_row`` of https://github.com/dirac-institute/sorcha, ``element_order`` of
 https://github.com/Smithsonian/layup, ``readDESOrbitFile`` of https://github.com/oorb/oorb.
 """
 
@@ -51,7 +51,7 @@ FORMATS: Mapping[str, tuple[tuple[str, ...], str, str]] = {
     "BCART_EQ": (CARTESIAN, "ssb", "equator"),
     "CAREQ": (CARTESIAN, "sun", "equator"),
 }
-#: Column names, in lower case, of each element; an epoch by name of its column is MJD or JD.
+#: Column names, in lower case, of each element. Dates are MJD, or JD if the column name says so.
 _ALIASES: Mapping[str, tuple[str, ...]] = {
     "a": ("a",), "q": ("q",), "e": ("e",), "i": ("inc", "i", "incl"), "node": ("node", "omega", "longnode"),
     "peri": ("argperi", "peri", "w"), "M": ("ma", "m", "meananomaly"),
@@ -64,7 +64,7 @@ _COVARIANCE = [f"cov_{i}_{j}" for i in range(6) for j in range(6)]
 
 
 def _lines(text: str) -> Iterator[str]:
-    """Lines without comments; the header of OpenOrb may start with ``!!``."""
+    """Lines other than comments; the header line of OpenOrb may start with ``!!``."""
     for line in text.splitlines():
         if line.strip() and not line.startswith("#") and not re.match(r"!(?!!)", line):
             yield line.removeprefix("!!")
@@ -106,7 +106,7 @@ def read_table(text: str, file: str) -> list[Entry]:
     """
     lines = list(_lines(text))
     columns = _cells(lines[0])
-    if "\t" in lines[0] and "" in columns:  # several tabs between two columns
+    if "\t" in lines[0] and "" in columns:  # columns separated by several tabs
         lines = [re.sub(r"\t+", "\t", line.strip()) for line in lines]
         columns = _cells(lines[0])
     if "FORMAT" not in columns:  # OpenOrb reads tables without a header
@@ -126,7 +126,7 @@ def read_table(text: str, file: str) -> list[Entry]:
 
 
 def _given(text: str) -> bool:
-    """Whether a cell has a value other than zero."""
+    """Whether a cell contains a value other than zero."""
     try:
         return bool(np.nan_to_num(float(text)))
     except ValueError:
@@ -167,7 +167,7 @@ def _entry(row: Mapping[str, str], file: str) -> Entry:
         out |= elements_row(jd, names, texts, values)
     else:
         state = state_of(names, values, gm)
-        if axes == "equator":  # state_of has turned it as if its axes were those of the ecliptic
+        if axes == "equator":  # undo the rotation by state_of, which assumes ecliptic axes
             state = rotated(state, to_ecliptic=True)
         out |= state_row(jd, heliocentric_state(jd, state, centre))
     matrix = _matrix(row, kind, names is CARTESIAN, axes, file)
@@ -179,7 +179,7 @@ def _entry(row: Mapping[str, str], file: str) -> Entry:
 
 
 def _check(row: Mapping[str, str], file: str) -> None:
-    """Raise InvalidInput for parameters of force models, which layup writes in lower case with their errors."""
+    """Raise InvalidInput for parameters of force models; layup writes them in lower case, with their errors."""
     names = [c for c in row if (looks_like_parameter(c) and c not in _OTHER) or re.match(r"a[1-9](_|$)", c)]
     given = {c.partition("_")[0].upper() for c in names if _given(row[c])}
     given |= {c for c in row if re.match(r"cov_([6-9]_|\d_[6-9])", c) and _given(row[c])}
@@ -187,12 +187,12 @@ def _check(row: Mapping[str, str], file: str) -> None:
 
 
 def _matrix(row: Mapping[str, str], kind: str, cartesian: bool, axes: str, file: str) -> np.ndarray | None:
-    """Covariance with axes of the ecliptic; None without one.
+    """Covariance of the state with ecliptic axes; None if the row has none.
 
     Raises
     ------
     InvalidInput
-        A covariance of elements, whose unit (rad2 or deg2) depends on the version of layup.
+        The covariance is one of elements, whose unit (rad2 or deg2) depends on the version of layup.
     """
     if not all(c in row for c in _COVARIANCE) or not any(_given(row[c]) for c in _COVARIANCE):
         return None
@@ -200,8 +200,8 @@ def _matrix(row: Mapping[str, str], kind: str, cartesian: bool, axes: str, file:
         raise InvalidInput(
             "covariance",
             kind,
-            f"that of a state (layup convert to BCART_EQ) in {file}: angles of other formats are in radians or "
-            "degrees, by the version of layup",
+            f"the covariance of a state (layup convert to BCART_EQ) in {file}: in other formats, angles are in radians "
+            "or degrees, depending on the version of layup",
         )
     matrix = np.array([number(row[c], c, file) for c in _COVARIANCE]).reshape(6, 6)
     matrix = 0.5 * (matrix + matrix.T)

@@ -1,8 +1,8 @@
-"""Answers of JPL Horizons: osculating elements and vectors, as text or CSV, and the page of an object's own orbit.
+"""Answers of JPL Horizons: osculating elements and vectors, as text or CSV, and object data pages.
 
 Centre, units, axes and time scale are read from the header of the answer
-(https://ssd.jpl.nasa.gov/horizons/manual.html#output); the constants of the non-gravitational acceleration in the
-description of the object. Of a table with several times only the first is read.
+(https://ssd.jpl.nasa.gov/horizons/manual.html#output), non-gravitational parameters from the description of the object.
+Only the first epoch of a table is read.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _PAIR = re.compile(r"([A-Za-z][A-Za-z0-9-]*) ?= *([-+]?[.\d]+(?:[EeDd][-+]?\d+)?
 
 def _is_horizons(text: str) -> bool:
     head = text[:60000]
-    if text.lstrip()[:1] in "{[":  # the API wraps the same text in JSON
+    if text.lstrip()[:1] in "{[":  # the API returns the same text within JSON
         return '"result"' in text and ("JPL/HORIZONS" in text or "$$SOE" in text)
     return (
         "$$SOE" in text and "Target body name:" in head and ("Output units" in head or "JDT" in head)
@@ -70,8 +70,8 @@ def read_horizons(text: str, file: str) -> list[Entry]:
     Raises
     ------
     InvalidInput
-        Another centre than the Sun or the barycentre of the solar system, other axes than ecliptic or ICRF, or
-        parameters of the force model that are not modelled.
+        The centre is neither the Sun nor the barycentre of the solar system, the axes are neither ecliptic nor ICRF,
+        or there are parameters that are not modelled.
     """
     if text.lstrip().startswith("{"):
         text = str(parse_json(text, "orbit file", file).get("result", ""))
@@ -126,7 +126,7 @@ def _centre(header: str, file: str) -> str:
 
 
 def _barycentre(header: str) -> str:
-    """Ephemeris of the centre: DE441 since 2021, DE431 or DE405 before."""
+    """Ephemeris that defines the centre: DE441 since 2021, DE431 or DE405 before."""
     found = re.search(r"^Center body name\s*:.*\{source: *DE-?0*(\d+)", header, re.MULTILINE)
     return f"de{found[1]}" if found else "de441"
 
@@ -150,13 +150,13 @@ def _units(header: str, file: str) -> tuple[float, float]:
 
 
 def _first(header: str, table: str, file: str) -> tuple[float, dict[str, str]]:
-    """Julian date (TDB) and the named values of the first time of a table."""
+    """Julian date (TDB) and values by name for the first epoch of a table."""
     titles = [line for line in header.splitlines() if re.match(r"\s*JD(TDB|TT|UT)?\s*,", line)]
     scale = re.search(r"^\s*JD(\w*)", titles[-1] if titles else header[-2000:], re.MULTILINE)
     body = table.strip()
     lines = body.splitlines()
     if not lines:
-        raise InvalidInput("table", "empty", f"at least one time in {file}")
+        raise InvalidInput("table", "empty", f"at least one epoch in {file}")
     if (scale and scale[1] == "UT") or re.search(r"\b(UT|UTC)\b", lines[0]):
         raise InvalidInput("time scale", "UT", f"TDB or TT in {file}")
     if titles:
@@ -176,7 +176,7 @@ def _first(header: str, table: str, file: str) -> tuple[float, dict[str, str]]:
 
 
 def _gm(header: str, length: float, day: float, centre: str, file: str) -> float | None:
-    """GM of the elements, m3/s2 (None: that of the Sun), from the header where it is given."""
+    """GM of the elements (m3/s2; None for the Sun), from the header if it is given there."""
     from flybystab.orbit.elements import GM_SUN
 
     text = _line(header, "Keplerian GM")
@@ -199,7 +199,7 @@ def _elements(
     file: str,
     barycentre: str = "de441",
 ) -> Entry:
-    au = length / AU  # times of perihelion are Julian dates in every system of units
+    au = length / AU  # Tp is a Julian date whatever the output units
     use = (
         _KEPLERIAN
         if all(c in cells for c in _KEPLERIAN) and number(cells["EC"], "EC", file) < 1.0
@@ -227,7 +227,7 @@ def _elements(
 def _of_digits(
     jd: float, values: np.ndarray, scale: np.ndarray, texts: list[str], source: str
 ) -> Covariance | None:
-    """Covariance from the printed digits of a state in any unit."""
+    """Covariance from the printed digits of a state; `scale` is the unit of its components (m, m/s)."""
     in_au = values / np.array([AU] * 3 + [AU / DAY] * 3)
     step = scale / np.array([AU] * 3 + [AU / DAY] * 3)
     shown = []
@@ -238,7 +238,7 @@ def _of_digits(
 
 
 def _own_orbit(header: str, row: dict[str, str], file: str) -> Entry:
-    """The orbit of the page of an object: its solution at the epoch of the solution."""
+    """The orbit solution on an object data page, at the epoch of the solution."""
     page = header.partition("osc. elements")[2]
     pairs: dict[str, str] = {}
     for key, value in _PAIR.findall(page):
@@ -277,7 +277,7 @@ def _nongravitational(header: str, file: str) -> dict[str, str]:
     Raises
     ------
     InvalidInput
-        Parameters that are not modelled, or a law without all of its constants.
+        There are parameters that are not modelled, or constants of the law are missing.
     """
     block = re.search(
         r"non-gravitational force model[^\n]*:\s*\n(.*?)(?:\n\s*\n|\n\*{5}|\n(?:ASTEROID|COMET) comments|\Z)",

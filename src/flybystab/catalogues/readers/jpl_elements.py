@@ -1,7 +1,7 @@
 """Element tables of JPL: ``ELEMENTS.NUMBR``, ``ELEMENTS.UNNUM`` and ``ELEMENTS.COMET``.
 
-Columns are marked by lines of dashes, as explained at https://ssd.jpl.nasa.gov/sb/elem_tables.html: epoch in MJD, TDB;
-a or q in au; angles in degrees; Tp as ``yyyymmdd.ddddd``, TDB. The tables leave out non-gravitational parameters.
+Columns are marked by a line of dashes (https://ssd.jpl.nasa.gov/sb/elem_tables.html): epoch in MJD, TDB; a or q in au;
+angles in degrees; Tp as ``yyyymmdd.ddddd``, TDB. The tables do not contain non-gravitational parameters.
 """
 
 from __future__ import annotations
@@ -49,11 +49,11 @@ def read_elements(text: str, file: str) -> list[Entry]:
     Raises
     ------
     InvalidInput
-        Columns that are not known, or a row that does not fit them.
+        The table has unknown columns, or a row has missing or invalid values.
     """
     header, dashes, *lines = text.splitlines()
     spans = [match.span() for match in re.finditer("-+", dashes)]
-    # A value may begin left of its dashes; the last column extends to the end of the line.
+    # A value may start to the left of its dashes; the last column extends to the end of the line.
     starts = [0, *(stop for _, stop in spans[:-1])]
     columns = [" ".join(c.split()) for c in _cut(header, starts)]
     known = {*_KEPLERIAN, *_COMETARY, *_OTHER}
@@ -91,7 +91,7 @@ def _entry(row: dict[str, str], file: str) -> Entry:
 
 
 def _perihelion(text: str, file: str) -> tuple[float, str]:
-    """Julian date of the midnight before, and the printed fraction of the day, of ``yyyymmdd.ddddd``."""
+    """Julian date at the preceding midnight and printed fraction of the day of ``yyyymmdd.ddddd``."""
     whole, _, fraction = text.partition(".")
     try:
         midnight = date(int(whole[:-4]), int(whole[-4:-2]), int(whole[-2:])).toordinal() + 1721424.5

@@ -41,17 +41,17 @@ _MPC = {
 
 
 def from_mpc(row: Mapping[str, str], file: str) -> dict[str, str]:
-    """A row of the Minor Planet Center's orbits (with column names that carry units) as a catalogue row."""
+    """Convert a row of an MPC table (column names with units) to a catalogue row."""
     out = {mine: row[theirs] for theirs, mine in _MPC.items() if row.get(theirs)}
     out["name"] = row.get("name", "").strip() or row["principal_desig"].strip()
     out["aliases"] = ";".join(a.strip() for a in row.get("other_desigs", "").replace("|", ";").split(";"))
     # TT and TDB differ by less than 2 ms.
     out["epoch_jd_tdb"] = row["epoch_jd_tt"]
     out["observed_jd"] = _middle(row.get("arc", ""), row.get("last_obs", ""))
-    if out["observed_jd"]:  # of one opposition the MPC gives the length in days, otherwise the years
+    if out["observed_jd"]:  # the MPC gives arcs of one opposition in days, longer ones in years
         out["single_opposition"] = "Y" if row["arc"].endswith("d") else "N"
     out |= arc_columns(row.get("first_obs"), row.get("last_obs"))
-    try:  # the mean motion determines the semi-major axis to more digits than its own column
+    try:  # the mean motion is printed with more significant digits than the semi-major axis
         axis = (_GAUSS / float(row["n_deg_d"])) ** (2.0 / 3.0)
         if abs(axis - float(row["a_au"])) < 1e-7:
             out["a_au"] = repr(axis)
@@ -83,7 +83,7 @@ _COLUMNS = {"principal_desig", "epoch_jd_tt", "a_au", "e", "i_deg", "node_deg", 
     Contents("a, e, i, node, peri, M", "printed digits and U", "none", "H"),
 )
 def read_mpc(text: str, file: str) -> list[Entry]:
-    """Rows of an MPC table whose column names carry units."""
+    """Rows of an MPC table with units in the column names."""
     check_parameters("table", [c for c in header_of(text) if looks_like_parameter(c)], file)
     return [(from_mpc(row, file), None) for row in rows_of(text, file)]
 
@@ -93,7 +93,7 @@ _MPCORB = re.compile(r"^[0-9A-Za-z~_][0-9A-Za-z ]{6} .{5} .{5} [IJK]\d\d[1-9A-C]
 
 
 def _body(text: str) -> list[str]:
-    """Lines with orbits: those after a line of dashes, if there is one."""
+    """Lines with orbits, after the line of dashes if there is one."""
     lines = text.splitlines()
     dashes = next((k for k, line in enumerate(lines[:100]) if line.startswith("-----")), -1)
     return [line for line in lines[dashes + 1 :] if line.strip()]
@@ -116,12 +116,12 @@ def _is_mpcorb(text: str) -> bool:
     ),
 )
 def read_mpcorb(text: str, file: str) -> list[Entry]:
-    """Rows of MPCORB.DAT, NEA.txt, DAILY.DAT and the like.
+    """Rows of MPCORB.DAT, NEA.txt, DAILY.DAT and similar files.
 
     Raises
     ------
     InvalidInput
-        A line has other columns.
+        A line does not have the columns of MPCORB.
     """
     out: list[Entry] = []
     for line in _body(text):

@@ -1,9 +1,9 @@
 """JSON of the Minor Planet Center: ``mpcorb_extended.json`` and related files, and answers of its web service.
 
-Fields of the extended files: https://minorplanetcenter.net/Extended_Files/Extended_MPCORB_Data_Format_Manual.pdf (
-``Epoch`` is a Julian date, TT); of the web service, which astroquery's ``MPC.query_object`` queries:
-https://minorplanetcenter.net/web_service/. Answers with non-gravitational parameters raise InvalidInput, since the web
-service does not give their law.
+Fields of the extended files (``Epoch`` is a Julian date, TT):
+https://minorplanetcenter.net/Extended_Files/Extended_MPCORB_Data_Format_Manual.pdf; of the web service, also used by
+``MPC.query_object`` of astroquery: https://minorplanetcenter.net/web_service/. Answers with non-gravitational
+parameters raise InvalidInput, since the web service does not state their law.
 """
 
 from __future__ import annotations

@@ -1,10 +1,10 @@
-"""Orbit documents of the Minor Planet Center (MPC_ORB JSON of the get-orb API), with their covariances.
+"""Orbit documents of the Minor Planet Center (MPC_ORB JSON of the get-orb API), with covariances.
 
 Fields: https://github.com/Smithsonian/mpc-public/tree/main/mpc_orb (schema 0.1 to 0.7). ``CAR`` is a heliocentric
-state with axes of the ecliptic, ``COM`` q, e, i, node, argperi, peri_time (MJD); epoch in MJD, TT; ``covKL`` is row
-K, column L of the covariance in the same units. ``non_grav_units``: yarkovsky in 1e-10 au/d2, srp in m2/ton (the units
-of OrbFit, which makes the orbits), A1, A2, A3 in au/d2, DT in days; ``non_grav_model`` names their law: ``marsden``, or
-``yc`` (Yeomans & Chodas 1989) with DT.
+state with ecliptic axes, ``COM`` contains q, e, i, node, argperi, peri_time (MJD); the epoch is in MJD, TT; ``covKL``
+is row K, column L of the covariance in the same units. ``non_grav_units``: yarkovsky in 1e-10 au/d2, srp in m2/ton
+(units of OrbFit, with which the orbits are computed), A1, A2, A3 in au/d2, DT in days; ``non_grav_model`` is their law:
+``marsden``, or ``yc`` (Yeomans & Chodas 1989) with DT.
 """
 
 from __future__ import annotations
@@ -44,7 +44,7 @@ _PARAMETERS = {
     "A3": ("A3", 1.0),
     "DT": ("DT", 1.0),
 }
-#: Models whose A1, A2, A3 follow the water law of comets.
+#: Models in which A1, A2, A3 follow the water-ice law of comets.
 _COMET_MODELS = ("marsden", "yc")
 
 
@@ -58,7 +58,7 @@ def _is_mpc_orbit(text: str) -> bool:
     Contents("cometary, cartesian", "full matrix", "A2, AMRAT; A1, A2, A3, DT of comets", "H"),
 )
 def read_mpc_orbit(text: str, file: str) -> list[Entry]:
-    """Orbits of a document, or of an answer of the API that holds documents (``mpc_orb``, ``orb``).
+    """Orbits of a document, or of an API answer that contains documents (``mpc_orb``, ``orb``).
 
     Raises
     ------
@@ -91,7 +91,7 @@ def _entry(document: Document, file: str) -> Entry:
     if planes - {"Ecliptic", "ecliptic"}:
         raise InvalidInput("reference plane", ", ".join(sorted(planes)), f"Ecliptic in {file}")
     jd = day + (MJD if form == "MJD" else 0.0)
-    # Over long arcs the cometary elements are closer to a normal distribution; both describe the same orbit.
+    # Both sets describe the same orbit; errors of cometary elements stay closer to a normal distribution.
     kind = "COM" if document.get("COM") else "CAR"
     law = _law(document, file)
     names, values, matrix = _solution(document[kind], _COM if kind == "COM" else _CAR, law, file)
@@ -125,12 +125,12 @@ def _identity(document: Document) -> dict[str, str]:
 
 
 def _law(document: Document, file: str) -> str:
-    """Law of A1, A2, A3 by the model of the solution; empty without such a model.
+    """Law of A1, A2, A3 in the model of the solution; empty if it has no such model.
 
     Raises
     ------
     InvalidInput
-        A model that is not known, or one of which the document has no parameter.
+        The model is unknown, or the document does not contain its parameters.
     """
     booleans = document.get("non_grav_booleans") or {}
     used = [k for k, v in (booleans.get("non_grav_model") or {}).items() if v is True]
@@ -154,7 +154,7 @@ def _solution(
     Raises
     ------
     InvalidInput
-        Parameters beside the elements that are not modelled.
+        Parameters other than the elements are not modelled.
     """
     try:
         theirs = [str(n) for n in part["coefficient_names"]]

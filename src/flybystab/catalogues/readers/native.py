@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def read_native(text: str, file: str) -> list[Entry]:
-    """Rows of a catalogue: the format assumed if no registered reader recognises the text.
+    """Rows of a catalogue; this format is assumed if a text has none of the registered formats.
 
     Raises
     ------
@@ -44,7 +44,7 @@ def read_native(text: str, file: str) -> list[Entry]:
 
 
 def _message(text: str, file: str) -> str:
-    """Message of an answer of JPL without an orbit, as for an unknown or an ambiguous name; empty for other texts."""
+    """Message in a JPL answer without an orbit, such as for an unknown or ambiguous name; empty for other texts."""
     if not text.lstrip().startswith("{") or '"message"' not in text:
         return ""
     answer = parse_json(text, "catalogue file", file)
@@ -52,7 +52,7 @@ def _message(text: str, file: str) -> str:
 
 
 def _with_law(row: dict[str, str]) -> dict[str, str]:
-    """A row whose A1, A2, A3 follow the law of comets, if it is one by name or class and does not state a law."""
+    """The row, with the law of comets for A1, A2, A3 if it states no law and its name or class is that of a comet."""
     if row.get("nongrav_law") or not any(row.get(f"{n}_au_d2") for n in ("A1", "A2", "A3")):
         return row
     names = (row.get("designation", ""), row.get("name", ""))

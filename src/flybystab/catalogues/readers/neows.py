@@ -1,7 +1,7 @@
 """NASA's web service for near-Earth objects (NeoWs): one object, or a list of them (JSON).
 
 Fields: https://api.nasa.gov (Asteroids - NeoWs); ``orbital_data`` are elements of the JPL Small-Body Database with
-all their digits, without errors. Estimated diameters are not read, since they follow from H and an assumed albedo.
+all digits, without errors. Estimated diameters are not read, since they are derived from H with an assumed albedo.
 """
 
 from __future__ import annotations
@@ -54,13 +54,13 @@ def read_neows(text: str, file: str) -> list[Entry]:
     Raises
     ------
     InvalidInput
-        An object without elements, or with parameters that are not modelled.
+        An object has no elements, or has parameters that are not modelled.
     """
     return [_entry(thing, file) for thing in _objects(parse_json(text, "orbit file", file))]
 
 
 def _objects(value: object) -> list[Document]:
-    """Everything with ``orbital_data``: an answer is one object, a list, or a mapping of lists by date."""
+    """All objects with ``orbital_data`` in an answer: one object, a list, or a mapping of lists by date."""
     if isinstance(value, dict):
         if "orbital_data" in value:
             return [value]

@@ -1,9 +1,9 @@
-"""Non-gravitational parameters of orbit files as columns of a catalogue.
+"""Conversion of non-gravitational parameters in orbit files to catalogue columns.
 
-A1, A2, A3 (au/d2) and DT (d) of Marsden et al. (1973) and Yeomans & Chodas (1989), with the constants of their law of
-distance, and AMRAT, the illuminated area over mass (m2/kg) of radiation pressure on an absorbing body. OrbFit states
-A/M in m2/ton for a solar constant of 1370 W/m2 (its module ``non_grav``, subroutine ``radpast``); Find_Orb in m2/kg
-for 1361 W/m2 (``constant.h``), the value of :mod:`flybystab.orbit.forces`.
+Parameters are A1, A2, A3 (au/d2) of Marsden et al. (1973) and DT (d) of Yeomans & Chodas (1989), with the constants of
+the law g(r), and AMRAT, the area-to-mass ratio (m2/kg) for radiation pressure on an absorbing body. OrbFit gives A/M in
+m2/ton for a solar constant of 1370 W/m2 (module ``non_grav``, subroutine ``radpast``), Find_Orb in m2/kg for 1361 W/m2
+(``constant.h``), the value in :mod:`flybystab.orbit.forces`.
 """
 
 from __future__ import annotations
@@ -22,13 +22,13 @@ COLUMN_OF_PARAMETER: Mapping[str, str] = {
     "AMRAT": "AMRAT_m2_kg",
 }
 ACCELERATIONS = ("A1", "A2", "A3")
-#: Constants of the laws of distance, as JPL lists them: R0 in au. NN has no effect where NK is zero.
+#: Constants of the laws g(r) as listed by JPL, R0 in au. NN has no effect if NK is zero.
 LAWS: Mapping[str, Mapping[str, float]] = {
     "asteroid": {"ALN": 1.0, "NK": 0.0, "NM": 2.0, "R0": 1.0},
     "comet": {"ALN": 0.1112620426, "NK": 4.6142, "NM": 2.15, "NN": 5.093, "R0": 2.808},
 }
 _CONSTANTS = ("ALN", "R0", "NM", "NN", "NK")
-#: m2/kg of 1 m2/ton of OrbFit and the MPC, which fits orbits with it, with the solar constant of this package.
+#: Factor from m2/ton of OrbFit, with which the MPC fits orbits, to m2/kg for the solar constant of this package.
 ORBFIT_AREA = 1e-3 * 1370.0 / 1361.0
 
 
@@ -40,16 +40,16 @@ def nongravitational_columns(
     Parameters
     ----------
     values : mapping
-        Parameters by the names of JPL, in au/d2, d, m2/kg and, of the law, au; others are ignored.
+        Parameters and constants by JPL's names, in au/d2, d, m2/kg and au (R0); other entries are ignored.
     comet : bool
-        Whether A1, A2, A3 without constants follow the law of comets.
+        Whether A1, A2, A3 follow the law of comets if the constants are not given.
     law : str, optional
-        Law of a publisher that does not list its constants.
+        Name of the law, for publishers that do not list its constants.
 
     Raises
     ------
     InvalidInput
-        A value is not a finite number, the law is not known, or DT is given without A1, A2, A3.
+        A value is not a finite number, or the law is unknown.
     """
     given = {n: number(v, n, file) for n, v in values.items() if n in COLUMN_OF_PARAMETER}
     given = {n: v for n, v in given.items() if v != 0.0}
@@ -60,12 +60,12 @@ def nongravitational_columns(
 
 
 def law_of(values: Mapping[str, object], comet: bool, file: str) -> str:
-    """Name of the law of distance of A1, A2, A3, or its five constants ALN, R0, NM, NN, NK.
+    """Name of the law g(r) of A1, A2, A3, or its five constants ALN, R0, NM, NN, NK.
 
     Raises
     ------
     InvalidInput
-        An asteroid without constants, or constants that agree with neither named law.
+        The constants are missing for an asteroid, or incomplete and not those of a named law.
     """
     given = {n: number(values[n], n, file) for n in _CONSTANTS if values.get(n) is not None}
     if not given and comet:
@@ -78,5 +78,5 @@ def law_of(values: Mapping[str, object], comet: bool, file: str) -> str:
     raise InvalidInput(
         "A1, A2, A3",
         f"with the law {given or 'not given'} in {file}",
-        "all of the constants ALN, R0, NM, NN, NK, or those of the law 1/r2 or of the water law of comets",
+        "all of the constants ALN, R0, NM, NN, NK, or those of the law 1/r2 or of the water-ice law of comets",
     )

@@ -1,10 +1,10 @@
 """Orbit files of OrbFit, format OEF2.0: ESA NEOCC, NEODyS and AstDyS (``.ke0 .ke1 .eq0 .eq1``, ``neodys.cat``).
 
 Elements: ``KEP`` a (au), e, i, node, peri, M (deg); ``EQU`` a (au), h, k, p, q, mean longitude (deg); ``COM`` q (au),
-e, i, node, peri (deg), time of perihelion (MJD); ``CAR`` state of the ecliptic (au, au/d). ``COV`` is the upper
-triangle, row by row, in the same units, then m2/ton for the area-to-mass ratio and 1e-10 au/d2 for A2 (OrbFit 5.0,
-module ``orbit_elements``, and the description of the files at https://neo.ssa.esa.int/computer-access; checked
-against the ``RMS`` lines).
+e, i, node, peri (deg), time of perihelion (MJD); ``CAR`` state with ecliptic axes (au, au/d). ``COV`` is the upper
+triangle of the covariance, row by row, in the same units, m2/ton for the area-to-mass ratio and 1e-10 au/d2 for A2
+(OrbFit 5.0, module ``orbit_elements``, and the description of the files at https://neo.ssa.esa.int/computer-access;
+checked against the ``RMS`` lines).
 """
 
 from __future__ import annotations
@@ -41,7 +41,7 @@ _SETS: Mapping[str, tuple[str, ...]] = {
     "COM": COMETARY,
     "CAR": CARTESIAN,
 }
-#: Parameters of the force models in the order of the LSP and NGR lines; only model 1 is that of asteroids.
+#: Parameters by model number, in the order of the LSP and NGR lines; other models are those of comets.
 _PARAMETERS: Mapping[str, tuple[str, ...]] = {"0": (), "1": ("AMRAT", "A2")}
 #: Units of these: m2/ton with the solar constant of OrbFit, 1e-10 au/d2.
 _UNIT: Mapping[str, float] = {"AMRAT": ORBFIT_AREA, "A2": 1e-10}
@@ -63,7 +63,7 @@ def _is_oef(text: str) -> bool:
     ),
 )
 def read_oef(text: str, file: str) -> list[Entry]:
-    """Orbits of a file, one or many.
+    """The orbits in a file.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def from_neocc(text: str, file: str) -> Entry:
 
 
 def _blocks(body: str) -> Iterator[tuple[str, list[str]]]:
-    """Name and lines of each orbit; comments are left out, but for the line of the RMS."""
+    """Name and lines of each orbit; comments are omitted except the RMS line."""
     name, lines = "", list[str]()
     for raw in body.splitlines():
         line = raw.strip()
@@ -112,7 +112,7 @@ def _blocks(body: str) -> Iterator[tuple[str, list[str]]]:
 
 
 def _identity(text: str) -> dict[str, str]:
-    """Name columns of an OrbFit name, which has no spaces: 2018VP1, 433, 2040P-L."""
+    """Name columns for a name in the form of OrbFit, without spaces: 2018VP1, 433, 2040P-L."""
     return name_columns(text.strip("' "))
 
 
@@ -155,7 +155,7 @@ def _parameters(words: Mapping[str, Sequence[str]], name: str, file: str) -> dic
     Raises
     ------
     InvalidInput
-        A model or a parameter that is not modelled, as the outgassing of comets.
+        A model or a parameter is not supported, such as the outgassing of comets.
     """
     values = [number(v, "NGR", file) for v in words.get("NGR", [])]
     model = (words.get("LSP") or ["1" if values else "0"])[0]
@@ -174,7 +174,7 @@ def _parameters(words: Mapping[str, Sequence[str]], name: str, file: str) -> dic
 
 
 def _solved(words: Mapping[str, Sequence[str]], file: str) -> list[str]:
-    """Names of the parameters that were estimated with the elements (the end of the LSP line)."""
+    """Names of the parameters estimated together with the elements (end of the LSP line)."""
     lsp = words.get("LSP", [])
     labels = _PARAMETERS.get(lsp[0], ()) if lsp else ()
     out = []
@@ -215,7 +215,7 @@ def _covariance(
 
 
 def _row(line: str, file: str) -> Entry:
-    """A line of a catalogue of one-line records: name, MJD, six elements, H, G and a flag."""
+    """The orbit in a one-line record: name, MJD, six elements, H, G and a flag."""
     cells = line.split()
     if len(cells) < 8:
         raise InvalidInput("row", line[:60], f"a name, an epoch and six elements in {file}")

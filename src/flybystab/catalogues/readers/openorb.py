@@ -1,10 +1,9 @@
 """Orbit files of OpenOrb (``.orb``): four header lines and fixed columns.
 
 Columns: ``readOpenOrbOrbitFile`` of https://github.com/oorb/oorb (main/io.f90). The numbers in the last header line
-name them: 2 to 7 Keplerian elements (au, deg), 75 and 76 perihelion distance and time, 39 to 44 a state of the
-ecliptic (au, au/d), 8 the epoch as year, month and day, 74 as MJD (TT); 9 to 14 standard deviations, 15 to 29
-correlations, 78 to 92 covariances. Errors of cometary elements are not used, since their units are not
-documented.
+identify them: 2 to 7 Keplerian elements (au, deg), 75 and 76 perihelion distance and time, 39 to 44 a state with
+ecliptic axes (au, au/d), 8 the epoch as year, month and day, 74 as MJD (TT); 9 to 14 standard deviations, 15 to 29
+correlations, 78 to 92 covariances. Errors of cometary elements are not used, since their units are not documented.
 """
 
 from __future__ import annotations
@@ -106,7 +105,7 @@ def _entry(line: str, tags: Sequence[int], names: Sequence[str], file: str) -> E
 
 
 def _matrix(cells: Sequence[str], tags: Sequence[int], file: str) -> Array | None:
-    """Covariance from standard deviations and correlations or covariances; None without them."""
+    """Covariance from standard deviations with correlations or covariances; None if these are missing."""
     if 9 not in tags or not {15, 78} & set(tags):
         return None
     upper = np.triu_indices(6, 1)

@@ -62,7 +62,7 @@ _SBDB = {
 _NAMES = {"a": "a", "e": "e", "i": "i", "om": "node", "w": "peri", "ma": "M", "q": "q", "tp": "tp"}
 #: Columns in capitals that are not parameters of the force model.
 _OTHER = frozenset({"H", "G", "M1", "M2", "K1", "K2", "PC", "GM", "BV", "UB", "IR", "UV"})
-#: Texts of missing values, in lower case, as pandas and other programs write them.
+#: Texts that denote missing values, in lower case, as written by pandas and other programs.
 _NOTHING = frozenset({"null", "none", "nan", "n/a", "--"})
 #: Columns that identify a table of JPL.
 _JPL = frozenset(
@@ -74,17 +74,17 @@ _COMETS = frozenset({"COM", "CTc", "ETc", "HTC", "HYP", "JFC", "JFc", "PAR"})
 
 
 def comet_orbit(orbit_class: str, key: str) -> bool:
-    """Whether an object is a comet, by its class or its designation: its A1, A2, A3 follow the law of comets."""
+    """Whether an object is a comet by its class or designation, so that A1, A2, A3 follow the law of comets."""
     return orbit_class in _COMETS or is_comet(key)
 
 
 def from_sbdb(row: Mapping[str, str], file: str) -> dict[str, str]:
-    """A row of a query (column names of the API) as a catalogue row.
+    """Convert a row of a query (column names of the API) to a catalogue row.
 
     Raises
     ------
     InvalidInput
-        Parameters of the force model that are not modelled, or elements that are no numbers.
+        The row has parameters that are not modelled, or an element is not a number.
     """
     row = completed(row, file)
     check_frame(row.get("equinox"), file)
@@ -100,7 +100,7 @@ def from_sbdb(row: Mapping[str, str], file: str) -> dict[str, str]:
         "I",
     )
     out |= _elements(row, file)
-    law = "comet" if comet else "asteroid"  # a query does not list the constants
+    law = "comet" if comet else "asteroid"  # a query does not list the constants of the law
     out |= nongravitational_columns({c: row[c] for c in _PARAMETERS if row.get(c)}, comet, file, law=law)
     out |= _names(row, full, key)
     out |= arc_columns(row.get("first_obs"), row.get("last_obs"))
@@ -118,7 +118,7 @@ def from_sbdb(row: Mapping[str, str], file: str) -> dict[str, str]:
 
 def _names(row: Mapping[str, str], full: str, key: str) -> dict[str, str]:
     if comet_orbit(row.get("class", ""), key) and (full or is_comet(key)):
-        return name_columns(full or key)  # many comets are called SOHO or LINEAR
+        return name_columns(full or key)  # the name alone is ambiguous: many comets are called SOHO or LINEAR
     designation = full.partition("(")[2].rstrip(") ") if "(" in full else ""
     known = names_of(key)
     out = {"number": key if key.isdigit() else ""}
@@ -128,13 +128,13 @@ def _names(row: Mapping[str, str], full: str, key: str) -> dict[str, str]:
 
 
 def _check(row: Mapping[str, str], file: str) -> None:
-    """Raise InvalidInput for parameters of the force model: columns in capitals that have no other known meaning."""
+    """Raise InvalidInput for parameters that are not modelled: capitalised columns without another known meaning."""
     given = {c.removesuffix("_sigma").removesuffix("_kind") for c in row if row[c] and c not in _OTHER}
     check_parameters("JPL", sorted(c for c in given if looks_like_parameter(c) and c not in _OTHER), file)
 
 
 def _key_of(full: str, spkid: str) -> str:
-    """Number or designation from the full name, else from the identifier of a numbered asteroid (20000000 + n)."""
+    """Number or designation from the full name, or from the identifier of a numbered asteroid (20000000 + n)."""
     if full:
         bare = full.strip("() ")
         first = bare.split()[0].strip("()") if bare else ""
@@ -153,7 +153,7 @@ def _significant(text: str) -> int:
 
 
 def _calendar(text: str, name: str, file: str) -> str:
-    """Julian date of a date as ``20220809.0`` or ``2022-Aug-09.0``, with its digits."""
+    """Julian date of ``20220809.0`` or ``2022-Aug-09.0``, with the same number of decimals."""
     plain = text.strip()
     for month, word in enumerate(_MONTHS, start=1):
         plain = plain.replace(f"-{word}-", f"-{month:02d}-")
@@ -167,7 +167,7 @@ def _calendar(text: str, name: str, file: str) -> str:
 
 
 def completed(row: Mapping[str, str], file: str) -> dict[str, str]:
-    """A row with epoch, e, and a or q, from whichever columns of JPL define them; with the digits of their source.
+    """A row with epoch, e, and a or q, derived from other JPL columns if necessary, with as many digits as these.
 
     Raises
     ------
@@ -239,9 +239,9 @@ def _elements(row: Mapping[str, str], file: str) -> dict[str, str]:
 
 
 def _covariance(row: Mapping[str, str], file: str) -> Covariance | None:
-    """Covariance from values that a catalogue row does not hold: 1-sigmas of q, tp, A1, A2, A3, DT, and digits.
+    """Covariance from values without columns in a catalogue: 1-sigmas of q, tp, A1, A2, A3, DT, and printed digits.
 
-    The rounding of the printed digits (four by default in the query tool) is added to the 1-sigmas.
+    Rounding errors of the printed digits (four by default in the query tool) are added in quadrature to the 1-sigmas.
     """
     pushes = [c for c in _PARAMETERS if row.get(c) and row.get(f"{c}_sigma")]
     keplerian = _keplerian(row)
@@ -256,7 +256,7 @@ def _covariance(row: Mapping[str, str], file: str) -> Covariance | None:
     known = all(given) and sigmas_of(given, columns, file) is not None
     source = f"JPL SBDB ({file})"
     digits = printed_covariance(jd, names, texts, jd, source)
-    if not known and not pushes:  # U and digits of ellipses: flybystab.catalogues.orbit_errors
+    if not known and not pushes:  # ellipses: estimated in flybystab.catalogues.orbit_errors from U and digits
         return None if keplerian and not hyperbolic else digits
     if keplerian and not pushes and digits is None:
         return None
@@ -271,7 +271,7 @@ def _covariance(row: Mapping[str, str], file: str) -> Covariance | None:
     what = "1-sigmas" if digits is None else "printed digits and 1-sigmas"
     label = f"{what} without correlations, {source}"
     found = covariance_of(jd, [*names, *pushes], values, np.diag(sigma**2), label, file, correlated=False)
-    if not known:  # 1-sigmas of A1, A2, A3 say nothing of the elements
+    if not known:  # 1-sigmas of A1, A2, A3 alone do not constrain the elements
         return replace(found, caveat=DIGITS)
     return found if digits is None else replace(found, caveat="by the digits and 1-sigmas of its elements")
 
@@ -283,12 +283,12 @@ def check_frame(equinox: object, file: str) -> None:
 
 
 def thousandfold(text: str, name: str, file: str) -> str:
-    """A printed number of kilometres in metres."""
+    """A printed number multiplied by 1000: km in m, g/cm3 in kg/m3."""
     return f"{1000.0 * number(text, name, file):.10g}"
 
 
 def _missing(columns: set[str]) -> list[str]:
-    """Columns that are missing in a query to define an orbit and to name its object."""
+    """Missing columns without which the rows of a query do not define an orbit and the name of its object."""
     pair = len({"a", "q", "ad"} & columns) >= 2
     out = [c for c in ("e", "i", "om", "w") if c not in columns and not (c == "e" and pair)]
     for either in (
@@ -334,7 +334,7 @@ def read_query(text: str, file: str) -> list[Entry]:
     Raises
     ------
     InvalidInput
-        Columns that define an orbit are missing, or a row is not understood.
+        Columns that define an orbit are missing, or a value cannot be read.
     """
     return _entries(rows_of(text, file), set(header_of(text)), file)
 

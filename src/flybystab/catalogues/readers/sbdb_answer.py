@@ -1,7 +1,7 @@
-"""JPL Small-Body Database: the answer for one object (JSON), with covariance and physical parameters.
+"""Answers of the JPL Small-Body Database for one object (JSON), with covariance and physical parameters.
 
-Fields: https://ssd-api.jpl.nasa.gov/doc/sbdb.html (``full-prec=1``, ``cov=mat``, ``phys-par=1``). Covariances are of
-e, q, tp, node, peri, i and estimated parameters, in au, days and degrees, at an epoch of their own.
+Fields: https://ssd-api.jpl.nasa.gov/doc/sbdb.html (``full-prec=1``, ``cov=mat``, ``phys-par=1``). Covariances are those
+of e, q, tp, node, peri, i and estimated parameters, in au, days and degrees, at an epoch of their own.
 """
 
 from __future__ import annotations
@@ -48,14 +48,14 @@ _UNITS = {
 
 
 def from_sbdb_answer(text: str, file: str) -> tuple[dict[str, str], Covariance | None]:
-    """The orbit of an answer.
+    """The orbit in an answer.
 
     Returns
     -------
     dict
-        A catalogue row: elements of the answer at their epoch.
+        Catalogue row with the elements at their epoch.
     Covariance or None
-        At its own epoch, about the elements given for that epoch.
+        Covariance at its own epoch, about the elements given for that epoch.
 
     Raises
     ------
@@ -91,7 +91,7 @@ def from_sbdb_answer(text: str, file: str) -> tuple[dict[str, str], Covariance |
 
 
 def _with_digits(row: Mapping[str, str], covariance: Covariance | None) -> Covariance | None:
-    """The covariance of the printed digits if it exceeds the given one, as in an answer without ``full-prec=1``."""
+    """The covariance from printed digits if it exceeds the given one, as in answers without ``full-prec=1``."""
     if not all(row.get(c) for c in _COLUMNS.values()):
         return covariance
     texts = [row[c] for c in _COLUMNS.values()]
@@ -115,7 +115,7 @@ def _names(full: str, key: str) -> dict[str, str]:
 
 
 def _elements(orbit: Document, elements: Document, file: str) -> dict[str, str]:
-    """Columns of the elements: a and M, or q and tp where these are lacking (parabolas)."""
+    """Columns of the elements: a and M, or q and tp if these are missing (parabolas)."""
     epoch = str(orbit["epoch"])
     if all((elements.get(c) or {}).get("value") not in (None, "") for c in ("a", "ma")):
         for c in _COLUMNS:
@@ -133,7 +133,7 @@ def _elements(orbit: Document, elements: Document, file: str) -> dict[str, str]:
 
 
 def physical(items: Sequence[Document], file: str) -> dict[str, str]:
-    """Physical columns of a list of physical parameters, each with its source.
+    """Catalogue columns for a list of physical parameters, each with its source.
 
     Raises
     ------
@@ -200,7 +200,7 @@ def _covariance(orbit: Document, pushes: Document, source: str, file: str) -> Co
             raise KeyError("elements at the epoch of the covariance")
         mean = {_LABELS.get(e["name"], e["name"]): str(e["value"]) for e in found.get("elements", own)}
         mean |= {name: str(p["value"]) for name, p in pushes.items()}
-        # Digits of the time of perihelion are lost neither as a Julian date nor as a difference.
+        # Subtracting whole days first preserves all printed digits of the time of perihelion.
         whole, fraction = julian(mean["tp"])
         values = [(whole - epoch) + fraction if n == "tp" else float(mean[n]) for n in names]
         if not all(isinstance(line, list | tuple | np.ndarray) for line in found["data"]):
@@ -211,12 +211,12 @@ def _covariance(orbit: Document, pushes: Document, source: str, file: str) -> Co
         if isinstance(error, InvalidInput):
             raise
         raise InvalidInput(
-            "covariance", file, f"labels out of e, q, tp, node, peri, i, A1, A2, A3, DT, AMRAT ({error})"
+            "covariance", file, f"labels among e, q, tp, node, peri, i, A1, A2, A3, DT, AMRAT ({error})"
         ) from None
 
 
 def _uncorrelated(orbit: Document, pushes: Document, source: str, file: str) -> Covariance | None:
-    """Covariance from 1-sigmas of elements and accelerations; None if none is given or all have columns in the row."""
+    """Covariance from 1-sigmas of elements and parameters; None if not given, or if all have catalogue columns."""
     elements = {item["name"]: item for item in orbit["elements"]}
     with_errors = [n for n, p in pushes.items() if p.get("sigma")]
     use = tuple(_COLUMNS)
@@ -254,5 +254,5 @@ def _is_answer(text: str) -> bool:
     ),
 )
 def read_answer(text: str, file: str) -> list[Entry]:
-    """The orbit of an answer for one object."""
+    """The orbit in an answer for one object."""
     return [from_sbdb_answer(text, file)]

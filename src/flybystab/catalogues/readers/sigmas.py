@@ -1,4 +1,4 @@
-"""1-sigmas of orbit files: checked, and told apart from errors that are not given."""
+"""1-sigma errors in orbit files: conversion to numbers and detection of unknown errors."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from flybystab.typing import Array
 
 
 def sigmas_of(texts: Sequence[object], names: Sequence[str], file: str) -> Array | None:
-    """1-sigmas as numbers, shape (n,); None where all of them are zero, which is how some programs write "unknown".
+    """1-sigma errors as numbers, shape (n,); None if all are zero, by which some programs denote unknown errors.
 
     Raises
     ------
