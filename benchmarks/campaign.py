@@ -152,7 +152,7 @@ def said(body: fs.Body, encounter: fs.Encounter) -> str:
 
 
 def energy_gain(found: FlybyRun, body: fs.Body) -> float:
-    """Largest share of the kinetic energy gained at an instant, where it can only fall."""
+    """Largest fraction of the kinetic energy gained at an instant, where it can only fall."""
     h = found.history
     assert h is not None
     gradient = h["velocity_gradient"]
@@ -369,11 +369,11 @@ def pile(rng: np.random.Generator, surface: str, dilatancy: float) -> Scene:
     return body, encounter, Rotation.random(random_state=int(rng.integers(1 << 31))).as_matrix()
 
 
-QUANTITIES = ("semi-axes", "spin", "bound share", "event times")
+QUANTITIES = ("semi-axes", "spin", "bound mass", "event times")
 
 
 def coverage(n: int, seed: int, tolerance: float = 1e-8, tight: float = 1e-11) -> dict[str, float]:
-    """Share of bodies with flow whose true error, against a run at `tight`, is below the measured one."""
+    """Fraction of bodies with flow whose true error, against a run at `tight`, is below the measured one."""
     rng = np.random.default_rng(seed)
     floor = 1e-12
     total: Counter[str] = Counter()
@@ -400,7 +400,7 @@ def coverage(n: int, seed: int, tolerance: float = 1e-8, tight: float = 1e-11) -
                 total["events differ"] += not same
                 covered["semi-axes"] += axes <= max(r.error.semi_axes, floor)
                 covered["spin"] += spin <= max(r.error.spin, floor)
-                covered["bound share"] += abs(r.bound_fraction - truth.bound_fraction) <= max(
+                covered["bound mass"] += abs(r.bound_fraction - truth.bound_fraction) <= max(
                     r.error.bound_fraction, floor
                 )
                 covered["event times"] += (late if same else np.inf) <= max(told, 1e-6)

@@ -1,14 +1,14 @@
-"""A search of the whole MPC catalogue against the lists of CNEOS: recall and precision at 0.05 au, by decade.
+"""Search of the whole MPC catalogue compared with lists of CNEOS: recall and precision at 0.05 au, by decade.
 
 Usage: ``python benchmarks/completeness.py [FOUND.ecsv]``. The search (40,874 orbits, 1950 to 2050, 4.1 million
-object-years) takes some five minutes on two free cores; its table is read from FOUND if that exists, else written
-there. ``python benchmarks/completeness.py stages`` shows on 1,000 orbits what a cheaper first pass would save and lose.
-The lists are read from ``../shared/data`` (or ``$FLYBYSTAB_SHARED/data``); nothing is downloaded.
+object-years) takes some five minutes on two idle cores; its table is read from FOUND if that exists, otherwise written
+there. ``python benchmarks/completeness.py stages`` measures on 1,000 orbits the gain and the losses of a cheaper first
+pass. The lists are read from ``../shared/data`` (or ``$FLYBYSTAB_SHARED/data``); nothing is downloaded.
 
-The list of 2021 has passages below 0.05 au of 1950 to 2040. Recall: of its rows, the share found within a day and
-three of its sigmas; those whose time CNEOS knows to a minute (3 sigma) count on their own. Precision: of the passages
-found of asteroids that JPL knew well by then (condition code 0 in September 2020), the share that the list has: it
-leaves out what it does not know to ten days.
+The list of 2021 contains encounters below 0.05 au from 1950 to 2040. Recall is the fraction of its rows that are found
+within a day and three of its sigmas; it is also given for the rows whose time is known to a minute (3 sigma). Precision
+is the fraction of the encounters found that are in the list, for asteroids whose orbits were well known at that time
+(condition code 0 in September 2020); the list omits encounters whose time is not known to ten days.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ LIMIT = 0.05
 
 
 def search(asteroids: tuple[Asteroid, ...], path: Path | None) -> QTable:
-    """Every passage of the catalogue by the Earth, from a former run if there is one."""
+    """All encounters of the catalogue with the Earth, from an earlier run if there is one."""
     if path is not None and path.exists():
         table = QTable.read(path)
         print(table.meta["search"])
@@ -45,7 +45,7 @@ def search(asteroids: tuple[Asteroid, ...], path: Path | None) -> QTable:
     wall, used = time.perf_counter() - begin, time.process_time() - used
     years = 100.0 * len(asteroids)
     table.meta["search"] = (
-        f"{len(table)} passages of {len(asteroids)} asteroids below {LIMIT} au: {wall:.0f} s on {os.cpu_count()} "
+        f"{len(table)} encounters of {len(asteroids)} asteroids below {LIMIT} au: {wall:.0f} s on {os.cpu_count()} "
         f"cores with a load of {load:.1f} to {os.getloadavg()[0]:.1f}, {used:.0f} s of processor time, "
         f"{years / used:.0f} object-years a second and core"
     )
@@ -81,7 +81,7 @@ def certain(asteroids: tuple[Asteroid, ...], folder: Path = DATA) -> np.ndarray:
 
 
 def matches(listed: dict[str, np.ndarray], index: np.ndarray, jd: np.ndarray) -> np.ndarray:
-    """Of each row of the list, the passage found nearest in time (-1: none in a day and three sigmas)."""
+    """Encounter found nearest in time to each row of the list (-1: none within a day and three sigmas)."""
     order = np.argsort(index, kind="stable")
     first = np.searchsorted(index[order], listed["index"], "left")
     last = np.searchsorted(index[order], listed["index"], "right")
@@ -104,7 +104,7 @@ def stages(count: int = 1000) -> None:
     find_encounters(some[:2], *SPAN, workers=1)
     print(f"{count} orbits of the MPC, 1950 to 2050, Earth, {LIMIT} au, one thread, processor time")
     print(
-        f"{'error (km)':>10} {'tolerance':>9} {'object-years/s':>14} {'passages':>8} {'lost':>5} {'asteroids':>9} "
+        f"{'error (km)':>10} {'tolerance':>9} {'object-years/s':>14} {'found':>8} {'lost':>5} {'asteroids':>9} "
         f"{'median (km)':>11} {'p99 (km)':>9} {'largest (km)':>12}"
     )
     truth = None
@@ -144,7 +144,7 @@ def main(arguments: list[str]) -> int:
     year, year_listed = (2000.0 + (days - 2451545.0) / 365.25 for days in (jd, listed["jd"]))
     print(
         f"{'decade':8} {'rows':>6} {'found':>6} {'recall':>8}   {'3 sigma < 1 min':>15} {'found':>6} {'recall':>8}   "
-        f"{'passages found':>14} {'listed':>6} {'precision':>9} {'|dt| median (s)':>15}"
+        f"{'all found':>14} {'listed':>6} {'precision':>9} {'|dt| median (s)':>15}"
     )
     for decade in (*range(1950, 2040, 10), None):
         low, high = (1950, 2040) if decade is None else (decade, decade + 10)
@@ -159,7 +159,7 @@ def main(arguments: list[str]) -> int:
             f"{some.sum():14d} {best:6d} {best / some.sum():9.2%} {late:15.1f}"
         )
     _causes(asteroids, listed, there & good & (found < 0))
-    print("\npassages found of asteroids that JPL knew well, which the list lacks")
+    print("\nencounters found of asteroids with well-known orbits (JPL) that are missing in the list")
     for k in np.flatnonzero(mine & ~known)[:40]:
         day = Time(jd[k], format="jd", scale="tdb").iso[:16]
         print(f"  {asteroids[index[k]].name:14} {day} {au[k]:.6f} au")
@@ -167,8 +167,8 @@ def main(arguments: list[str]) -> int:
 
 
 def _causes(asteroids: tuple[Asteroid, ...], listed: dict[str, np.ndarray], missed: np.ndarray) -> None:
-    """Print each row that was missed with the passage of the same orbit nearest in time, within 0.2 au."""
-    print("\nrows known to a minute that were not found, and where the same orbit passes")
+    """Print each row that was not found with the encounter of the same orbit nearest in time, within 0.3 au."""
+    print("\nrows known to a minute that were not found, and the encounter of the same orbit nearest in time")
     for k in np.flatnonzero(missed):
         asteroid = asteroids[listed["index"][k]]
         day = Time(listed["jd"][k], format="jd", scale="tdb")

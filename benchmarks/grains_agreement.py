@@ -99,7 +99,7 @@ def agrees(row: Row, sample: list[Row]) -> NDArray[np.bool_]:
 
 
 def left_out(rows: list[Row], sample: list[Row], size: int) -> list[NDArray[np.float64]]:
-    """Share of the samples of `size` runs with which each row agrees; a row is never in its own sample."""
+    """Fraction of the samples of `size` runs with which each row agrees; a row is never in its own sample."""
     out = []
     for row in rows:
         others = [other for other in sample if other is not row]
@@ -123,7 +123,7 @@ def rates(found: Cases, known: Cases) -> list[str]:
         ("runs of the other code in samples of the other, where it has four piles", theirs),
         ("the same runs in samples of this code", again),
     )
-    out = [f"share of runs that agree with {size} piles     rows  class  clump in range  both"]
+    out = [f"fraction of runs that agree with {size} piles     rows  class  clump in range  both"]
     for name, values in names:
         if values:
             a, b, c = np.mean(values, axis=0)
@@ -165,7 +165,7 @@ def pile_scores(found: Cases, known: Cases, name: str, log: bool, whole: bool) -
 
 
 def difference(here: Scores, there: Scores) -> tuple[float, float, float]:
-    """Difference of the means of two sets of piles, its standard error, and the share of exchanges that exceed it."""
+    """Difference of the means of two sets of piles, its standard error, and the fraction of larger exchanges."""
     gap = here.mean() - there.mean()
     error = np.sqrt(here.var(ddof=1) / len(here) + there.var(ddof=1) / len(there))
     pool = np.concatenate([here, there])
@@ -205,7 +205,7 @@ def compare(path: Path, figure: Path | None) -> None:
     print(
         "\ndifference of the codes in units of the scatter between piles, its standard error over the piles, and the"
     )
-    print("share of the exchanges of piles between the codes that give a larger one")
+    print("fraction of the exchanges of piles between the codes that give a larger one")
     print("                                 largest clump           stretch (whole)         period (whole)")
     for label, chosen in GROUPS:
         some = {c: rows for c, rows in known.items() if chosen(c)}

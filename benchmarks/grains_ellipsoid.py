@@ -32,7 +32,7 @@ from flybystab.flybys.grains_run import one_pile
 from flybystab.orbit.planets import PLANETS
 from flybystab.typing import Array
 
-#: Change of the long axis above which a body has moved; share of the largest clump below which it is lost.
+#: Change of the long axis above which a body has moved; fraction of the largest clump below which it is lost.
 MOVED, LOST = 0.03, 0.9
 #: Name, yield surface and change of the friction angle (deg) from that of the pile.
 MODELS = (
@@ -82,7 +82,7 @@ def case_of(number: int) -> Case:
         material=fs.Material(friction_angle=rng.uniform(30.0, 40.0) * u.deg, cohesion=cohesion * u.Pa),
     )
     planet = PLANETS[name]
-    # the Roche distance scales with the cube root of the densities: deep and shallow passages for each planet
+    # the Roche distance scales with the cube root of the densities: deep and shallow encounters for each planet
     roche = planet.radius * np.cbrt(planet.gm / (4.0 / 3.0 * np.pi * 6.6743e-11 * planet.radius**3) / density)
     q = max(1.02 * planet.radius, roche * rng.uniform(0.85, 2.0))
     v = rng.uniform(0.0, 20.0)

@@ -25,20 +25,20 @@ from flybystab.units import R_earth
 
 
 class At:
-    """Finder of one passage of the Earth at a distance in Earth radii."""
+    """Finder of one encounter with the Earth at a distance in Earth radii."""
 
     def __init__(self, q: float) -> None:
         self.encounter = Encounter.hyperbolic("earth", q * R_earth, v_inf=6 * u.km / u.s)
 
     def __call__(self, asteroid: Asteroid, settings: object) -> list[Passage]:
-        """The passage."""
+        """The encounter."""
         when = Time(2462000.5, format="jd", scale="tdb")
         distance = self.encounter.distance.to_value(u.m)
         return [Passage(asteroid, "earth", when, distance, 6000.0, self.encounter)]
 
 
 def screened(q: float, samples: int, grains: int | None) -> tuple[list[dict[str, object]], float]:
-    """Samples of a passage and the time, s."""
+    """Samples of an encounter and the processor time, s."""
     chosen = settings("2026-01-01", "2036-01-01", samples=samples, seed=1, grains=grains, keep_samples=True)
     run = Screening([Asteroid.from_catalogue("Anteros")], chosen, At(q))
     begun = time.thread_time()
@@ -61,15 +61,15 @@ def main(arguments: list[str] | None = None) -> None:
         if needing <= 0.01 * options.samples:
             break
     rows, seconds = screened(float(q), options.samples, options.grains)
-    carried = sum(r["decided_by"] == "grains" for r in rows)
+    continued = sum(r["decided_by"] == "grains" for r in rows)
     dynamic = sum(r["decided_by"] != "bound" for r in rows)
     print(
         f"{options.samples} samples at {q:.1f} Earth radii, {dynamic} integrated, {needing} in need of grains, "
-        f"{carried} carried on by {options.grains} grains"
+        f"{continued} continued with {options.grains} grains"
     )
     print(f"processor time without grains {without:.2f} s, with grains {seconds:.2f} s")
-    if carried:
-        print(f"{(seconds - without) / carried:.1f} s a sample by grains, its pile included")
+    if continued:
+        print(f"{(seconds - without) / continued:.1f} s per sample with grains, including its pile")
 
 
 if __name__ == "__main__":

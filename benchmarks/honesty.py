@@ -1,15 +1,15 @@
-"""Attacks the quick bound: no body that it calls INTACT may yield in the full dynamics.
+"""Tests of the yield bound: no body that it classifies as INTACT may yield in the full dynamics.
 
 python benchmarks/honesty.py scripted [--encounters N] [--bodies N] [--seed N]
-    random hyperbolas and parabolas of six planets with J2, from grazing to distant; spheres, spheroids and
-    triaxial bodies, exact and nearly so, at rest, slow, beyond the spin limit, tumbling about any axis; all yield
-    surfaces, cohesion, brittle or not. Most friction angles are put where the bound only just decides.
+    random hyperbolas and parabolas at six planets with J2, from grazing to distant; spheres, spheroids and triaxial
+    bodies, exactly and nearly, without spin, slow, beyond the spin limit, and tumbling about any axis; all yield
+    surfaces, with and without cohesion, brittle or not. Most friction angles are only just sufficient for the bound.
 python benchmarks/honesty.py surfaces [--encounters N] [--bodies N] [--seed N]
-    piles of 35 deg without cohesion past the Earth, at 1.5 to 30 radii: how often the bound decides on each yield
-    surface, of the bodies that stay rigid in the dynamics, and by how much it exceeds the friction that they mobilise.
+    bodies of 35 deg without cohesion at the Earth, at 1.5 to 30 radii: the fraction of the bodies that stay rigid in
+    the dynamics for which the bound decides, by yield surface, and its excess over the friction angle mobilised.
 python benchmarks/honesty.py real [--every N] [--seed N]
-    passages of catalogued asteroids by six planets: the bound from distance and speed alone against the tide of the
-    encounter that was followed among all bodies; samples by the bound against the same samples by the dynamics.
+    encounters of catalogued asteroids with six planets: the bound on the tide from distance and speed alone compared
+    with the tide of the integrated encounter; samples decided by the bound compared with the dynamics.
 """
 
 from __future__ import annotations
@@ -65,7 +65,7 @@ def bodies(n: int, rng: np.random.Generator) -> Sample:
 
 
 def encounter(rng: np.random.Generator) -> Encounter:
-    """A scripted encounter: 1.02 to 100 radii, 0 to 30 km/s, with J2 or not."""
+    """A hyperbolic encounter at 1.02 to 100 radii and 0 to 30 km/s, with or without J2."""
     body = planet(rng.choice(PLANETS))
     q = 1.01 * body.impact_distance + body.radius * 10.0 ** rng.uniform(-2, 2)
     v = rng.choice([0.0, 10.0 ** rng.uniform(-2, 1.5)])
@@ -80,7 +80,7 @@ def encounter(rng: np.random.Generator) -> Encounter:
 
 
 class Count(NamedTuple):
-    """What a campaign found; `used` is the share of the bound's rise that the dynamics reaches, per sample."""
+    """Counts of a campaign; `used` is the friction rise in the dynamics over that of the bound, per sample."""
 
     samples: int
     intact: int
@@ -90,7 +90,7 @@ class Count(NamedTuple):
 
 
 def campaign(seed: int, encounters: int, each: int) -> Count:
-    """Random bodies in random encounters: what the bound says against what the dynamics does."""
+    """Verdicts of the bound and of the dynamics for random bodies in random encounters."""
     rng = np.random.default_rng(seed)
     intact = standing = false = 0
     used: list[float] = []
@@ -102,7 +102,7 @@ def campaign(seed: int, encounters: int, each: int) -> Count:
         friction, verdict = np.empty((each, 2)), np.empty(each, dtype=np.int64)
         for angle in (np.full(each, np.radians(60)), phi):
             quick_margins(axes, rho, omega, angle, cohesion, code, *size, friction, verdict)
-            # Just enough friction, for most of those that can have it.
+            # A friction angle that is only just sufficient, for most bodies for which there is one.
             tight = (rng.random(each) < 0.7) & (friction[:, 1] < np.radians(65))
             if angle is not phi:
                 phi[tight] = np.maximum(friction[tight, 1], 1e-3) + 1e-9
@@ -127,10 +127,10 @@ def scripted(args: argparse.Namespace) -> int:
     c = campaign(args.seed, args.encounters, args.bodies)
     print(f"{c.samples} samples in {args.encounters} encounters")
     print(f"decided by the bound: {c.intact} INTACT, {c.not_in_equilibrium} NOT IN EQUILIBRIUM")
-    print(f"called INTACT, and something else in the dynamics: {c.false}")
+    print(f"INTACT by the bound, with another verdict in the dynamics: {c.false}")
     q = np.quantile(c.used, [0.5, 0.9, 1.0])
     print(
-        f"share of the bound that the dynamics reaches: median {q[0]:.3f}, 90 % {q[1]:.3f}, largest {q[2]:.4f}"
+        f"fraction of the bound that the dynamics reaches: median {q[0]:.3f}, 90 % {q[1]:.3f}, largest {q[2]:.4f}"
     )
     return int(c.false > 0)
 
@@ -175,7 +175,7 @@ def surfaces(args: argparse.Namespace) -> int:
             f"{most:8.2f}",
             flush=True,
         )
-    print(f"called INTACT, and not rigid in the dynamics: {false}")
+    print(f"INTACT by the bound, not rigid in the dynamics: {false}")
     return int(false > 0)
 
 
@@ -200,9 +200,11 @@ def real(args: argparse.Namespace) -> int:
             dynamic += int(fast.dynamic.sum())
             false += sum(a != b for a, b in zip(fast.verdict, full.verdict, strict=True))
     least = np.min(ratios, axis=0)
-    print(f"{samples} samples, {dynamic} of them by the dynamics; another verdict in the dynamics: {false}")
-    print(f"bound without following over the tide followed, {len(ratios)} passages, least:")
-    print(f"peak {least[0]:.3f}, integral {least[1]:.3f} (below 1: false)")
+    print(f"{samples} samples, {dynamic} of them integrated; decided otherwise by the dynamics: {false}")
+    print(
+        f"tide bound from distance and speed over the tide of the integrated encounter, smallest of {len(ratios)}:"
+    )
+    print(f"peak {least[0]:.3f}, integral {least[1]:.3f} (below 1 the bound would be wrong)")
     return int(false > 0 or bool(np.any(least < 1.0)))
 
 

@@ -240,9 +240,9 @@ def pairs(size: int = 200) -> dict[str, list[tuple[Orbit, Orbit]]]:
 
 
 def factor(size: int = 500) -> list[str]:
-    """Shares within 1 and 3 sigma by the part of the runoff that is called one sigma, for two halves of the asteroids.
+    """Fractions of errors within 1 and 3 sigma for several factors of the runoff, for two halves of the asteroids.
 
-    The first half is that of the choice of ``orbit_errors.FACTOR``; `size` limits the asteroids with U = 0.
+    The first half is that used to choose ``orbit_errors.FACTOR``; `size` limits the asteroids with U = 0.
     """
     new, mpc = read(NEW), read(MPC)
     late = {k: a.orbit for k, a in new.items() if abs(seconds(a.epoch, MEETING)) < 2.0 * YEAR}
@@ -279,7 +279,7 @@ def factor(size: int = 500) -> list[str]:
 
 
 def coverage() -> list[str]:
-    """Stated errors of orbits against later orbits, along the direction least known: shares within 1 and 3 sigma."""
+    """Stated errors of orbits against later orbits, along the direction least known: fractions within 1 and 3 sigma."""
     window = ephemeris("de440").window(MEETING, -8.0 * YEAR, 2.0 * YEAR)
     out = [
         "Stated errors against JPL's orbits of 2026-07 at their epoch, along the direction least known",
@@ -312,7 +312,7 @@ def model() -> list[str]:
     )
     found = []
     for row in ours:
-        if row["model_error"].to_value(u.km) > 5.0:  # beyond an earlier passage
+        if row["model_error"].to_value(u.km) > 5.0:  # beyond an earlier encounter
             continue
         near = other[other["index"] == row["index"]]
         late = np.abs((near["time"] - row["time"]).to_value(u.s))

@@ -40,7 +40,9 @@ def counts():
     distance = np.array([float(r["dist_au"]) for r in rows])
     size = np.array([float(r["H"]) if r["H"] not in ("", "n/a") else np.nan for r in rows])
     years = np.ptp(jd) / 365.25
-    print(f"passages by the Earth in {years:.0f} years: counted (CNEOS, 2021) and expected (orbits of 2026)")
+    print(
+        f"encounters with the Earth in {years:.0f} years: counted (CNEOS, 2021) and expected (orbits of 2026)"
+    )
     print("H              within (au)  counted  expected  ratio")
     for low, high in ((0.0, 17.75), (17.75, 20.0), (20.0, 22.0)):
         of = orbits[(h >= low) & (h < high)]
@@ -69,7 +71,7 @@ def counts():
 
 
 def search(limit="17.75"):
-    """Passages from 1950 to 2050 found by the search of the package, by planet, and the expected numbers."""
+    """Encounters from 1950 to 2050 found by the search of the package, by planet, and the expected numbers."""
     limit = float(limit)
     rows = [r for r in read("nea_mpc_2026-02.csv.gz") if float(r["H"] or "nan") < limit]
     table, h = catalogue()
@@ -191,13 +193,13 @@ def published():
             "a, b",
         ),
         (
-            f"Earth passage of NEAs > 420 m ({len(large)} known) in 5.96 R_E, one in (kyr)",
+            f"Earth encounter of NEAs > 420 m ({len(large)} known) in 5.96 R_E, one in (kyr)",
             (7, 8.2),
             1e-3 / deep,
             "a",
         ),
-        ("Earth passage of one NEA within 10 radii, one in (Myr)", 10, 1 / each["earth"].mean(), "a"),
-        ("Venus passage of one NEA within 10 radii, one in (Myr)", 10, 1 / each["venus"].mean(), "a"),
+        ("Earth encounter of one NEA within 10 radii, one in (Myr)", 10, 1 / each["earth"].mean(), "a"),
+        ("Venus encounter of one NEA within 10 radii, one in (Myr)", 10, 1 / each["venus"].mean(), "a"),
         ("  either of the two, one in (Myr)", 5, 1 / either, "a"),
         ("any terrestrial planet within 10 R_E, median NEA, one in (Myr)", (1, 10), times[0], "c"),
         ("any terrestrial planet within 30 R_E, median NEA, one in (Myr)", (0, 1), times[1], "c"),
@@ -235,7 +237,7 @@ def answers():
     large = np.flatnonzero(h < 17.75)
     rates = fs.disruption_rates(orbits[large], ("mercury", "venus", "earth", "mars"), samples=4800, seed=1)
     print(f"{len(large)} known asteroids of H < 17.75 as bodies of 1 km, drawn properties")
-    print(f"share reshaped in the last Myr: {100 * rates.changed_fraction(1 * u.Myr):.2f} %")
+    print(f"fraction reshaped in the last Myr: {100 * rates.changed_fraction(1 * u.Myr):.2f} %")
     print("\nlargest rates of changes of shape by encounters within 5 radii")
     print("asteroid            changes per Gyr  samples")
     for row in rates.contributors(most=8):
@@ -243,7 +245,7 @@ def answers():
         name = " ".join(x for x in (one["number"], one["name"] or one["principal_desig"]) if x)
         print(f"{name:18s} {1e9 * row['rate'].to_value(1 / u.yr):16.1f} {row['samples']:8d}")
     print(
-        "\nshare of the asteroids with a fresh surface, by refreshing distance and weathering time (Earth, Venus)"
+        "\nfraction of the asteroids with a fresh surface, by refreshing distance and weathering time (Earth, Venus)"
     )
     print("radii   0.1 Myr   1 Myr")
     for radii in (3.6, 5, 7.2, 10, 16):
@@ -256,7 +258,7 @@ def answers():
 
 
 def nbody(years=3000.0, particles=200, within=0.1):
-    """Passages counted in an N-body integration of known asteroids, and expected from their changing orbits."""
+    """Encounters counted in an N-body integration of known asteroids, and expected from their changing orbits."""
     import rebound
 
     years, particles = float(years), int(particles)
@@ -333,10 +335,10 @@ def nbody(years=3000.0, particles=200, within=0.1):
     print(
         f"{particles} known asteroids (H < 17.75, q < 1 au) with the planets, {years:g} years by WHFast: {wall:.0f} s"
     )
-    print(f"planet  passages within {within:g} au: counted  expected  ratio  (1 sigma of counting)")
+    print(f"planet  encounters within {within:g} au: counted  expected  ratio  (1 sigma of counting)")
     for name in watched:
         n, m = counts[name], expected[name]
-        print(f"{name:8s} {n:31d}  {m:8.0f}  {n / m:5.3f}  ({1 / np.sqrt(m):.3f})")
+        print(f"{name:8s} {n:32d}  {m:8.0f}  {n / m:5.3f}  ({1 / np.sqrt(m):.3f})")
 
 
 def convergence():

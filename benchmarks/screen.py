@@ -2,10 +2,10 @@
 
 python benchmarks/screen.py throughput     samples per second by distance and workers; cost of 10^8 samples
 python benchmarks/screen.py memory         resident memory while 10^6 rows are written
-python benchmarks/screen.py samples        resident memory for 10^6 samples of one passage
+python benchmarks/screen.py samples        resident memory for 10^6 samples of one encounter
 python benchmarks/screen.py catalogue [FILE] [--jobs N] [--samples N] [--output FILE]
                                            a whole run: time, verdicts, the ten closest to failure
-python benchmarks/screen.py cneos RESULT   a table of results against the passages that CNEOS predicted in 2021
+python benchmarks/screen.py cneos RESULT   a table of results compared with the encounters predicted by CNEOS in 2021
 """
 
 from __future__ import annotations
@@ -160,10 +160,10 @@ def throughput() -> None:
     spent = time.perf_counter() - began
     years = 24 * len(run.asteroids)
     print(
-        f"search and catalogue bodies, 1 worker: {years / spent:.0f} object-years/s ({found} passages of "
+        f"search and catalogue bodies, 1 worker: {years / spent:.0f} object-years/s ({found} encounters of "
         f"{len(run.asteroids)} asteroids in 24 years, {spent:.1f} s)"
     )
-    # Passages within 0.05 au that come within 10 Earth radii, by the area of the target plane.
+    # Fraction of the encounters within 0.05 au that come within 10 Earth radii, by area on the target plane.
     deep = (10 * R_EARTH / (0.05 * AU)) ** 2
     search = 1e6 * 24 / (years / spent) / 2
     draw = 1e8 * ((1 - deep) / rates["0.02 au", 200, 2] + deep / rates["2 R_E", 20, 2])
@@ -209,7 +209,7 @@ def memory(count: int) -> None:
 
 
 def sample_memory(count: int) -> None:
-    """Peak resident memory of one passage with up to `count` samples."""
+    """Peak resident memory of one encounter with up to `count` samples."""
     base = Asteroid.from_catalogue("Anteros")
     print(f"{'samples':>9} {'peak memory (MB)':>17} {'processor time (s)':>19}")
     with tempfile.TemporaryDirectory() as where:
@@ -235,7 +235,7 @@ def whole(args: argparse.Namespace) -> None:
 
 
 def cneos(result: Path, data: Path) -> None:
-    """Passages of the CNEOS table (2021) that a result does not have, with the uncertainty they had then."""
+    """Encounters of the CNEOS table (2021) that are missing in a result, with their uncertainty at that time."""
     table = read_results(result)
     span = table.meta["settings"]["start_jd_tdb"], table.meta["settings"]["stop_jd_tdb"]
     file = table.meta["catalogue"]
@@ -259,7 +259,7 @@ def cneos(result: Path, data: Path) -> None:
             closest = min(near, key=lambda x: abs(x[0] - day), default=(float("nan"),) * 2)
             lost.append((r, closest))
     print(
-        f"{len(known)} passages predicted in 2021, {len(known) - len(lost)} found at that time and distance;"
+        f"{len(known)} encounters predicted in 2021, {len(known) - len(lost)} found at that time and distance;"
     )
     print(
         f"of the {len(sure)} whose time was known to an hour (3 sigma), {sum(r in sure for r, _ in lost)} not found"

@@ -95,7 +95,7 @@ def published(file=None):
             if density == 1.29:
                 passing[name] = 100.0 * np.mean(steepest, axis=0)
         print()
-    print("share of the area that first exceeds an angle of repose at 1.29 g/cm3 (%)")
+    print("fraction of the area that first exceeds an angle of repose at 1.29 g/cm3 (%)")
     print("deg  " + "  ".join(passing))
     for k, angle in enumerate((15, 20, 25, 30, 35)):
         print(f"{angle:3d}  " + "  ".join(f"{values[k]:{len(name)}.2f}" for name, values in passing.items()))

@@ -1,6 +1,6 @@
 """What two simplifications of a flyby could save: no steps on the distant orbit, and motion in its plane only.
 
-python benchmarks/shortcuts.py distant   share of the time on stretches where the tide is below the error asked for
+python benchmarks/shortcuts.py distant   fraction of the time on stretches where the tide is below the error asked for
 python benchmarks/shortcuts.py planar    cost of the parts of a step of plastic flow, and what fewer numbers would leave
 
 Times are processor times, least of several runs.
@@ -42,7 +42,7 @@ def least(run: Callable[[], object], repeat: int = 20) -> float:
 
 
 def scenes() -> list[tuple[str, fs.Body, fs.Encounter]]:
-    """Scripted from 10 radii, rigid and with flow, and the real passages of Apophis and of a fast rotator."""
+    """Scripted from 10 radii, rigid and with flow, and the real encounters of Apophis and of a fast rotator."""
 
     def earth(q: float) -> fs.Encounter:
         return fs.Encounter.hyperbolic(

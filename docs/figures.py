@@ -99,7 +99,7 @@ SECTIONS = {
         ("surface_history_figure", "Slopes before, at and after closest approach", "shape_map.surface_history_figure(slopes)"),
     ],
     "Equilibrium and stability": [
-        ("requirements", "`Requirements`: share of the samples in equilibrium", "fs.requirements(body, density_sigma=400 * u.kg / u.m**3, samples=400).plot(axes)"),
+        ("requirements", "`Requirements`: fraction of the samples in equilibrium", "fs.requirements(body, density_sigma=400 * u.kg / u.m**3, samples=400).plot(axes)"),
         ("stability", "`Stability`: energy barrier along the weakest direction", "fs.stability(body).plot(axes)"),
         ("push", "`Push`: energy barrier along a chosen direction", "fs.push(body, np.diag([1.0, 0.0, -1.0]), np.linspace(0, 0.3, 31)).plot(axes)"),
         ("regions_plot", "Required friction angle over axis ratios at one spin", "stability.regions_plot(axes, 0.4)"),

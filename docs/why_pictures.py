@@ -86,7 +86,7 @@ def friction():
 
 
 def margin():
-    """Mobilised friction angle against time, for passages at several distances."""
+    """Mobilised friction angle against time, for encounters at several distances."""
     figure = Figure(figsize=(7.2, 3.4), layout="constrained")
     axes = figure.subplots()
     for q, colour, style in ((6.0, GREEN, ":"), (4.0, BLUE, "-"), (3.0, ORANGE, "--"), (2.2, RED, "-.")):

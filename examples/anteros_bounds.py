@@ -1,8 +1,8 @@
-"""Constraints on the density and friction of Anteros from its spin.
+"""Constraints on the density and friction angle of Anteros from its spin.
 
-Anteros is nearly a sphere and rotates in 2.8695 h. A cohesionless sphere requires
-omega^2 <= (8/3) sin phi/(1 + sin phi) pi G rho; the catalogue shape changes this slightly. Its density has not been
-measured, so that this lower bound is the only constraint.
+Anteros is nearly spherical and rotates in 2.8695 h. A cohesionless sphere is in equilibrium if
+omega^2 <= (8/3) sin phi/(1 + sin phi) pi G rho; the catalogued shape changes this limit slightly. The density has not
+been measured, so that the lower bound from this condition is its only constraint.
 """
 
 import astropy.units as u
@@ -16,7 +16,7 @@ anteros = fs.Asteroid.from_catalogue("Anteros")
 period = anteros.quantity("spin_period_h")
 omega = 2 * np.pi / period.to_value(u.s)
 print(f"{anteros.label}: period {period:.4f}, not measured: {', '.join(anteros.assumptions) or 'nothing'}")
-print("friction (deg)  least density (kg/m3): sphere, catalogue shape; cohesion at 1500 kg/m3 (Pa)")
+print("friction (deg)  least density (kg/m3): sphere, catalogued shape; cohesion at 1500 kg/m3 (Pa)")
 worst = 0.0
 for phi in (25, 30, 35, 40, 45):
     material = fs.Material(friction_angle=phi * u.deg)

@@ -1,9 +1,10 @@
-"""Forecast of the rotation of Apophis after 13 April 2029 for rival spin solutions, as a table (ECSV).
+"""Forecast of the rotation of Apophis after 13 April 2029 for alternative spin solutions, as a table (ECSV).
 
-Observations of 2012-2013 and 2020-2021 allow several pairs of precession and rotation period. For each, the table gives
-5, 50 and 95 % of the periods after the encounter over the unknown rotation phase, the pole and the share of phases in
-the short-axis mode; then what changes if inertia, pole or distance are others. The forecast does not depend on density,
-size or strength of a rigid body. An attitude measured in 2028 would replace the whole spread by one value.
+Observations of 2012-2013 and 2020-2021 are fitted by several pairs of precession and rotation period. For each pair,
+the table gives the 5th, 50th and 95th percentile of the periods after the encounter over the unknown rotation phase,
+the pole, and the fraction of phases that end in the short-axis mode. Further rows vary the moments of inertia and the
+pole; the last line printed varies the distance. For a rigid body the forecast does not depend on density, size or
+strength. A measurement of the attitude in 2028 would reduce each distribution to one value.
 """
 
 from pathlib import Path
@@ -33,8 +34,8 @@ CASES = (
 
 forecasts, rows = {}, []
 for name, (precession, rotation), inertia, turned in CASES:
-    rival = apophis.with_tumbling(precession * u.h, rotation * u.h, inertia=inertia)
-    found = spin_forecast(rival, encounter, n=PHASES, turned=turned * u.deg)
+    tumbler = apophis.with_tumbling(precession * u.h, rotation * u.h, inertia=inertia)
+    found = spin_forecast(tumbler, encounter, n=PHASES, turned=turned * u.deg)
     forecasts[name] = found
     latitude = found.ecliptic[1]
     row = {"solution": name, "precession_before": precession * u.h, "rotation_before": rotation * u.h}
@@ -42,7 +43,7 @@ for name, (precession, rotation), inertia, turned in CASES:
         for level, value in zip((5, 50, 95), found.quantiles(column), strict=True):
             row[f"{column}_{level}"] = value
     row["pole_latitude_5"], row["pole_latitude_95"] = np.quantile(latitude, [0.05, 0.95])
-    row["share_sam"] = np.mean(found.mode == "SAM")
+    row["fraction_sam"] = np.mean(found.mode == "SAM")
     rows.append(row)
 
 table = QTable(rows)
@@ -64,7 +65,7 @@ for row in table:
     near, moved, far = (row[f"pole_change_{k}"].value for k in (5, 50, 95))
     print(
         f"{row['solution']:47} {mid:5.1f} ({low:5.1f} to {high:5.1f})  {turn:6.1f} ({slow:5.1f} to {fast:6.1f})"
-        f"  {moved:4.1f} ({near:3.1f} to {far:4.1f})  {row['share_sam']:.0%}"
+        f"  {moved:4.1f} ({near:3.1f} to {far:4.1f})  {row['fraction_sam']:.0%}"
     )
 
 body = apophis.body

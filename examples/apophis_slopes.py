@@ -1,10 +1,10 @@
 """Change of the surface slopes of Apophis by the encounter of 13 April 2029.
 
-Published for shape models with relief: slopes change by up to 4 deg at 1.29 g/cm3 and 2 deg at a higher density
-(2.2 here), and about 1 % of the area is resurfaced. The body here is a smooth ellipsoid that tumbles as observed, at
-64 phases. Its slopes stay below the angle of repose. On a surface with relief, 1 to 2 % of the area per degree of slope
-lies near the angle of repose; the fraction that exceeds it is that density times the mean increase of the slopes.
-The slope of a sphere without spin changes by (3/2) GM/d^3 / (4/3 pi G rho).
+Published results for shape models with relief: slopes change by up to 4 deg for a bulk density of 1.29 g/cm3 and 2 deg
+for a higher one (2.2 here), and about 1 % of the area is resurfaced. The body here is a smooth ellipsoid in the
+observed tumbling state, at 64 phases; its slopes stay below the angle of repose. On a surface with relief, 1 to 2 % of
+the area per degree of slope is near the angle of repose, and the area fraction that exceeds it is this density times
+the mean increase of the slopes. On a sphere without spin the largest change is (3/2) GM/d^3 / (4/3 pi G rho).
 """
 
 import astropy.units as u
@@ -36,6 +36,6 @@ for density in (1.29, 2.2):
     sphere = float(np.rad2deg(tide / (4 / 3 * np.pi * G * density * 1e3)))
     print(
         f"{density} g/cm3: largest change {min(changes):.2f} to {max(changes):.2f} deg "
-        f"(median {np.median(changes):.2f}, a sphere {sphere:.2f}); "
-        f"steepest slope met {max(steepest):.1f} deg; mean rise {np.median(rises):.2f} deg"
+        f"(median {np.median(changes):.2f}, sphere {sphere:.2f}); "
+        f"steepest slope {max(steepest):.1f} deg; mean increase {np.median(rises):.2f} deg"
     )

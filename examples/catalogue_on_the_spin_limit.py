@@ -1,6 +1,6 @@
-"""The catalogue against the spin limit of bodies without cohesion.
+"""Asteroids of the catalogue compared with the spin limits of cohesionless bodies.
 
-For each asteroid: spin over sqrt(pi G rho), and the friction angle that its shape and spin mobilise far from any
+For each asteroid: spin rate in units of sqrt(pi G rho), and the friction angle required by shape and spin far from any
 planet. Writes out/spin_limit.png.
 """
 
@@ -22,9 +22,9 @@ for asteroid in fs.catalogue():
 rate, flat, need = map(np.array, (rate, flat, need))
 holds = need <= 35.0
 print(
-    f"{len(need)} bodies: {holds.sum()} hold with 35 deg of friction and no cohesion, {(~holds).sum()} do not,"
+    f"{len(need)} bodies: {holds.sum()} are in equilibrium at 35 deg without cohesion, {(~holds).sum()} are not,"
 )
-print(f"{np.isinf(need).sum()} of them with no friction at all (mean tension)")
+print(f"{np.isinf(need).sum()} of these at no friction angle (mean tension)")
 
 figure = Figure(figsize=(6.4, 4.4), layout="constrained")
 axes = figure.subplots()

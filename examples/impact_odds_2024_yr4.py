@@ -1,8 +1,8 @@
 """Probability that 2024 YR4 hits the Moon on 22 December 2032, by two methods.
 
-The orbit and its covariance are ESA NEOCC's (2024YR4.ke1 beside this script). The probability is computed from clones
-of the orbit, and from the covariance mapped linearly to the target plane of the Moon. NASA gave 4.3 % (CNEOS, June
-2025). Writes out/2024_yr4.png.
+The orbit and its covariance are those of ESA NEOCC (2024YR4.ke1 in the folder of this script). The probability is
+computed from clones of the orbit, and from the covariance mapped linearly to the target plane of the Moon. The value of
+CNEOS (June 2025) is 4.3 %. Writes out/2024_yr4.png.
 """
 
 from pathlib import Path
@@ -27,9 +27,9 @@ clones, linear = moon.impact_probability, moon.linear.impact_probability
 low, high = moon.impact_interval()
 major, minor, angle = ellipse(moon.linear.covariance)
 print(f"Moon: {clones:.3f} of the clones (95 % interval {low:.3f} to {high:.3f}), linear map {linear:.4f}")
-print(f"one-sigma ellipse on the target plane: {major:.0f} by {minor:.1f}, {angle:.1f} from T to R")
+print(f"1-sigma ellipse on the target plane: {major:.0f} by {minor:.1f}, {angle:.1f} from T to R")
 nearest = earth.distance.min()
-print(f"Earth: {earth.linear.impact_probability:.2g}; the clones pass at {nearest:.0f} or more")
+print(f"Earth: {earth.linear.impact_probability:.2g}; smallest distance of the clones {nearest:.0f}")
 
 figure = Figure(figsize=(6.4, 3.2), layout="constrained")
 axes = figure.subplots()

@@ -1,4 +1,4 @@
-"""From a shape file to a map of the slopes of Apophis on 13 April 2029, before, at and after closest approach.
+"""Map of the slopes of Apophis on 13 April 2029, before, at and after closest approach, from a shape file.
 
 The same in the shell: ``flybystab flyby Apophis --shape examples/relief.obj --map slopes.png``
 """

@@ -1,4 +1,4 @@
-"""Dependence of the verdict on the yield surface: a 2.8 x 1.7 x 1.5 km pile passes the Earth at several distances."""
+"""Dependence of the verdict on the yield surface for a 2.8 x 1.7 x 1.5 km pile at several distances from the Earth."""
 
 import astropy.units as u
 

@@ -1,7 +1,7 @@
-"""Failure distance of a granular sphere in a slowly growing tide, against friction angle.
+"""Failure distance of a granular sphere in a slowly increasing tide, as a function of the friction angle.
 
-The closed form d/Rp (rho/rho_p)^(1/3) = [(3 - sin phi)/(2 sin phi)]^(1/3) (Holsapple & Michel 2006) and the
-onset of yield found by the dynamics in a slowly increasing tide.
+Comparison of the closed form d/Rp (rho/rho_p)^(1/3) = [(3 - sin phi)/(2 sin phi)]^(1/3) (Holsapple & Michel 2006) with
+the onset of yield in the dynamics.
 """
 
 import numpy as np

@@ -6,7 +6,7 @@ import numpy as np
 import flybystab as fs
 from flybystab.screening.summary import summary
 
-# the ephemeris that comes with the package ends in 2050 (extra `jpl`: 2650)
+# the default ephemeris ends in 2050 (that of the extra `jpl` in 2650)
 table = fs.screen(None, "2026-01-01", "2049-12-01", within=0.02 * u.au)
 print(summary(table, closest=5).text())
 nearest = table[int(np.argmin(table["distance"]))]

@@ -1,6 +1,6 @@
-"""Slopes of an irregular shape during a flyby at the distance of Apophis, with a map.
+"""Slopes on an irregular shape during a flyby at the distance of Apophis, with a map.
 
-The shape is made in code (an ellipsoid with Gaussian relief). For a shape from a file:
+The shape is generated (an ellipsoid with Gaussian relief). To use a shape from a file:
 ``shape = fs.Shape.read("apophis.obj", unit=u.km)``.
 """
 

@@ -1,8 +1,8 @@
 """Probability of survival for an uncertain point on the target plane.
 
-A rubble pile approaches at 6 km/s. Its uncertainty is an elongated ellipse on the target plane, as after a few months
-of observations. The fraction of sampled points at which it survives is given with its sampling error.
-Writes out/target_plane.png.
+A rubble pile approaches the Earth at 6 km/s. Its uncertainty region on the target plane is an elongated ellipse, as
+after a few months of observations. The fraction of sampled points at which it survives is given with its sampling
+error. Writes out/target_plane.png.
 """
 
 from pathlib import Path
@@ -24,17 +24,17 @@ centre, sigma, tilt = np.array([22e6, 5e6]), np.array([6e6, 0.5e6]), np.deg2rad(
 turn = np.array([[np.cos(tilt), -np.sin(tilt)], [np.sin(tilt), np.cos(tilt)]])
 points = centre + (rng.standard_normal((N, 2)) * sigma) @ turn.T
 
-passages, attitudes = [], []
+encounters, attitudes = [], []
 for b in points:
     size = np.hypot(*b)
     q = GM_EARTH / SPEED**2 * (np.sqrt(1 + (size * SPEED**2 / GM_EARTH) ** 2) - 1)
-    passages.append(fs.Encounter.hyperbolic("earth", q * u.m, SPEED * u.m / u.s))
-    # the spin axis stays where it is in space; the plane of the orbit turns with B
+    encounters.append(fs.Encounter.hyperbolic("earth", q * u.m, SPEED * u.m / u.s))
+    # the spin axis is fixed in space; the plane of the orbit rotates with B
     angle, phase = np.arctan2(b[1], b[0]), rng.uniform(0, np.pi)
     about_x = np.array([[1, 0, 0], [0, np.cos(angle), np.sin(angle)], [0, -np.sin(angle), np.cos(angle)]])
     about_z = np.array([[np.cos(phase), -np.sin(phase), 0], [np.sin(phase), np.cos(phase), 0], [0, 0, 1]])
     attitudes.append(about_x @ about_z)
-table = fs.flyby_many([pile] * N, passages, attitudes, tolerance=1e-6)
+table = fs.flyby_many([pile] * N, encounters, attitudes, tolerance=1e-6)
 verdict = table.verdict
 survives = int(np.count_nonzero((verdict == "INTACT") | (verdict == "RESHAPED")))
 hits = int(np.count_nonzero(verdict == "IMPACT"))

@@ -1,11 +1,11 @@
 """Probability of survival from published orbit covariances: clones of Apophis, Bennu and Didymos.
 
-Clones are drawn from the covariance that JPL or ESA published and integrated with all forces to the encounter.
-For Bennu and Didymos the tide at their closest encounters before 2050 is negligible compared with their own
-gravity. For Apophis it is not: each clone meets the Earth at its own attitude, since the rotation phase
-cannot be predicted so far ahead. The spread of the result is shown for sampled orbits alone, and for sampled
-orbits and attitudes. A body stays INTACT while the mobilised friction angle is below that of its material, so that
-one run gives the probability at every friction angle. Writes out/real_clones.png.
+Clones are drawn from the published covariance (JPL or ESA) and integrated with all forces to the encounter. For Bennu
+and Didymos the tide at their closest encounters before 2050 is negligible compared with their self-gravity. For Apophis
+it is not; its clones have random rotation phases, since the phase cannot be predicted that far ahead. The distribution
+of the results is shown for sampled orbits alone, and for sampled orbits and attitudes. A body stays INTACT if the
+mobilised friction angle is below that of its material, so that one run gives the probability for every friction angle.
+Writes out/real_clones.png.
 """
 
 from pathlib import Path
@@ -33,23 +33,25 @@ for name, planet, date in (
     tide = 2 * clones.planet.gm / q.si.value**3 / (4 / 3 * np.pi * G * asteroid.body.rho)
     print(f"{asteroid.label}, {planet.capitalize()}, {clones.time.iso[:10]}, {clones.source}")
     print(
-        f"    closest {q.to_value(u.km):.0f} km, 3-sigma {three_sigma[name]:.2f} km; tide over own gravity {tide:.1e}"
+        f"    closest {q.to_value(u.km):.0f} km, 3-sigma {three_sigma[name]:.2f} km; tide over self-gravity {tide:.1e}"
     )
 
 apophis, clones = fs.Asteroid.from_catalogue("Apophis"), drawn["Apophis"]
 probability, least, most = fs.survival(apophis, clones, seed=1).probability()
-print(f"Apophis survives 2029 whole: {probability:.3f} (95 % interval {least:.3f} to {most:.3f})")
+print(
+    f"Apophis stays intact in 2029: probability {probability:.3f} (95 % interval {least:.3f} to {most:.3f})"
+)
 
-# Separate effects: every clone at the same attitude, and each at its own.
-passages = [
+# Separate the effects of orbit and attitude: all clones at the same attitude, and each at a random one.
+encounters = [
     fs.Encounter.hyperbolic("earth", q, v) for q, v in zip(clones.distance, clones.v_inf, strict=True)
 ]
 frame = fs.periapsis_axes(fs.Encounter.from_orbit(apophis.orbit, "earth", clones.time))
 states = spin_states(apophis, N, seed=1)
 bodies, attitudes = states.bodies(), list(frame @ states.rotations)
 tables = {
-    "orbit and attitude": fs.flyby_many(bodies, passages, attitudes),
-    "orbit alone": fs.flyby_many([bodies[0]] * N, passages, [attitudes[0]] * N),
+    "orbit and attitude": fs.flyby_many(bodies, encounters, attitudes),
+    "orbit alone": fs.flyby_many([bodies[0]] * N, encounters, [attitudes[0]] * N),
 }
 friction = {what: t.max_required_friction_angle.to_value(u.deg) for what, t in tables.items()}
 ratio = {what: t.spin_ratio for what, t in tables.items()}

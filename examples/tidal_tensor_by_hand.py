@@ -1,6 +1,6 @@
-"""The tide of the Earth at Apophis' closest approach, from a formula and from the package.
+"""Tidal tensor of the Earth at the closest approach of Apophis, from its formula and from the package.
 
-On the line to the planet the tide stretches by 2 GM/R^3 and squeezes by GM/R^3 across it.
+Its eigenvalues are 2 GM/R^3 (extension) along the line to the planet and -GM/R^3 (compression) across it.
 """
 
 import astropy.units as u

@@ -46,15 +46,15 @@ def test_pile_at_two_radii():
 
 def test_sl9_at_jupiter():
     names = ran("sl9_at_jupiter.py")
-    limits, fate = names["limits"], names["fate"]
+    limits, verdict = names["limits"], names["verdict"]
     assert limits["drucker-prager"] == pytest.approx(619, abs=10)
     assert limits["mohr-coulomb"] > limits["drucker-prager"]
     # a sphere without spin yields below rho = rho_p (Rp/d)^3 (3 - sin phi)/(2 sin phi), the static limit
     mean = 126686531.9e9 / (4 / 3 * np.pi * 6.6743e-11 * (1.31 * 71492e3) ** 3)
     sine = np.sin(np.deg2rad(35))
     static = mean * (3 - sine) / (2 * sine)
-    assert fate(0.999 * static) == "RESHAPED"
-    assert fate(1.001 * static) == "INTACT"
+    assert verdict(0.999 * static) == "RESHAPED"
+    assert verdict(1.001 * static) == "INTACT"
 
 
 def test_anteros_bounds():
@@ -142,7 +142,7 @@ def test_apophis_forecast(monkeypatch, tmp_path):
     monkeypatch.chdir(tmp_path)
     names = ran("apophis_forecast.py")
     table = QTable.read(tmp_path / "out" / "apophis_forecast.ecsv")
-    assert np.all(table["share_sam"] > 0.8)
+    assert np.all(table["fraction_sam"] > 0.8)
     assert np.all((table["pole_change_50"] > 9 * u.deg) & (table["pole_change_95"] > 20 * u.deg))
     # alternative periods change the median forecast by less than the spread over the phases
     middle = table["precession_period_50"][:3].to_value(u.h)

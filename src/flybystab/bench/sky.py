@@ -228,9 +228,9 @@ def lines(rows: list[Document]) -> list[str]:
     reason = oracle.missing()
     out += [
         "",
-        f"Passages by the Earth below {WITHIN:g} au, {speed[0]['asteroids']} asteroids, one thread, processor time"
+        f"Encounters with the Earth below {WITHIN:g} au, {speed[0]['asteroids']} asteroids, one thread, processor time"
         + (f"; no ASSIST: {reason}" if reason else "; errors against the first row of ASSIST"),
-        f"{'years':>6s} {'code':10s} {'setting':34s} {'object-years/s':>14s} {'passages':>8s} {'missed':>6s} "
+        f"{'years':>6s} {'code':10s} {'setting':34s} {'object-years/s':>14s} {'found':>8} {'missed':>6s} "
         f"{'median (km)':>11s} {'p99 (km)':>9s}",
     ]
     for r in speed:

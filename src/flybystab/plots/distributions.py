@@ -51,7 +51,7 @@ def _area_above(
 
 
 def _slope_axes(axes: Axes) -> Axes:
-    axes.set(xlabel="slope (deg)", ylabel="share of the area that is steeper", ylim=(0.0, 1.02))
+    axes.set(xlabel="slope (deg)", ylabel="fraction of the area that is steeper", ylim=(0.0, 1.02))
     axes.set_xlim(left=0.0)
     return axes
 
@@ -142,7 +142,9 @@ def forecast_plot(axes: Axes, forecast: SpinForecast) -> Axes:
         kept = np.isfinite(hours)
         if kept.any():
             axes.step(hours[kept], share[kept], where="mid", color=colour, ls=line, label=name)
-    axes.set(xlabel="period after the encounter (h)", ylabel="share of the rotation phases", ylim=(0.0, 1.0))
+    axes.set(
+        xlabel="period after the encounter (h)", ylabel="fraction of the rotation phases", ylim=(0.0, 1.0)
+    )
     axes.legend()
     return axes
 
@@ -170,7 +172,7 @@ def grains_outcome_plot(axes: Axes, outcome: GrainsOutcome) -> Axes:
     place = np.arange(1, len(order) + 1)
     axes.bar(place, bound[order], color="0.85", edgecolor=BLACK, hatch="//", label="bound to it")
     axes.bar(place, largest[order], color=BLUE, edgecolor=BLACK, label="largest clump")
-    axes.set(xlabel="pile, by the mass of its largest clump", ylabel="share of the mass", ylim=(0.0, 1.05))
+    axes.set(xlabel="pile, by the mass of its largest clump", ylabel="fraction of the mass", ylim=(0.0, 1.05))
     axes.set_xticks(place)
     axes.legend(loc="lower right")
     return axes
@@ -181,7 +183,7 @@ def grains_course_plot(axes: Axes, course: GrainsCourse) -> Axes:
     t = course.time.to_value(u.h)
     axes.plot(t, course.bound_fraction, color=ORANGE, ls="--", label="bound to it")
     axes.plot(t, course.largest_fraction, color=BLUE, label="largest clump")
-    axes.set(xlabel="time from closest approach (h)", ylabel="share of the mass", ylim=(0.0, 1.05))
+    axes.set(xlabel="time from closest approach (h)", ylabel="fraction of the mass", ylim=(0.0, 1.05))
     axes.legend()
     return axes
 
@@ -192,5 +194,5 @@ def requirements_plot(axes: Axes, found: Requirements) -> Axes:
     share: Array = (np.arange(len(phi)) + 1.0) / len(phi)
     finite = np.isfinite(phi)
     axes.step(phi[finite], share[finite], where="post", color=BLUE)
-    axes.set(xlabel="friction angle (deg)", ylabel="share of the samples in equilibrium", ylim=(0.0, 1.02))
+    axes.set(xlabel="friction angle (deg)", ylabel="fraction of the samples in equilibrium", ylim=(0.0, 1.02))
     return axes
