@@ -323,3 +323,15 @@ def test_refused_files(results, tmp_path):
 def test_metadata_of_unknown_classes_is_refused():
     with pytest.raises(KeyError):
         saving.decoded({"class": "Popen", "args": ["true"]})
+
+
+def test_classes_that_were_moved_are_read_under_their_former_address():
+    found = fs.push(body(), np.diag([1.0, -0.5, -0.5]), [0.01, 0.02])
+    text = json.dumps(saving.encoded(found))
+    assert "flybystab.body.perturbation:Push" in text
+    old = json.loads(text.replace("flybystab.body.perturbation:", "flybystab.body.stability:"))
+    restored = saving.decoded(old)
+    assert type(restored) is type(found)
+    assert np.array_equal(restored.loss.barrier, found.loss.barrier)
+    with pytest.raises(KeyError):  # a class of another package that the module imports
+        saving.decoded({"class": "flybystab.body.stability:Quantity"})

@@ -91,10 +91,10 @@ _HOME = {
     "periapsis_axes": "encounter.attitude",
     "plot_result": "plots.results",
     "population_figure": "plots.population",
-    "push": "body.stability",
+    "push": "body.perturbation",
     "read_population": "population.model_population",
     "recovery": "body.recovery",
-    "recovery_energy": "body.recovery",
+    "recovery_energy": "body.perturbed_motion",
     "refresh_distance": "flybys.refresh_distance",
     "requirements": "body.bounds",
     "roche_lobe": "body.roche_lobe",
@@ -125,13 +125,15 @@ if TYPE_CHECKING:
     from flybystab.body.elastic_stress import ElasticStress, elastic_stress
     from flybystab.body.equilibrium import Equilibrium, equilibrium, failure_distance, spin_limits
     from flybystab.body.limit_analysis import CohesionBounds, cohesion_bounds
+    from flybystab.body.perturbation import push
+    from flybystab.body.perturbed_motion import recovery_energy
     from flybystab.body.pile import Pile, PileState, make_pile
-    from flybystab.body.recovery import RecoveryLimit, recovery, recovery_energy
+    from flybystab.body.recovery import RecoveryLimit, recovery
     from flybystab.body.roche_lobe import roche_lobe
     from flybystab.body.shape import Shape
     from flybystab.body.shape_slope import shape_slopes
     from flybystab.body.spin_state import SpinState
-    from flybystab.body.stability import Stability, push, stability
+    from flybystab.body.stability import Stability, stability
     from flybystab.catalogues.asteroid import Asteroid
     from flybystab.catalogues.catalogue import catalogue
     from flybystab.encounter.attitude import periapsis_axes

@@ -226,13 +226,16 @@ def _address(kind: type) -> str:
 
 
 def _class(address: str) -> type:
-    """Class of an address ``module:Name``: a dataclass, named tuple or enumeration that is defined in that module."""
+    """Class of an address ``module:Name``: a dataclass, named tuple or enumeration of the package in that module.
+
+    Classes that were moved are found under their former address if that module still imports them.
+    """
     module, _, name = address.rpartition(":")
     module = module or KNOWN[name]
     if not _MODULE.fullmatch(module):
         raise KeyError(address)
     kind = getattr(import_module(module), name, None)
-    if not isinstance(kind, type) or kind.__module__ != module:
+    if not isinstance(kind, type) or not _MODULE.fullmatch(kind.__module__):
         raise KeyError(address)
     if not (is_dataclass(kind) or hasattr(kind, "_fields") or issubclass(kind, Enum)):
         raise KeyError(address)

@@ -6,8 +6,9 @@ import pytest
 
 from flybystab.body.body import Body, Material
 from flybystab.body.equilibrium import equilibrium
+from flybystab.body.perturbation import push
 from flybystab.body.recovery import pushed, recovery, recovery_energy
-from flybystab.body.stability import push, stability
+from flybystab.body.stability import stability
 from flybystab.constants import G
 from flybystab.errors import InvalidInput
 

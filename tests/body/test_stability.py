@@ -9,8 +9,9 @@ from scipy.optimize import minimize
 from flybystab.body.body import YIELD_SURFACES, Body, Material
 from flybystab.body.equilibrium import equilibrium, spin_limits
 from flybystab.body.fluids import maclaurin
+from flybystab.body.perturbation import body_units, push
 from flybystab.body.recovery import pushed, recovery_energy
-from flybystab.body.stability import body_units, push, stability
+from flybystab.body.stability import stability
 from flybystab.body.stability_regions import stability_many
 from flybystab.constants import G
 from flybystab.core.ellipsoid.tide import components, tensor

@@ -10,7 +10,7 @@ from astropy.time import Time
 
 import flybystab as fs
 from flybystab.catalogues.catalogue import catalogue
-from flybystab.catalogues.readers.conversion import covariance_of
+from flybystab.catalogues.readers.covariances import covariance_of
 from flybystab.constants import AU, DAY
 from flybystab.errors import InvalidInput
 from flybystab.orbit.elements import GM_TOTAL

@@ -15,7 +15,8 @@ from astropy.units import Quantity
 from numpy.typing import ArrayLike, NDArray
 
 from flybystab.body.body import DEFAULT_SURFACE, YIELD_SURFACES, Body, refuse_cut_off
-from flybystab.body.stability import LEVELS, flow_cohesion
+from flybystab.body.perturbation import flow_cohesion
+from flybystab.body.stability import LEVELS
 from flybystab.constants import G
 from flybystab.core.ellipsoid.potential import carlson_fd
 from flybystab.core.energy import stability_row as columns

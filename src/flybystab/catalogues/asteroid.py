@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -13,14 +13,13 @@ import numpy as np
 from astropy.time import Time
 from astropy.units import Quantity
 
-from flybystab.arguments import check_arguments, finite, vector
+from flybystab.arguments import check_arguments, vector
 from flybystab.body.body import Body, Material
 from flybystab.body.shape import Shape
-from flybystab.catalogues.covariance_files import embedded_covariance
-from flybystab.catalogues.record import BODILY, ORBIT, ORBIT_SI, ORBITAL, PERIHELION, SHAPE, Record
+from flybystab.catalogues.catalogued_orbit import catalogued_orbit, epoch_of
+from flybystab.catalogues.record import BODILY, ORBITAL, SHAPE, Record
 from flybystab.catalogues.spin_solutions import SpinSolution, solutions_of
 from flybystab.catalogues.tumbling import attitude_matrix, ecliptic_direction, free_spin, tumbling_state
-from flybystab.constants import DAY
 from flybystab.errors import InvalidInput
 from flybystab.typing import Array
 from flybystab.units import to_si
@@ -31,13 +30,6 @@ if TYPE_CHECKING:
 
 #: Version of the embedded catalogue: date of its newest source.
 CATALOGUE_DATE = "2026-07"
-
-
-@lru_cache(maxsize=64)
-def _day(jd: float) -> Time:
-    """Time (TDB) from a Julian date; cached, since most rows of a catalogue have the same epoch."""
-    whole = np.floor(jd)
-    return Time(whole, jd - whole, format="jd", scale="tdb")
 
 
 @dataclass(frozen=True, eq=False, init=False)
@@ -181,17 +173,9 @@ class Asteroid(Record):
         """
         if not isinstance(shape, Shape):
             raise InvalidInput("shape", shape, "a flybystab.Shape")
-        row = dict(self.row)
-        for column, length in zip(SHAPE, shape.ellipsoid().value.tolist(), strict=True):
-            sigma = column.removesuffix("_m") + "_sigma_m"
-            if self.knows(column, sigma):
-                row[sigma] = repr(self._number(sigma) / self._number(column) * length)
-            row[column] = repr(length)
-        row["shape_kind"] = "measured"
-        row["semi_axes_source"] = f"equivalent ellipsoid of a polyhedron of {len(shape.facets)} facets"
-        row["diameter_m"] = repr(2.0 * float(shape.mean_radius.value))
-        row["assumed"] = ";".join(c for c in self.assumed if not c.startswith(("semi_axis", "diameter")))
-        return replace(self, row=row)
+        from flybystab.catalogues import given as columns
+
+        return replace(self, row=dict(self.row) | columns.shape_columns(self, shape))
 
     def with_physical(self, *files: str | Path) -> Asteroid:
         """The same asteroid with its physical parameters replaced by those in files, each with its source.
@@ -238,23 +222,12 @@ class Asteroid(Record):
             Ratios ``J1/J3`` and ``J2/J3`` of the moments of inertia. The semi-axes are replaced by those of the
             homogeneous ellipsoid with these ratios and the same volume.
         """
-        row = dict(self.row)
-        for column, value in (
-            ("precession_period_h", precession_period),
-            ("rotation_period_h", rotation_period),
-        ):
-            row[column] = repr(to_si(value, u.h, column, low=0.0, open_low=True))
-        row["tumbling_mode"] = mode
+        from flybystab.catalogues import given as columns
+
+        changed = columns.tumbling_columns(precession_period, rotation_period, mode)
         if inertia is not None:
-            if np.shape(inertia) != (2,):
-                raise InvalidInput("inertia", inertia, "two ratios of moments of inertia")
-            first, second = (finite(x, "inertia") for x in inertia)
-            if not (0.0 < first <= second <= 1.0 < first + second):
-                raise InvalidInput("inertia", inertia, "0 < J1/J3 <= J2/J3 <= 1 < J1/J3 + J2/J3")
-            squares = np.array([second + 1.0 - first, first + 1.0 - second, first + second - 1.0])
-            axes = np.sqrt(squares) * np.cbrt(np.prod(self.semi_axes.value) / np.sqrt(np.prod(squares)))
-            row.update(zip(SHAPE, map(repr, axes.tolist()), strict=True))
-        return replace(self, row=row)
+            changed |= columns.inertia_columns(self.semi_axes, inertia)
+        return replace(self, row=dict(self.row) | changed)
 
     def __reduce__(self) -> tuple[type[Asteroid], tuple[object, ...]]:
         # Excludes the cached orbit and body, which are rebuilt when needed.
@@ -278,7 +251,7 @@ class Asteroid(Record):
     @property
     def epoch(self) -> Time:
         """Epoch of the elements, TDB."""
-        return _day(self._number("epoch_jd_tdb"))
+        return epoch_of(self)
 
     @cached_property
     def orbit(self) -> Orbit:
@@ -290,59 +263,7 @@ class Asteroid(Record):
         diagonal matrix from the 1-sigmas of the row, marked as uncorrelated; an estimate from printed digits and U
         (:mod:`flybystab.catalogues.orbit_errors`). Otherwise it is None.
         """
-        from flybystab.orbit.forces import NonGravitational, au_per_day2
-        from flybystab.orbit.orbit import Orbit
-
-        if self.own_orbit is not None:
-            return self.own_orbit
-        epoch = self.epoch
-        a1, a2, a3 = (
-            au_per_day2(self._number(c)) if self.row.get(c) else 0.0
-            for c in ("A1_au_d2", "A2_au_d2", "A3_au_d2")
-        )
-        delay = self._number("DT_d") * DAY if self.row.get("DT_d") else 0.0
-        area = self._number("AMRAT_m2_kg") if self.row.get("AMRAT_m2_kg") else 0.0
-        nongrav = NonGravitational((a1, a2, a3), self.row.get("nongrav_law") or "asteroid", delay, area)
-        _ = nongrav.constants  # raises for an unknown law
-        if self.knows(*PERIHELION) and not self.knows("a_au", "M_deg"):
-            state = self._state_by_perihelion()
-            r, v = state[:3] * u.m, state[3:] * u.m / u.s
-            return Orbit(epoch, r, v, nongrav=nongrav, name=self.name, covariance=self.covariance)
-        elements = [self._number(c) * unit for c, unit in zip(ORBIT[1:], ORBIT_SI.tolist(), strict=True)]
-        return Orbit._from_si_elements(epoch, elements, nongrav, self.name, self._covariance(epoch))
-
-    def _state_by_perihelion(self) -> Array:
-        """Heliocentric state (m, m/s), shape (6,), from perihelion distance and time, for any conic."""
-        from flybystab.constants import AU
-        from flybystab.orbit.elements import state_from_elements
-
-        i, node, peri = (float(np.radians(self._number(c))) for c in ("i_deg", "node_deg", "peri_deg"))
-        since = (self._number("epoch_jd_tdb") - self._number("tp_jd_tdb")) * DAY
-        return state_from_elements(self._number("q_au") * AU, self._number("e"), i, node, peri, since)
-
-    def _covariance(self, epoch: Time) -> Covariance | None:
-        if self.covariance is not None:
-            return self.covariance
-        if self.file.startswith("embedded") and (known := embedded_covariance(self.row.get("number", ""))):
-            return known
-        sigmas = tuple("sigma_" + c for c in ORBIT[1:])
-        # Sigmas that are all zero denote unknown errors.
-        if not self.knows(*sigmas) or not any(self._number(c) for c in sigmas):
-            from flybystab.catalogues.orbit_errors import error_of
-
-            return error_of(self.row, epoch)
-        from flybystab.orbit.covariance import SETS, Covariance
-
-        sigma = np.array([self._number(c) for c in sigmas]) * ORBIT_SI
-        source = self.row.get("sigma_source") or self.row.get("orbit_source") or self.file
-        return Covariance(
-            epoch,
-            SETS["keplerian"],
-            np.array([self._number(c) for c in ORBIT[1:]]) * ORBIT_SI,
-            np.diag(sigma**2),
-            f"1-sigmas without correlations, {source}",
-            correlated=False,
-        )
+        return catalogued_orbit(self, self.covariance) if self.own_orbit is None else self.own_orbit
 
     @property
     def tumbles(self) -> bool:

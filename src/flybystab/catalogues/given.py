@@ -9,9 +9,11 @@ import astropy.units as u
 import numpy as np
 from astropy.units import Quantity
 
+from flybystab.arguments import finite
 from flybystab.body.body import Body, check_body
+from flybystab.body.shape import Shape
 from flybystab.catalogues.readers.conversion import state_row
-from flybystab.catalogues.record import SHAPE
+from flybystab.catalogues.record import SHAPE, Record
 from flybystab.errors import InvalidInput, UnknownName
 from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.osculating_state import heliocentric
@@ -81,6 +83,58 @@ def pole_columns(pole: Quantity) -> dict[str, str]:
         "pole_ecl_lon_deg": repr(float(np.degrees(longitude))),
         "pole_ecl_lat_deg": repr(float(np.degrees(latitude))),
     }
+
+
+def shape_columns(record: Record, shape: Shape) -> dict[str, str]:
+    """Columns of the equivalent ellipsoid of a shape; relative errors of the semi-axes are kept from the row."""
+    row = {}
+    for column, length in zip(SHAPE, shape.ellipsoid().value.tolist(), strict=True):
+        sigma = column.removesuffix("_m") + "_sigma_m"
+        if record.knows(column, sigma):
+            row[sigma] = repr(record._number(sigma) / record._number(column) * length)
+        row[column] = repr(length)
+    row["shape_kind"] = "measured"
+    row["semi_axes_source"] = f"equivalent ellipsoid of a polyhedron of {len(shape.facets)} facets"
+    row["diameter_m"] = repr(2.0 * float(shape.mean_radius.value))
+    row["assumed"] = ";".join(c for c in record.assumed if not c.startswith(("semi_axis", "diameter")))
+    return row
+
+
+def tumbling_columns(precession_period: Quantity, rotation_period: Quantity, mode: str) -> dict[str, str]:
+    """Columns of a tumbling solution: periods ``P_phi`` and ``P_psi``, and the mode."""
+    row = {"tumbling_mode": mode}
+    for column, value in (
+        ("precession_period_h", precession_period),
+        ("rotation_period_h", rotation_period),
+    ):
+        row[column] = repr(to_si(value, u.h, column, low=0.0, open_low=True))
+    return row
+
+
+def inertia_columns(semi_axes: Quantity, inertia: tuple[float, float]) -> dict[str, str]:
+    """Columns of the semi-axes of a homogeneous ellipsoid with given ratios of its moments of inertia.
+
+    Parameters
+    ----------
+    semi_axes : Quantity (3,)
+        Semi-axes whose volume is kept, m.
+    inertia : (float, float)
+        ``J1/J3`` and ``J2/J3``.
+
+    Raises
+    ------
+    InvalidInput
+        No ellipsoid has these ratios.
+    """
+    if np.shape(inertia) != (2,):
+        raise InvalidInput("inertia", inertia, "two ratios of moments of inertia")
+    first, second = (finite(x, "inertia") for x in inertia)
+    if not (0.0 < first <= second <= 1.0 < first + second):
+        raise InvalidInput("inertia", inertia, "0 < J1/J3 <= J2/J3 <= 1 < J1/J3 + J2/J3")
+    # J1 = m (b^2 + c^2)/5 and cyclic, so that a^2 is proportional to J2 + J3 - J1.
+    squares = np.array([second + 1.0 - first, first + 1.0 - second, first + second - 1.0])
+    axes = np.sqrt(squares) * np.cbrt(np.prod(semi_axes.value) / np.sqrt(np.prod(squares)))
+    return dict(zip(SHAPE, map(repr, axes.tolist()), strict=True))
 
 
 def error_columns(sigmas: Mapping[str, Quantity]) -> dict[str, str]:

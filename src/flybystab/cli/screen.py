@@ -116,7 +116,7 @@ def run_study(
     asteroids = listed(names or None)
     if options.shape:
         if len(asteroids) != 1:
-            raise WrongUsage(f"--shape: expected with a single asteroid, not with {len(asteroids)}")
+            raise WrongUsage(f"--shape: expected with one asteroid, not with {len(asteroids)}")
         asteroids = (shaped(asteroids[0], options),)
     screening = Screening(
         asteroids,

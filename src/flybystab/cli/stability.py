@@ -45,11 +45,9 @@ def arguments(sub: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> None:
     """Execute the command."""
     if options.all and options.shape:
-        raise WrongUsage("--shape: expected with a single asteroid, not with --all")
+        raise WrongUsage("--shape: expected with one asteroid, not with --all")
     if options.all and options.catalogue:
-        raise WrongUsage(
-            "--catalogue: expected with a single asteroid; for a whole file use stability --all FILE"
-        )
+        raise WrongUsage("--catalogue: expected with one asteroid; for a whole file use stability --all FILE")
     if options.all:
         _catalogue(options)
     elif options.name is None:

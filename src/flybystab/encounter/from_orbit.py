@@ -119,6 +119,30 @@ def _periapsis(
     return _Periapsis(t, q, excess2, float(np.sqrt(excess2 + 2.0 * gm / q)), body.impact_level(q), entry)
 
 
+class _Span(NamedTuple):
+    """Span of an encounter: distance at the start (m); start, stop and end of the track (s from the epoch)."""
+
+    distance: float
+    start: float
+    stop: float
+    end: float
+
+
+def _span(
+    log: Array, window: Window, index: int, body: Planet, at: _Periapsis, start: float | None, wait: float
+) -> _Span:
+    """From the distance `start` (m; None: the default), inbound, to the same distance outbound and `wait` s longer.
+
+    An impact ends both the encounter and the track.
+    """
+    beyond = start_beyond(start, body, at.q)
+    t_in, t_out = ends_of_encounter(log, window, index, beyond, at.t if at.entry is None else at.entry)
+    distance = float(np.linalg.norm(state_in_log(log, window, index, t_in)[:3]))
+    if at.entry is not None:
+        return _Span(distance, t_in, at.entry, at.entry)
+    return _Span(distance, t_in, t_out + wait, t_out + wait + TAIL)
+
+
 def _panels(
     tide: Callable[[Array], Array], start: float, stop: float, tau: float
 ) -> tuple[TidePanels, float]:
@@ -149,19 +173,21 @@ def _tide(
     index: int,
     body: Planet,
     zero: float,
-    times: tuple[float, float, float],
+    span: _Span,
     tau: float,
     accuracy: float,
 ) -> _Tide:
     """The tide of the planet and of the sources above a relative `accuracy`, on the clock of closest approach.
 
-    `times` are the start and the end of the encounter and the end of the track, s from the epoch of the window.
+    `zero` is the time of closest approach, s from the epoch of the window; `tau` the time scale of the panels, s.
     """
-    start, stop, end = times
-    sources, kept, dropped = chosen_sources(track, window, index, body, zero, start, stop, accuracy)
+    sources, kept, dropped = chosen_sources(track, window, index, body, zero, span.start, span.stop, accuracy)
     axis = np.array(body.pole_at(window.epoch))
     panels, error = _panels(
-        lambda t: tide_of(track, window, index, body, axis, zero, t, sources), start - zero, end - zero, tau
+        lambda t: tide_of(track, window, index, body, axis, zero, t, sources),
+        span.start - zero,
+        span.end - zero,
+        tau,
     )
     return _Tide(panels, error, kept, dropped)
 
@@ -182,36 +208,32 @@ def _around(
     """The encounter around a closest approach."""
     index = BODIES.index(body.name)
     at = _periapsis(float(window.gm[index]), body, approach, contact)
-    zero, q, entry, log = at.t, at.q, at.entry, approach.log
-    tau = max(q, 0.01 * body.radius) / at.speed
-    start = start_beyond(start, body, q)
-    t_in, t_out = ends_of_encounter(log, window, index, start, zero if entry is None else entry)
-    start = float(np.linalg.norm(state_in_log(log, window, index, t_in)[:3]))
-    stop = t_out + wait if entry is None else entry
-    end = stop + TAIL if entry is None else entry
-    row = max(int(np.searchsorted(log[:, TIME], t_in, side="right")) - 1, 0)
-    flight = Flight(model(window, approach.forces, orbit.nongrav), log[row, TIME], log[row, STATE])
-    track = panel_track(relative_to(flight, window, index, zero), t_in - zero, end - zero, tau)
-    tide = _tide(track, window, index, body, zero, (t_in, stop, end), tau, 0.1 * accuracy / q)
+    span = _span(approach.log, window, index, body, at, start, wait)
+    tau = max(at.q, 0.01 * body.radius) / at.speed
+    row = max(int(np.searchsorted(approach.log[:, TIME], span.start, side="right")) - 1, 0)
+    forces = model(window, approach.forces, orbit.nongrav)
+    flight = Flight(forces, approach.log[row, TIME], approach.log[row, STATE])
+    track = panel_track(relative_to(flight, window, index, at.t), span.start - at.t, span.end - at.t, tau)
+    tide = _tide(track, window, index, body, at.t, span, tau, 0.1 * accuracy / at.q)
     return cls(
         planet=body,
-        time=later(window.epoch, zero),
-        distance=(q * u.m).to(u.km),
+        time=later(window.epoch, at.t),
+        distance=(at.q * u.m).to(u.km),
         v_inf=(np.sqrt(max(at.excess2, 0.0)) * u.m / u.s).to(u.km / u.s),
         v_periapsis=(at.speed * u.m / u.s).to(u.km / u.s),
-        start_distance=(start * u.m).to(u.km),
-        impact=entry is not None,
+        start_distance=(span.distance * u.m).to(u.km),
+        impact=at.entry is not None,
         impact_level=at.level,
-        impact_time=None if entry is None else entry - zero,
+        impact_time=None if at.entry is None else at.entry - at.t,
         frame="ICRF",
         forces=(*(f"orbit: {n}" for n in approach.forces), *(f"tide: {n}" for n in tide.kept)),
         left_out=(
-            *((f"orbit: {n}", v / q) for n, v in size.items() if n not in approach.forces and v > 1e-6),
+            *((f"orbit: {n}", v / at.q) for n, v in size.items() if n not in approach.forces and v > 1e-6),
             *tide.dropped,
         ),
         tide_error=tide.error,
-        t_start=t_in - zero,
-        t_stop=stop - zero,
+        t_start=span.start - at.t,
+        t_stop=span.stop - at.t,
         tide=tide.panels,
         track=track,
         distance_error=(errors.distance * u.m).to(u.km),
@@ -220,7 +242,7 @@ def _around(
         growth=errors.growth,
         neighbour=errors.beside.label,
         predictability=predictability(
-            max(q, body.impact_distance if at.level is not None else 0.0),
+            max(at.q, body.impact_distance if at.level is not None else 0.0),
             errors.displacement,
             errors.model,
             errors.distance,

@@ -16,7 +16,7 @@ import numpy as np
 from astropy.units import Quantity
 
 from flybystab.body.body import Body, check_body, refuse_cut_off
-from flybystab.body.stability import body_units, flow_cohesion
+from flybystab.body.perturbation import body_units, flow_cohesion
 from flybystab.body.stability_regions import stability_many
 from flybystab.core.ellipsoid.tide import tensor
 from flybystab.core.energy.newmark import driving_stress, slide

@@ -12,7 +12,7 @@ import numpy as np
 from astropy.units import Quantity
 
 from flybystab.body.bounds import Requirements
-from flybystab.body.stability import Push
+from flybystab.body.perturbation import Push
 from flybystab.body.surface_history import SurfaceHistory
 from flybystab.body.surface_slope import SlopeChange, SurfaceSlopes
 from flybystab.encounter.distribution import EncounterDistribution

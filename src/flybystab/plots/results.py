@@ -12,7 +12,8 @@ from matplotlib.axes import Axes  # evaluated with the annotations by singledisp
 from numpy.typing import ArrayLike
 
 from flybystab.body.bounds import Requirements
-from flybystab.body.stability import Push, Stability
+from flybystab.body.perturbation import Push
+from flybystab.body.stability import Stability
 from flybystab.body.surface_history import SurfaceHistory
 from flybystab.body.surface_slope import SlopeChange, SurfaceSlopes
 from flybystab.encounter.distribution import EncounterDistribution

@@ -12,7 +12,8 @@ from astropy.units import Quantity
 from flybystab.body.body import DEFAULT_SURFACE, Body, Material
 from flybystab.body.equilibrium import failure_distance, spin_limits
 from flybystab.body.fluids import jacobi, maclaurin
-from flybystab.body.stability import push, stability
+from flybystab.body.perturbation import push
+from flybystab.body.stability import stability
 from flybystab.body.stability_regions import stability_map
 from flybystab.constants import G
 from flybystab.plots.labels import label_points

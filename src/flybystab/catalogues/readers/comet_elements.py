@@ -13,7 +13,8 @@ from typing import TYPE_CHECKING
 
 from flybystab.catalogues.designations import name_columns, unpacked
 from flybystab.catalogues.readers import Contents, reader
-from flybystab.catalogues.readers.conversion import COMETARY, number, perihelion_row, printed_covariance
+from flybystab.catalogues.readers.conversion import COMETARY, number, perihelion_row
+from flybystab.catalogues.readers.covariances import printed_covariance
 from flybystab.catalogues.readers.parameters import (
     check_parameters,
     looks_like_parameter,

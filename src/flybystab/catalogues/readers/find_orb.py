@@ -17,15 +17,10 @@ import numpy as np
 
 from flybystab.catalogues.designations import name_columns
 from flybystab.catalogues.readers import Contents, reader
-from flybystab.catalogues.readers.conversion import (
-    CARTESIAN,
-    covariance_of,
-    elements_row,
-    number,
-)
+from flybystab.catalogues.readers.conversion import CARTESIAN, elements_row, number
+from flybystab.catalogues.readers.covariances import covariance_of, sigmas_of
 from flybystab.catalogues.readers.nongravitational import nongravitational_columns
 from flybystab.catalogues.readers.parameters import check_parameters, looks_like_parameter
-from flybystab.catalogues.readers.sigmas import sigmas_of
 from flybystab.errors import InvalidInput
 from flybystab.files import parse_json
 from flybystab.typing import Document

@@ -22,15 +22,14 @@ from flybystab.catalogues.readers.conversion import (
     COMETARY,
     KEPLERIAN,
     MJD,
-    cartesian_covariance,
     elements_row,
     heliocentric_state,
     number,
-    printed_covariance,
     rotated,
     state_of,
     state_row,
 )
+from flybystab.catalogues.readers.covariances import cartesian_covariance, printed_covariance
 from flybystab.catalogues.readers.parameters import check_parameters, looks_like_parameter
 from flybystab.errors import InvalidInput
 from flybystab.files import csv_rows

@@ -17,15 +17,14 @@ from flybystab.catalogues.designations import is_comet, name_columns
 from flybystab.catalogues.readers import Contents, reader
 from flybystab.catalogues.readers.conversion import (
     CARTESIAN,
-    decimals_of,
     elements_row,
     heliocentric_state,
     number,
-    printed_covariance,
     rotated,
     state_of,
     state_row,
 )
+from flybystab.catalogues.readers.covariances import decimals_of, printed_covariance
 from flybystab.catalogues.readers.nongravitational import nongravitational_columns
 from flybystab.catalogues.readers.parameters import check_parameters, looks_like_parameter
 from flybystab.constants import AU, DAY

@@ -12,12 +12,8 @@ from typing import TYPE_CHECKING
 
 from flybystab.catalogues.designations import name_columns
 from flybystab.catalogues.readers import Contents, reader
-from flybystab.catalogues.readers.conversion import (
-    MJD,
-    elements_row,
-    number,
-    printed_covariance,
-)
+from flybystab.catalogues.readers.conversion import MJD, elements_row, number
+from flybystab.catalogues.readers.covariances import printed_covariance
 from flybystab.catalogues.readers.parameters import check_parameters
 from flybystab.errors import InvalidInput
 

@@ -16,13 +16,8 @@ import numpy as np
 
 from flybystab.catalogues.designations import name_columns
 from flybystab.catalogues.readers import Contents, reader
-from flybystab.catalogues.readers.conversion import (
-    CARTESIAN,
-    MJD,
-    covariance_of,
-    elements_row,
-    number,
-)
+from flybystab.catalogues.readers.conversion import CARTESIAN, MJD, elements_row, number
+from flybystab.catalogues.readers.covariances import covariance_of
 from flybystab.catalogues.readers.nongravitational import ORBFIT_AREA, nongravitational_columns
 from flybystab.catalogues.readers.parameters import check_parameters
 from flybystab.errors import InvalidInput

@@ -11,13 +11,8 @@ from typing import TYPE_CHECKING
 from flybystab.catalogues.designations import is_comet, name_columns
 from flybystab.catalogues.readers import Contents, reader
 from flybystab.catalogues.readers.arcs import arc_columns
-from flybystab.catalogues.readers.conversion import (
-    COLUMN_OF,
-    KEPLERIAN,
-    number,
-    perihelion_row,
-    printed_covariance,
-)
+from flybystab.catalogues.readers.conversion import COLUMN_OF, KEPLERIAN, number, perihelion_row
+from flybystab.catalogues.readers.covariances import printed_covariance
 from flybystab.catalogues.readers.parameters import check_parameters, looks_like_parameter
 from flybystab.errors import InvalidInput
 from flybystab.files import parse_json

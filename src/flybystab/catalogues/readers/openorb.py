@@ -17,16 +17,8 @@ import numpy as np
 
 from flybystab.catalogues.designations import name_columns
 from flybystab.catalogues.readers import Contents, reader
-from flybystab.catalogues.readers.conversion import (
-    CARTESIAN,
-    COMETARY,
-    KEPLERIAN,
-    MJD,
-    covariance_of,
-    elements_row,
-    number,
-    printed_covariance,
-)
+from flybystab.catalogues.readers.conversion import CARTESIAN, COMETARY, KEPLERIAN, MJD, elements_row, number
+from flybystab.catalogues.readers.covariances import covariance_of, printed_covariance
 from flybystab.catalogues.readers.parameters import check_parameters, named_parameters
 from flybystab.errors import InvalidInput
 

@@ -17,19 +17,15 @@ import numpy as np
 from flybystab.catalogues.designations import is_comet, name_columns, names_of
 from flybystab.catalogues.readers import FRAME, Contents, header_of, reader, rows_of
 from flybystab.catalogues.readers.arcs import arc_columns
-from flybystab.catalogues.readers.conversion import (
-    MJD,
-    axis_of,
+from flybystab.catalogues.readers.conversion import MJD, axis_of, number, perihelion_row, since_perihelion
+from flybystab.catalogues.readers.covariances import (
     covariance_of,
-    number,
-    perihelion_row,
     printed_covariance,
     printed_sigmas,
-    since_perihelion,
+    sigmas_of,
 )
 from flybystab.catalogues.readers.nongravitational import nongravitational_columns
 from flybystab.catalogues.readers.parameters import check_parameters, looks_like_parameter
-from flybystab.catalogues.readers.sigmas import sigmas_of
 from flybystab.errors import InvalidInput
 from flybystab.files import parse_json
 from flybystab.orbit.covariance import DIGITS

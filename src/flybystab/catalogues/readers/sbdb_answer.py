@@ -19,17 +19,15 @@ from flybystab.catalogues.readers.arcs import arc_columns
 from flybystab.catalogues.readers.conversion import (
     COLUMN_OF,
     KEPLERIAN,
-    covariance_of,
     equatorial_to_ecliptic,
     julian,
     number,
     perihelion_row,
-    printed_covariance,
 )
+from flybystab.catalogues.readers.covariances import covariance_of, printed_covariance, sigmas_of
 from flybystab.catalogues.readers.nongravitational import COLUMN_OF_PARAMETER, nongravitational_columns
 from flybystab.catalogues.readers.parameters import check_parameters
 from flybystab.catalogues.readers.sbdb import check_frame, comet_orbit, thousandfold
-from flybystab.catalogues.readers.sigmas import sigmas_of
 from flybystab.constants import G
 from flybystab.errors import InvalidInput
 from flybystab.files import parse_json
