@@ -187,8 +187,10 @@ def test_static_failure_distance_of_a_sphere(phi, surface):
     p = carried(body, 0.0, span, tide, tolerance=1e-10)
     assert p.events[0][0] == "onset"
     reached = (4.0 / 3.0 * RATE**2 / (2.0 * failure * p.events[0][1] / span)) ** (1.0 / 3.0)
-    assert reached == pytest.approx(distance, rel=1e-9)
-    assert np.rad2deg(p.events[0][2]) == pytest.approx(-30.0, abs=1e-6)
+    # The Lode angle comes from the invariants of the stress. At a corner of the surface their rounding errors of 1e-16
+    # are errors of some 1e-8 rad in the angle, and thus in the Mohr-Coulomb strength; on the cone it does not enter.
+    assert reached == pytest.approx(distance, rel=1e-12 if surface == "drucker-prager" else 1e-8)
+    assert p.events[0][2] == pytest.approx(-np.pi / 6.0, abs=5e-8)
 
 
 def test_dispersed_grains_keep_momentum_and_energy():
