@@ -7,7 +7,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import fields, is_dataclass
+from dataclasses import MISSING, fields, is_dataclass
 from html import escape
 from importlib import import_module
 from pathlib import Path
@@ -238,6 +238,8 @@ class Tabular(Results):
             if f.name in values or not f.init:
                 continue
             if f.name not in columns:
+                if f.name not in meta and f.default is not MISSING:
+                    continue  # a field that the version that wrote the file did not have
                 values[f.name] = decoded(meta[f.name])
                 continue
             column = columns[f.name]

@@ -50,7 +50,7 @@ def test_probabilities_come_before_the_catalogue_values():
     assert s.expected == {"INTACT": 0.6, "NOT IN EQUILIBRIUM": 0.4}
     lines = s.text().splitlines()
     assert lines[:3] == ["1 encounter", "probability over the samples", "  INTACT: 0.6"]
-    assert lines[4] == "at the catalogue values (1 of 1 of bodies with assumed properties)"
+    assert lines[4] == "at the catalogue values (1 of 1 encounter with assumed properties of the body)"
     assert lines[5] == "  NOT IN EQUILIBRIUM: 1"
     assert "P(intact) 0.6; NOT IN EQUILIBRIUM (density, spin period assumed)" in s.text()
     assert "inf" not in s.text()
@@ -61,7 +61,9 @@ def test_summary_without_samples_says_how_to_get_probabilities():
     row = ROWS[0] | {"samples": 0, "assumed": "density"}
     s = summary(table_of([row], COLUMNS, {}))
     assert s.expected == {}
-    assert "1 of 1 of bodies with assumed properties; --samples 100 gives probabilities" in s.text()
+    assert (
+        "1 of 1 encounter with assumed properties of the body; --samples 100 gives probabilities" in s.text()
+    )
 
 
 def test_summary_of_a_file_and_its_figure(tmp_path):

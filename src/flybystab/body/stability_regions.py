@@ -24,6 +24,7 @@ from flybystab.core.energy.potential import GRAVITY
 from flybystab.core.energy.stability_row import classify_many
 from flybystab.core.numerics.threads import in_order, worker_count
 from flybystab.errors import InvalidInput, UnknownName
+from flybystab.progress import Progressing, progress_bar
 from flybystab.typing import Array
 from flybystab.units import to_si
 
@@ -80,6 +81,7 @@ def stability_many(
     depth: str = "barrier",
     workers: int | None = None,
     threads: int | None = None,
+    progress: Progressing = None,
 ) -> StabilityTable:
     """Stability of many bodies with one yield surface.
 
@@ -97,6 +99,8 @@ def stability_many(
         Number of threads; one per processor by default.
     threads : int, optional
         Deprecated name of `workers`.
+    progress : bool or function, optional
+        Whether to show a bar (:mod:`flybystab.progress`); after two seconds on a terminal by default.
 
     Returns
     -------
@@ -134,6 +138,7 @@ def stability_many(
         dilatancy,
         depth,
         worker_count(workers, threads),
+        progress,
     )
     return _table(out, stress, stress * length**3, u.Pa, u.J)
 
@@ -150,6 +155,7 @@ def stability_map(
     depth: str = "second",
     workers: int | None = None,
     threads: int | None = None,
+    progress: Progressing = None,
 ) -> StabilityTable:
     """Stability over axis ratios and spin, in units of the body itself.
 
@@ -162,7 +168,7 @@ def stability_map(
         Of the material.
     cohesion : float
         In ``pi G rho^2 a^2``, ``a`` the mean radius.
-    yield_surface, dilatancy, depth, workers, threads
+    yield_surface, dilatancy, depth, workers, threads, progress
         As in :func:`stability_many`.
 
     Returns
@@ -198,6 +204,7 @@ def stability_map(
         dilatancy,
         depth,
         worker_count(workers, threads),
+        progress,
     )
     scaled = s / np.cbrt(s.prod(axis=1))[:, None]
     binding = np.array([2.0 * GRAVITY * carlson_fd(*row)[0] if row[0] > 0 else np.nan for row in scaled])
@@ -216,6 +223,7 @@ def _rows(
     dilatancy: float,
     depth: str,
     workers: int,
+    progress: Progressing,
 ) -> Array:
     if depth not in DEPTHS:
         raise UnknownName("depth", str(depth), get_close_matches(str(depth), DEPTHS), f"(known: {DEPTHS})")
@@ -233,7 +241,9 @@ def _rows(
             s_, spin_, code, phi_, cohesion_, in_flow_, beta, kappa_, DEPTHS.index(depth), out[part]
         )
 
-    list(in_order(work, range(0, n, size), workers))
+    with progress_bar(progress, n, "bodies", "stability") as tick:
+        for k, _ in enumerate(in_order(work, range(0, n, size), workers), start=1):
+            tick(min(k * size, n))
     return out
 
 

@@ -193,7 +193,7 @@ def _impact(
         "distance": float(best[1]),
         "sigma": sigma,
         "stretching": stretch,
-        "width": float(np.sqrt(across @ covariance @ across)),
+        "width": float(np.linalg.norm(across @ matrix)),
         "v_inf": float(best[4]),
         "probability": disc_probability(best[2:4] - matrix @ z0, covariance, disc),
     }

@@ -26,6 +26,7 @@ from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput, NotConverged
 from flybystab.flybys.binary_figures import Figures, averaged, rotation_matrices, synchronous
 from flybystab.flybys.binary_figures import rates as figured
+from flybystab.flybys.subject import subject_of
 from flybystab.orbit.kepler import states_at_times
 from flybystab.tabular import Tabular
 from flybystab.typing import Array
@@ -65,6 +66,8 @@ class BinarySample(Tabular):
     tide_at_start : float
         Tide at the start of the encounter over ``G (m1 + m2)/a^3``: the size of the neglected tide before the start.
     seed : int
+    subject : str
+        Planet, encounter and primary.
     """
 
     semi_major_axis: Quantity
@@ -77,6 +80,7 @@ class BinarySample(Tabular):
     obliquity: Quantity
     tide_at_start: float
     seed: int
+    subject: str = ""
 
     def __len__(self) -> int:
         return len(self.fate)
@@ -173,7 +177,8 @@ def binary_flyby(
     last, closest, collided = _carried(state, encounter, unit, contact / a, figures)
     tide = float(np.linalg.norm(encounter.tidal_tensor(encounter.t_start)) * unit**2)
     turning = figures if companion is not None else None
-    return _sample(state, last, closest, collided, turning, a * u.m, tide, int(seed))
+    subject = f"{subject_of(primary, encounter)}, mutual orbit {a / 1e3:.4g} km"
+    return _sample(state, last, closest, collided, turning, a * u.m, tide, int(seed), subject)
 
 
 def _sample(
@@ -185,6 +190,7 @@ def _sample(
     length: Quantity,
     tide: float,
     seed: int,
+    subject: str,
 ) -> BinarySample:
     """Orbits and rotations before and after, from states in units of `length` and of the mutual orbit.
 
@@ -212,6 +218,7 @@ def _sample(
         obliquity=np.rad2deg(obliquity) * u.deg,
         tide_at_start=tide,
         seed=seed,
+        subject=subject,
     )
 
 

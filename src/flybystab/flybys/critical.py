@@ -19,6 +19,7 @@ from flybystab.encounter.attitude_at_periapsis import attitude_at_start
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput, UnknownName
 from flybystab.flybys.flyby_many import flyby_many
+from flybystab.flybys.subject import subject_of
 from flybystab.flybys.verdict import SEVERITY, Verdict
 from flybystab.progress import Progressing, progress_bar
 from flybystab.tabular import Tabular
@@ -87,6 +88,8 @@ class CriticalValues(Tabular):
     quantity, outcome : str
     range : tuple of Quantity
         Ends of the range that was searched.
+    subject : str
+        Planet, encounter and body, without the quantity that was varied.
     """
 
     phase: Quantity
@@ -95,6 +98,7 @@ class CriticalValues(Tabular):
     quantity: str
     outcome: str
     range: tuple[Quantity, Quantity]
+    subject: str = ""
 
     def __len__(self) -> int:
         return len(self.phase)
@@ -193,6 +197,7 @@ def critical(
         quantity=quantity,
         outcome=str(outcome),
         range=(float(grid[0]) * unit, float(grid[-1]) * unit),
+        subject=subject_of(body, encounter, varied=quantity),
     )
 
 

@@ -19,6 +19,7 @@ from flybystab.errors import InvalidInput
 from flybystab.flybys.rigid_course import rigid_course
 from flybystab.flybys.shape_spin import RotationState, free_rotation
 from flybystab.flybys.spin_sample import SpinStates, spin_states
+from flybystab.flybys.subject import subject_of
 from flybystab.progress import Progressing, progress_bar
 from flybystab.tabular import Tabular
 from flybystab.typing import Array
@@ -39,6 +40,8 @@ class SpinForecast(Tabular):
         Direction of the angular momentum in the frame of the encounter.
     pole_change : Quantity, shape (n,)
         Angle from the pole before, deg.
+    subject : str
+        Planet, encounter and body.
     """
 
     precession_period: Quantity
@@ -47,6 +50,7 @@ class SpinForecast(Tabular):
     mode: NDArray[np.str_]
     pole: Array
     pole_change: Quantity
+    subject: str = ""
 
     def __len__(self) -> int:
         return len(self.mode)
@@ -138,6 +142,7 @@ def spin_forecast(
         np.array([s.mode for s in after]),
         momenta / np.linalg.norm(momenta, axis=1)[:, None],
         np.rad2deg(change) * u.deg,
+        subject_of(asteroid, encounter),
     )
 
 

@@ -17,6 +17,7 @@ from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
 from flybystab.flybys.batch import TOLERANCE, body_rows
 from flybystab.flybys.flyby_many import flyby_many, follow_rows
+from flybystab.flybys.subject import subject_of
 from flybystab.progress import Progressing
 from flybystab.tabular import Tabular
 from flybystab.typing import Array
@@ -55,6 +56,8 @@ class SpinSample(Tabular):
     pole_known : bool
         Whether the catalogued pole was used; otherwise poles are isotropic.
     seed : int
+    subject : str
+        Planet, encounter and body.
     """
 
     spin_ratio: Array
@@ -64,6 +67,7 @@ class SpinSample(Tabular):
     attitude: Array
     pole_known: bool
     seed: int
+    subject: str = ""
 
     def __len__(self) -> int:
         return len(self.spin_ratio)
@@ -136,6 +140,7 @@ def spin_sample(
         attitude=attitudes,
         pole_known=known,
         seed=seed,
+        subject=subject_of(asteroid, encounter),
     )
 
 

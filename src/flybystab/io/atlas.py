@@ -19,6 +19,7 @@ import astropy.units as u
 import jinja2
 import numpy as np
 from astropy.table import QTable, Row
+from astropy.time import Time
 
 from flybystab._version import __version__
 from flybystab.arguments import check_arguments
@@ -32,6 +33,7 @@ from flybystab.screening.columns import VERDICTS, share_of
 from flybystab.screening.results import read_results
 from flybystab.screening.tables import write_table
 from flybystab.typing import Document
+from flybystab.units import number_of
 
 #: Columns of the list, and whether they are numeric.
 COLUMNS = (
@@ -184,11 +186,12 @@ def _index(pages: jinja2.Environment, table: QTable, entries: list[Document], ti
     asteroids = len({e["label"] for e in entries})
     settings = table.meta.get("settings", {})
     settings = settings if isinstance(settings, dict) else {}
-    span = f"{dates[0]} to {dates[-1]}" if dates else "no dates"
+    span = _span(settings, dates)
     summary = (
-        f"{len(entries)} encounters of {asteroids} asteroids, {span}. P(intact) is the fraction of INTACT among all "
-        "samples of the uncertain inputs, P(yield) the fraction that yields or reaches the planet among the samples in "
-        "equilibrium before the encounter. The verdict applies to the catalogue values and the chosen material."
+        f"{number_of(len(entries), 'encounter')} of {number_of(asteroids, 'asteroid')}, {span}. P(intact) is the "
+        "fraction of INTACT among all samples of the uncertain inputs, P(yield) the fraction that yields or reaches the "
+        "planet among the samples in equilibrium before the encounter. The verdict applies to the catalogue values and "
+        "the chosen material."
     )
     return pages.get_template("index.html").render(
         title=title or f"Encounters of asteroids, {span}",
@@ -200,8 +203,8 @@ def _index(pages: jinja2.Environment, table: QTable, entries: list[Document], ti
         columns=COLUMNS,
         entries=entries,
         provenance=[
-            ("flybystab", __version__),
-            *((name.replace("_", " "), _plain_text(settings[name])) for name in settings),
+            ("flybystab", str(settings.get("flybystab", __version__))),
+            *((k.replace("_", " "), _plain_text(settings[k])) for k in settings if k != "flybystab"),
             *(
                 (name.replace("_", " "), _plain_text(table.meta[name]))
                 for name in ("catalogue", "ephemeris", "time_scale", "frame", "nominal")
@@ -209,6 +212,18 @@ def _index(pages: jinja2.Environment, table: QTable, entries: list[Document], ti
             ),
         ],
     )
+
+
+def _span(settings: Document, dates: list[str]) -> str:
+    """Interval that was screened, or else that of the encounters."""
+    try:
+        first, last = (
+            str(Time(float(settings[f"{end}_jd_tdb"]), format="jd", scale="tdb").iso[:10])
+            for end in ("start", "stop")
+        )
+    except (KeyError, TypeError, ValueError):
+        return f"{dates[0]} to {dates[-1]}" if dates else "no dates"
+    return f"{first} to {last}"
 
 
 def _plain_text(value: object) -> str:

@@ -21,6 +21,7 @@ from flybystab.flybys.binary import BinarySample
 from flybystab.flybys.grains_outcome import GrainsCourse, GrainsOutcome
 from flybystab.flybys.spin_forecast import SpinForecast
 from flybystab.plots.flyby import BLACK, BLUE, ORANGE, RED
+from flybystab.plots.labels import subject_title
 from flybystab.typing import Array
 
 if TYPE_CHECKING:
@@ -146,7 +147,7 @@ def forecast_plot(axes: Axes, forecast: SpinForecast) -> Axes:
         xlabel="period after the encounter (h)", ylabel="fraction of the rotation phases", ylim=(0.0, 1.0)
     )
     axes.legend()
-    return axes
+    return subject_title(axes, forecast.subject)
 
 
 def binary_plot(axes: Axes, sample: BinarySample) -> Axes:
@@ -161,7 +162,7 @@ def binary_plot(axes: Axes, sample: BinarySample) -> Axes:
             axes.plot([], [], ls="none", label=f"{fate} ({np.sum(sample.fate == fate)}), not shown")
     axes.set(xlabel="semi-major axis of the mutual orbit (km)", ylabel="eccentricity", ylim=(0.0, None))
     axes.legend()
-    return axes
+    return subject_title(axes, sample.subject)
 
 
 def grains_outcome_plot(axes: Axes, outcome: GrainsOutcome) -> Axes:

@@ -34,6 +34,13 @@ def literal(name: str) -> str:
     return "".join(shown).replace("$", r"\$")
 
 
+def subject_title(axes: Axes, subject: str, detail: str = "") -> Axes:
+    """Title from the subject of a result: the encounter, the body and further details on one line each."""
+    lines = [part for part in (*subject.split("; ", 1), detail) if part]
+    axes.set_title("\n".join(literal(line) for line in lines), fontsize="medium")
+    return axes
+
+
 def label_points(
     axes: Axes, points: Sequence[tuple[float, float, str]], others: ArrayLike | None = None, **text: Any
 ) -> Axes:

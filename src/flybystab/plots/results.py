@@ -32,6 +32,7 @@ from flybystab.flybys.table import FlybyTable
 from flybystab.plots import distributions, screening
 from flybystab.plots.flyby import BLUE, axes_plot, described, flyby_panels, friction_plot, spin_plot
 from flybystab.plots.grains import grains_plot
+from flybystab.plots.labels import subject_title
 from flybystab.plots.outcome_map import outcome_plot, target_plot
 from flybystab.plots.population import rate_plot, verdict_plot
 from flybystab.plots.stability import barrier_plot
@@ -121,8 +122,8 @@ def _(result: TargetMap, axes: Axes) -> Axes:
 def _(result: SpinSample, axes: Axes) -> Axes:
     axes.scatter(result.pole_change.to_value(u.deg), result.spin_ratio, s=14, color=BLUE)
     axes.set(xlabel="rotation of the spin axis (deg)", ylabel="spin rate after / before")
-    axes.set_title(f"{len(result)} attitudes, pole {'known' if result.pole_known else 'unknown'}")
-    return axes
+    sample = f"{len(result)} attitudes, pole {'known' if result.pole_known else 'unknown'}"
+    return subject_title(axes, result.subject, sample)
 
 
 @_plot.register
@@ -131,7 +132,7 @@ def _(result: CriticalValues, axes: Axes) -> Axes:
     axes.plot(result.phase.to_value(u.deg), result.value.value, "o-", color=BLUE)
     axes.set_xlabel("spin phase at closest approach (deg)")
     axes.set_ylabel(f"least {result.quantity.replace('_', ' ')} ({unit})\nfor {result.outcome}")
-    return axes
+    return subject_title(axes, result.subject)
 
 
 @_plot.register

@@ -22,6 +22,7 @@ from flybystab.screening.inference import strongest_passage
 from flybystab.screening.results import read_results
 from flybystab.screening.summary import summary
 from flybystab.typing import Array, Document
+from flybystab.units import number_of
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -228,13 +229,13 @@ def results_figure(results: QTable | str | Path, path: str | Path, names: int = 
     left, right = figure.subplots(1, 2)
     out = int((np.asarray(table["verdict"], dtype=str) == Verdict.NOT_IN_EQUILIBRIUM).sum())
     rest = len(table) - out - int(stands.sum())
-    hidden = f"{out} of bodies that are not in equilibrium" + (
-        f", {rest} without a finite margin" if rest else ""
-    )
+    hidden = [f"{out} of bodies that are not in equilibrium"] * bool(out)
+    hidden += [f"{rest} without a finite margin"] * bool(rest)
     limited = np.any(values["rise"][stands] == NOTHING)
     least = f"; points at {NOTHING:g} deg: {NOTHING:g} deg or less" if limited else ""
     figure.suptitle(
-        f"{len(table)} encounters, ephemeris {table.meta.get('ephemeris', '-')}; not shown: {hidden}{least}",
+        f"{number_of(len(table), 'encounter')}, ephemeris {table.meta.get('ephemeris', '-')}"
+        f"{'; not shown: ' if hidden else ''}{', '.join(hidden)}{least}",
     )
     rise_plot(left, table, names)
     margin_plot(right, table, names)

@@ -62,20 +62,25 @@ def regions_plot(
     """
     ratio = np.linspace(0.05, 1.0, cells)
     table = stability_map(
-        ratio[None, :],
-        ratio[:, None],
-        w2,
-        40 * u.deg,
-        yield_surface=yield_surface,
-        depth="infinitesimal",
+        ratio[None, :], ratio[:, None], w2, 40 * u.deg, yield_surface=yield_surface, depth="friction"
     )
     shape = table.level >= 0
     required = np.where(shape, np.minimum(table.required_friction_angle.to_value(u.deg), 90.0), np.nan)
     if np.nanmax(required) >= 90.0:
         axes.contourf(ratio, ratio, required, levels=[89.0, 91.0], colors=["0.8"])
-    unstable = np.where(shape & (table.curvature_at_yield < 0.0), 1.0, 0.0)
+    # Stability costs some hundred times as much as the angle: half the cells in each direction.
+    coarse = np.linspace(0.05, 1.0, max(2, cells // 2))
+    perturbed = stability_map(
+        coarse[None, :],
+        coarse[:, None],
+        w2,
+        40 * u.deg,
+        yield_surface=yield_surface,
+        depth="infinitesimal",
+    )
+    unstable = np.where((perturbed.level >= 0) & (perturbed.curvature_at_yield < 0.0), 1.0, 0.0)
     if unstable.any():
-        hatched = axes.contourf(ratio, ratio, unstable, levels=[0.5, 1.5], colors="none", hatches=["////"])
+        hatched = axes.contourf(coarse, coarse, unstable, levels=[0.5, 1.5], colors="none", hatches=["////"])
         hatched.set_edgecolor("0.55")
         hatched.set_linewidth(0.0)
     if np.nanmin(required) < max(angles):

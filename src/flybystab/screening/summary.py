@@ -125,7 +125,9 @@ class Summary:
     def _caveat(self) -> str:
         if not self.assumed:
             return ""
-        caveat = f" ({self.assumed} of {self.rows} of bodies with assumed properties"
+        caveat = (
+            f" ({self.assumed} of {number_of(self.rows, 'encounter')} with assumed properties of the body"
+        )
         return caveat + (")" if self.sampled else "; --samples 100 gives probabilities)")
 
 

@@ -31,7 +31,8 @@ document.addEventListener("DOMContentLoaded", () => {
       row.hidden = !shown(row);
       n += !row.hidden;
     }
-    count.textContent = n === rows.length ? `${n} encounters` : `${n} of ${rows.length} encounters`;
+    const noun = rows.length === 1 ? 'encounter' : 'encounters';
+    count.textContent = n === rows.length ? `${n} ${noun}` : `${n} of ${rows.length} ${noun}`;
   };
 
   const sort = () => {
