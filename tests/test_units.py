@@ -1,5 +1,7 @@
 """Every public callable converts the units of its arguments, refuses bare numbers and wrong dimensions by name."""
 
+import datetime
+
 import astropy.units as u
 import numpy as np
 import pytest
@@ -8,7 +10,7 @@ from scenes import PILE, R_E, earth
 
 import flybystab as fs
 from flybystab.errors import InvalidInput, UnitMismatch
-from flybystab.units import checked_time, number_of
+from flybystab.units import checked_time, number_of, to_si
 
 KMS = u.km / u.s
 GCC = u.g / u.cm**3
@@ -192,22 +194,65 @@ def test_dates_as_text_are_tdb():
         (" JD 2462240.40703 ", "2029-04-13 21:46:07.392"),
         ("jd2462239.5", "2029-04-13 00:00:00.000"),
         ("2029-04-13 21:45:03 UTC", "2029-04-13 21:46:12.184"),
+        ("2029-04-13T21:45:03Z", "2029-04-13 21:46:12.184"),
         ("2029:103:12:00", "2029-04-13 12:00:00.000"),
     ],
 )
 def test_dates_as_text(text, iso):
     found = checked_time(text, "start")
     assert found.tdb.iso[:-2] == iso[:-2]
-    if "UTC" not in text:
+    if not text.endswith(("UTC", "Z")):
         assert found.scale == "tdb"
 
 
+def test_dates_of_python_numpy_and_pandas():
+    pandas = pytest.importorskip("pandas")
+    for date in (
+        datetime.datetime(2029, 4, 13, 21, 46, 12),
+        np.datetime64("2029-04-13T21:46:12"),
+        pandas.Timestamp("2029-04-13 21:46:12"),
+    ):
+        found = checked_time(date, "time")
+        assert (found.scale, found.iso[:19]) == ("tdb", "2029-04-13 21:46:12")
+    assert checked_time(datetime.date(2029, 4, 13), "time").iso == "2029-04-13 00:00:00.000"
+    east = datetime.timezone(datetime.timedelta(hours=2))
+    for aware in (
+        datetime.datetime(2029, 4, 13, 23, 45, 3, tzinfo=east),
+        pandas.Timestamp("2029-04-13 21:45:03Z"),
+    ):
+        assert checked_time(aware, "time").tdb.iso[:19] == "2029-04-13 21:46:12"
+    for nothing in (np.datetime64("NaT"), pandas.NaT):
+        with pytest.raises(InvalidInput, match="time = NaT"):
+            checked_time(nothing, "time")
+
+
 @pytest.mark.parametrize(
-    "text", ["", "soon", "2029-13-01", "2029-Abc-13", "2029-04-31", "13.4.2029", "2029-04 12:00", "JD", "12"]
+    "text",
+    [
+        "",
+        "soon",
+        "2029-13-01",
+        "2029-Abc-13",
+        "2029-04-31",
+        "13.4.2029",
+        "2029-04 12:00",
+        "JD",
+        "12",
+        "2029-04-13Z",
+    ],
 )
 def test_texts_that_are_no_dates(text):
     with pytest.raises(InvalidInput, match="a date such as 2029-04-13"):
         checked_time(text, "start")
+
+
+def test_ranges_without_an_end_are_described_by_their_beginning():
+    with pytest.raises(InvalidInput, match=r"cohesion = -1\.0 Pa: expected a value of at least 0 Pa"):
+        to_si(-1 * u.Pa, u.Pa, "cohesion", low=0.0)
+    with pytest.raises(InvalidInput, match="expected a value above 0 m"):
+        to_si(0 * u.m, u.m, "radius", low=0.0, open_low=True)
+    with pytest.raises(InvalidInput, match=r"expected a value in \[0, 90\) deg"):
+        to_si(90 * u.deg, u.deg, "angle", low=0.0, high=90.0, open_high=True)
 
 
 def test_number_of():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from datetime import UTC, date, datetime
 from typing import Any
 
 import astropy.units as u
@@ -78,9 +79,16 @@ def to_si(
     too_low = array <= low if open_low else array < low
     too_high = array >= high if open_high else array > high
     if np.any(too_low) or np.any(too_high):
-        span = f"{'(' if open_low else '['}{low:g}, {high:g}{')' if open_high else ']'}"
-        raise InvalidInput(name, value, f"a value in {span} {unit}".rstrip())
+        raise InvalidInput(name, value, allowed(low, high, open_low, open_high, str(unit)))
     return float(array) if shape == () else array
+
+
+def allowed(low: float, high: float, open_low: bool = False, open_high: bool = False, unit: str = "") -> str:
+    """Text of an allowed range: ``a value in [0, 90) deg``, ``a value above 0 m``."""
+    end = f" {unit}".rstrip()
+    if high == np.inf and low > -np.inf:
+        return f"a value {'above' if open_low else 'of at least'} {low:g}{end}"
+    return f"a value in {'(' if open_low else '['}{low:g}, {high:g}{')' if open_high else ']'}{end}"
 
 
 def whole(value: object, name: str, least: int) -> int:
@@ -101,7 +109,7 @@ _MONTHS = ("jan", "feb", "mar", "apr", "may", "jun", "jul", "aug", "sep", "oct",
 #: Year, month, day with decimals, time of day, scale.
 _DATE = re.compile(
     r"(?P<year>[+-]?\d{4,5})(-(?P<month>\d{1,2}|[A-Za-z]{3})(-(?P<day>\d{1,2})(?P<part>\.\d+)?)?)?"
-    r"([T ]\s*(?P<clock>\d{1,2}:\d{2}(:\d{2}(\.\d*)?)?))?\s*(?P<scale>TDB|TT|TAI|UTC)?",
+    r"([T ]\s*(?P<clock>\d{1,2}:\d{2}(:\d{2}(\.\d*)?)?)(?P<zulu>Z)?)?\s*(?P<scale>TDB|TT|TAI|UTC)?",
     re.IGNORECASE,
 )
 _JULIAN = re.compile(r"JD\s*(\d+)(\.\d*)?\s*(TDB|TT|TAI|UTC)?", re.IGNORECASE)
@@ -109,7 +117,7 @@ DATES = "a date such as 2029-04-13, 2029-Apr-13 21:46, 2029-04 or JD 2462240.4, 
 
 
 def parsed_time(text: str) -> Time:
-    """The time of a text, in TDB if it does not end in another scale.
+    """The time of a text, in TDB if it does not end in another scale or in the Z of UTC.
 
     Dates with months as numbers or names (2029-04-13, 2029-Apr-13), with decimals of the day or a time of day, a
     month or a year alone (its beginning), and Julian dates after "JD".
@@ -124,11 +132,15 @@ def parsed_time(text: str) -> Time:
         day, part, scale = julian.groups()
         return Time(float(day), float(part or 0.0), format="jd", scale=(scale or "tdb").lower())
     found = _DATE.fullmatch(plain)
-    if found is None or (found["clock"] and (not found["day"] or found["part"])):
+    if (
+        found is None
+        or (found["clock"] and (not found["day"] or found["part"]))
+        or (found["zulu"] and found["scale"])
+    ):
         return Time(plain, scale="tdb")  # another format of astropy
     month = (found["month"] or "1").lower()
     number = _MONTHS.index(month) + 1 if month.isalpha() else int(month)
-    scale = (found["scale"] or "tdb").lower()
+    scale = "utc" if found["zulu"] else (found["scale"] or "tdb").lower()
     clock = found["clock"] or "00:00"
     time = Time(f"{found['year']}-{number:02d}-{int(found['day'] or 1):02d} {clock:0>5}", scale=scale)
     return time + float(found["part"]) * u.d if found["part"] else time
@@ -137,18 +149,26 @@ def parsed_time(text: str) -> Time:
 def checked_time(value: object, name: str) -> Time:
     """The time given, as an astropy Time that converts to TDB without tables of the Earth's rotation.
 
-    Text is read as in :func:`parsed_time`.
+    Text is read as in :func:`parsed_time`. Dates of Python, numpy and pandas without a time zone are read as TDB too;
+    those with one are converted from UTC.
 
     Raises
     ------
     InvalidInput
         Neither one Time nor a date, of a local scale or UT1, or not within the Julian dates -1e7 and 1e7.
     """
+    given = value
+    if isinstance(value, datetime) and value.tzinfo is not None:
+        value = f"{value.astimezone(UTC):%Y-%m-%d %H:%M:%S.%f} UTC"
+    elif isinstance(value, date):  # a datetime too
+        value = value.isoformat()
+    elif isinstance(value, np.datetime64):
+        value = str(value)
     if isinstance(value, str):
         try:
             value = parsed_time(value)
         except ValueError:
-            raise InvalidInput(name, value, f"{DATES}, or an astropy Time") from None
+            raise InvalidInput(name, given, f"{DATES}, or an astropy Time") from None
     if not isinstance(value, Time) or value.shape != ():
         raise InvalidInput(name, value, "one astropy Time, or a date such as 2029-04-13 (TDB)")
     if value.scale in ("local", "ut1"):

@@ -293,8 +293,8 @@ def test_the_script_rebuilds_the_embedded_file(tmp_path):
         ("density_kg_m3", "2.6", "in [50, 25000]"),  # g/cm3
         ("semi_axis_a_m", "0", "in [0.05, 5e+06]"),
         ("spin_period_h", "-30", "in [0.0001, 100000]"),
-        ("e", "-0.1", "in [0, inf]"),
-        ("sigma_a_au", "-1e-9", "in [0, inf]"),
+        ("e", "-0.1", "of at least 0"),
+        ("sigma_a_au", "-1e-9", "of at least 0"),
         ("a_au", "nan", "a finite number"),
     ],
 )
@@ -319,3 +319,20 @@ def test_other_separators_are_named(tmp_path):
     file.write_text("name;a_au\nX;1.2\n")
     with pytest.raises(InvalidInput, match="commas between the columns"):
         catalogue(file)
+
+
+@pytest.mark.parametrize(
+    ("cells", "match"),
+    [
+        ("80,90,100,", "a >= b >= c for Rock in mine.csv"),
+        ("0.1,0.09,0.08,180", "sphere of diameter_m = 180"),  # km
+    ],
+)
+def test_semi_axes_in_another_order_or_unit_are_refused(tmp_path, monkeypatch, cells, match):
+    monkeypatch.chdir(tmp_path)
+    Path("mine.csv").write_text(
+        "name,semi_axis_a_m,semi_axis_b_m,semi_axis_c_m,diameter_m,density_kg_m3,spin_period_h\n"
+        f"Rock,{cells},2000,5\n"
+    )
+    with pytest.raises(InvalidInput, match=match):
+        _ = Asteroid.from_file("mine.csv", "Rock").body

@@ -1,11 +1,12 @@
 """Options for a body of the user's own."""
 
 import json
+from argparse import ArgumentTypeError
 from pathlib import Path
 
 import pytest
 
-from flybystab.cli.body_options import _axes, measured
+from flybystab.cli.body_options import _axes, distance, measured
 from flybystab.cli.main import main
 from flybystab.errors import InvalidInput
 
@@ -132,3 +133,26 @@ def test_a_diameter_scales_the_known_shape():
     assert ratio == pytest.approx([ratio[0]] * 3)
     assert 2.0 * half.semi_axes.value.prod() ** (1 / 3) == pytest.approx(250.0)
     assert half.row["diameter_sigma_m"] == "20.0"
+
+
+@pytest.mark.parametrize("text", ["200,150,140 m", "200x150xm"])
+def test_bad_axes_are_described_by_axes(text):
+    with pytest.raises(InvalidInput, match="200x170x150"):
+        _axes(text)
+
+
+def test_distances_have_units():
+    assert distance("0.05") == 0.05
+    assert distance("149597870.7 km") == pytest.approx(1.0)
+    assert distance("2 R_earth") == pytest.approx(2 * 6378.1 / 149597870.7, rel=1e-4)
+    for text in ("5 h", "near", "1+-0.1 au"):
+        with pytest.raises(ArgumentTypeError, match="a distance such as"):
+            distance(text)
+
+
+def test_a_sphere_cannot_tumble(capsys):
+    assert main(["stability", "Apophis", "--axes", "200 m"]) == 1
+    error = capsys.readouterr().err
+    assert "semi-axes a > b > c" in error
+    assert "--period" in error
+    assert main(["stability", "Apophis", "--axes", "200 m", "--period", "30 h"]) == 0

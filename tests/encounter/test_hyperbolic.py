@@ -9,7 +9,7 @@ import pytest
 from flybystab.core.ellipsoid.tide import tensor, tide_at
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput, UnitMismatch, UnknownName
-from flybystab.orbit.planets import PLANETS, R_earth, planet
+from flybystab.orbit.planets import PLANETS, Planet, R_earth, planet
 
 
 def make(q=2.2, v=5.0, start=10, **more):
@@ -135,3 +135,14 @@ def test_planet_table_is_sane():
         assert 100 < body.gm / body.radius**3 * 1e9 < 3000  # mean density 0.7 to 5.5 g/cm3
         assert body.impact_distance >= body.radius
     assert planet(" Earth ") is PLANETS["earth"]
+
+
+def test_speeds_beyond_that_of_light_and_planets_without_mass_are_refused():
+    with pytest.raises(InvalidInput, match="v_inf"):
+        Encounter.hyperbolic("earth", 2 * R_earth, 3e5 * u.km / u.s)
+    with pytest.raises(InvalidInput, match="v_inf"):
+        Encounter.hyperbolic("earth", [2, 3] * R_earth, 3e5 * u.km / u.s)
+    good = {"name": "x", "gm": 1e14, "radius": 1e7, "j2": 0.0, "pole": (0, 0, 1), "atmosphere": 0.0}
+    for name, value in (("gm", 0.0), ("gm", np.nan), ("radius", -1.0), ("atmosphere", -1.0)):
+        with pytest.raises(InvalidInput, match=name):
+            Planet(**(good | {name: value}), target=0, orbit_radius=0.0)

@@ -10,6 +10,7 @@ from scipy.stats import norm
 import flybystab as fs
 from flybystab.catalogues.catalogue import catalogue
 from flybystab.constants import DAY
+from flybystab.encounter.virtual_impactors import _width
 from flybystab.errors import InvalidInput
 from flybystab.orbit.covariance import SETS, Covariance
 from flybystab.orbit.epochs import later
@@ -100,3 +101,19 @@ def test_a_line_beyond_the_conics_is_an_error_that_names_where():
     with pytest.raises(InvalidInput, match=r"sigmas = [0-9.]+: .*not those of a conic") as error:
         fs.virtual_impactors(orbit, later(EPOCH, DAY), later(EPOCH, 2 * DAY), sigmas=3.0, ephemeris="de421")
     assert 0.5 <= float(error.value.value) <= 0.6
+
+
+def test_the_width_of_a_narrow_ellipse_is_a_number():
+    rng = np.random.default_rng(1)
+    negative = 0
+    for _ in range(200):
+        way, line = rng.normal(size=6), rng.normal(size=2)
+        way /= np.linalg.norm(way)
+        matrix = 1e12 * np.outer(line, way) + 1e-6 * rng.normal(size=(2, 6))
+        along = matrix @ way
+        across = np.array([-along[1], along[0]]) / np.linalg.norm(along)
+        negative += across @ (matrix @ matrix.T) @ across < 0.0
+        assert 0.0 <= _width(matrix, along) < 1e-2
+    assert negative > 20  # the quadratic form has no root there
+    turned = np.array([[3.0, 0.0], [0.0, 0.5]])
+    assert _width(turned, turned @ [1.0, 0.0]) == pytest.approx(0.5)

@@ -124,3 +124,16 @@ def test_mixed_and_missing_elements_are_named(change, message):
 def test_unknown_centres_and_frames_are_refused(change):
     with pytest.raises(UnknownName, match="known"):
         fs.Orbit.from_elements(EPOCH, **(WHOLE | change))
+
+
+def test_the_time_of_perihelion_may_be_text_and_the_inclination_ends_at_180_degrees():
+    given = {"epoch": EPOCH, "q": 0.3 * u.au, "e": 1.0, "node": 10 * u.deg, "peri": 20 * u.deg}
+    by_text = fs.Orbit.from_elements(**given, i=20 * u.deg, Tp="2026-01-05")
+    by_time = fs.Orbit.from_elements(**given, i=20 * u.deg, Tp=Time("2026-01-05", scale="tdb"))
+    np.testing.assert_array_equal(state(by_text), state(by_time))
+    with pytest.raises(InvalidInput, match="Tp = soon: expected a date"):
+        fs.Orbit.from_elements(**given, i=20 * u.deg, Tp="soon")
+    fs.Orbit.from_elements(**given, i=180 * u.deg, Tp="2026-01-05")
+    for i in (-1.0, 200.0):
+        with pytest.raises(InvalidInput, match="i = "):
+            fs.Orbit.from_elements(**given, i=i * u.deg, Tp="2026-01-05")

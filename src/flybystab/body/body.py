@@ -82,7 +82,9 @@ class Material:
         object.__setattr__(self, "dilatancy", dilatancy)
         if str(self.yield_surface) not in YIELD_SURFACES:
             near = get_close_matches(str(self.yield_surface), YIELD_SURFACES, cutoff=0.4)
-            raise UnknownName("yield surface", str(self.yield_surface), near, f"(known: {YIELD_SURFACES})")
+            raise UnknownName(
+                "yield surface", str(self.yield_surface), near, f"(known: {', '.join(YIELD_SURFACES)})"
+            )
         if not isinstance(self.brittle, bool | np.bool_):
             raise InvalidInput("brittle", self.brittle, "True or False")
         if self.bulk_modulus is not None:

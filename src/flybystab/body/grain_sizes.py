@@ -64,7 +64,9 @@ def grain_sizes(
     """
     if str(distribution) not in DISTRIBUTIONS:
         near = get_close_matches(str(distribution), DISTRIBUTIONS, cutoff=0.4)
-        raise UnknownName("size distribution", str(distribution), near, f"(known: {DISTRIBUTIONS})")
+        raise UnknownName(
+            "size distribution", str(distribution), near, f"(known: {', '.join(DISTRIBUTIONS)})"
+        )
     if index is not None:
         if distribution == "uniform":
             raise InvalidInput("index", index, "size_distribution='power law': a uniform one has no exponent")

@@ -184,7 +184,7 @@ def stability_map(
         raise InvalidInput("cohesion", cohesion, "a finite number of at least zero")
     if yield_surface not in YIELD_SURFACES:
         near = get_close_matches(str(yield_surface), YIELD_SURFACES, cutoff=0.4)
-        raise UnknownName("yield surface", str(yield_surface), near, f"(known: {YIELD_SURFACES})")
+        raise UnknownName("yield surface", str(yield_surface), near, f"(known: {', '.join(YIELD_SURFACES)})")
     phi = to_si(friction_angle, u.rad, "friction_angle", low=0.0, high=np.pi / 2, open_high=True)
     n = a2.size
     shape_exists = ((a2 <= 1.0) & (a3 <= a2) & (a3 > 0.0)).ravel()
@@ -226,7 +226,9 @@ def _rows(
     progress: Progressing,
 ) -> Array:
     if depth not in DEPTHS:
-        raise UnknownName("depth", str(depth), get_close_matches(str(depth), DEPTHS), f"(known: {DEPTHS})")
+        raise UnknownName(
+            "depth", str(depth), get_close_matches(str(depth), DEPTHS), f"(known: {', '.join(DEPTHS)})"
+        )
     beta = to_si(dilatancy, u.dimensionless_unscaled, "dilatancy", low=0.0, high=1.0)
     n = len(s)
     out = np.empty((n, columns.COLUMNS))

@@ -272,8 +272,27 @@ class Asteroid(Record):
 
     @property
     def semi_axes(self) -> Quantity:
-        """Semi-axes ``a >= b >= c``, m."""
-        return np.array([self._number(c) for c in SHAPE]) * u.m
+        """Semi-axes ``a >= b >= c``, m.
+
+        Raises
+        ------
+        InvalidInput
+            Another order, or a volume that is not that of the diameter of the row (factor 3: another unit).
+        """
+        axes = np.array([self._number(c) for c in SHAPE])
+        given = " x ".join(f"{x:g}" for x in axes)
+        if not axes[0] >= axes[1] >= axes[2]:
+            raise InvalidInput(", ".join(SHAPE), given, f"a >= b >= c for {self.label} in {self.file}")
+        if self.row.get("diameter_m"):
+            diameter, wanted = 2.0 * float(np.cbrt(axes.prod())), self._number("diameter_m")
+            if not wanted / 3.0 < diameter < 3.0 * wanted:
+                raise InvalidInput(
+                    ", ".join(SHAPE),
+                    given,
+                    f"semi-axes in m with the volume of a sphere of diameter_m = {wanted:g} "
+                    f"for {self.label} in {self.file}",
+                )
+        return axes * u.m
 
     @cached_property
     def body(self) -> Body:

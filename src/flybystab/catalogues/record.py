@@ -16,6 +16,7 @@ from astropy.units import Quantity
 
 from flybystab.body.body import DENSITY_RANGE
 from flybystab.errors import InvalidInput
+from flybystab.units import allowed
 
 _LENGTH = ("semi_axis_a_m", "semi_axis_b_m", "semi_axis_c_m", "diameter_m")
 _HOURS = ("spin_period_h", "precession_period_h", "rotation_period_h")
@@ -217,9 +218,7 @@ class Record:
         if not np.isfinite(value):
             raise InvalidInput(column, text, f"a finite number for {self.label} in {self.file}")
         if not low <= value <= high:
-            raise InvalidInput(
-                column, text, f"a value in [{low:g}, {high:g}] for {self.label} in {self.file}"
-            )
+            raise InvalidInput(column, text, f"{allowed(low, high)} for {self.label} in {self.file}")
         return value
 
     def knows(self, *columns: str) -> bool:

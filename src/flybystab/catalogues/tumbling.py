@@ -104,7 +104,12 @@ def tumbling_state(
         raise UnknownName("tumbling mode", mode, list(MODES))
     j1, j2, j3 = (float(x) for x in moments)
     if not 0.0 < j1 < j2 < j3:
-        raise InvalidInput("moments", moments, "three different moments of inertia in ascending order")
+        raise InvalidInput(
+            "moments",
+            moments,
+            "three different moments of inertia in ascending order: semi-axes a > b > c, without which the periods of "
+            "a tumbler determine no spin state (a body that does not tumble: --period; Asteroid(body=...))",
+        )
     low, high = (j2, j3) if mode == "SAM" else (j1, j2)
     edge = 1e-9 * (high - low)
 

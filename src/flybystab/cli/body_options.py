@@ -18,6 +18,10 @@ _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:[eE][-+]?\d+)?"
 _VALUE = re.compile(rf"\s*({_NUMBER})\s*(?:(?:\+-|\+/-|±)\s*({_NUMBER}))?\s*(.*?)\s*")
 
 
+#: Expected value of --axes.
+AXES_EXAMPLE = "one or three semi-axes: '200x170x150+-10 m'"
+
+
 class Measured(float):
     """A number with its 1-sigma error; zero if none is given."""
 
@@ -56,6 +60,17 @@ def friction(text: str) -> Measured:
 def cohesion(text: str) -> Measured:
     """Value of --cohesion, Pa."""
     return _typed(text, "Pa", "--cohesion")
+
+
+def distance(text: str) -> float:
+    """Value of --within, au: a number, or one with a unit of length such as ``1e6 km`` or ``5 R_earth``."""
+    try:
+        found = measured(text, "au", "--within")
+    except InvalidInput:
+        found = None
+    if found is None or found.sigma:
+        raise argparse.ArgumentTypeError(f"{text}: expected a distance such as 0.05 au or '1e6 km'")
+    return float(found)
 
 
 def _typed(text: str, unit: str, name: str) -> Measured:
@@ -100,20 +115,19 @@ def _axes(text: str) -> tuple[list[float], list[float]]:
     """Semi-axes and their errors (m); an error or unit at the end applies to all of them."""
     parts = re.split(r"\s*[x×]\s*", text.strip())
     if len(parts) not in (1, 3):
-        raise InvalidInput("--axes", text, "one or three semi-axes: '200x170x150+-10 m'")
+        raise InvalidInput("--axes", text, AXES_EXAMPLE)
     tail = re.fullmatch(rf"(.*?)((?:\s*(?:\+-|\+/-|±)\s*{_NUMBER})?)\s*([A-Za-z]*)", parts[-1])
     assert tail is not None
     error, unit = tail.group(2), tail.group(3)
-    found = []
+    whole = []
     for part in parts[:-1]:
         has_unit = re.search(r"[A-Za-z]\s*$", part) is not None
         has_error = re.search(r"\+-|\+/-|±", part) is not None
-        found.append(
-            measured(
-                part + ("" if has_error or has_unit else error) + ("" if has_unit else unit), "m", "--axes"
-            )
-        )
-    found.append(measured(parts[-1], "m", "--axes"))
+        whole.append(part + ("" if has_error or has_unit else error) + ("" if has_unit else unit))
+    try:
+        found = [measured(part, "m", "--axes") for part in (*whole, parts[-1])]
+    except InvalidInput:
+        raise InvalidInput("--axes", text, AXES_EXAMPLE) from None
     found = sorted(found * (3 if len(found) == 1 else 1), reverse=True)
     return [float(x) for x in found], [x.sigma for x in found]
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Mapping
 from typing import TYPE_CHECKING
 
 from flybystab._version import __version__
-from flybystab.cli.body_options import cohesion, friction, with_body_options
+from flybystab.cli.body_options import cohesion, distance, friction, with_body_options
 from flybystab.core.material.surfaces import DEFAULT, NAMES
 from flybystab.errors import InvalidInput, NothingComputed, WrongUsage
 from flybystab.plots.formats import FIGURES, FILMS
@@ -62,7 +62,13 @@ def span_arguments(sub: argparse.ArgumentParser, start: str, stop: str) -> None:
     """Add the options of a search for encounters: dates, planets, maximum distance."""
     dates_arguments(sub, start, stop)
     sub.add_argument("--planet", action="append", help="planet; may be repeated (earth)")
-    sub.add_argument("--within", type=float, default=0.05, metavar="AU", help="maximum distance (0.05 au)")
+    sub.add_argument(
+        "--within",
+        type=distance,
+        default=0.05,
+        metavar="AU",
+        help="maximum distance (0.05 au), or '1e6 km'",
+    )
 
 
 def figure_argument(sub: argparse.ArgumentParser, films: bool = False) -> None:

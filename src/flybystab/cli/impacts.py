@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
+from flybystab.cli.body_options import distance
 from flybystab.cli.common import catalogue_argument, check_table, dates_arguments, show, tdb
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ def arguments(sub: argparse.ArgumentParser) -> None:
     catalogue_argument(sub)
     dates_arguments(sub, "2026-01-01", "2076-01-01")
     sub.add_argument("--planet", default="earth", help="planet or moon (earth)")
-    sub.add_argument("--within", type=float, default=0.1, metavar="AU", help="maximum distance (0.1 au)")
+    sub.add_argument("--within", type=distance, default=0.1, metavar="AU", help="maximum distance (0.1 au)")
     sub.add_argument(
         "--orbits",
         type=int,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 from typing import TYPE_CHECKING
 
+from flybystab.cli.body_options import distance
 from flybystab.cli.common import document, sampling_arguments, show, style_argument, surface_argument
 from flybystab.errors import InvalidInput
 
@@ -43,7 +44,7 @@ def arguments(sub: argparse.ArgumentParser) -> None:
     )
     sub.add_argument("--planet", action="append", help=f"planet; may be repeated ({', '.join(PLANETS)})")
     sub.add_argument(
-        "--within", type=float, metavar="AU", help="largest periapsis distance (radius of the planet)"
+        "--within", type=distance, metavar="AU", help="largest periapsis distance (radius of the planet)"
     )
     sub.add_argument(
         "--verdicts",

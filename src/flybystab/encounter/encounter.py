@@ -13,6 +13,7 @@ from astropy.time import Time
 from astropy.units import Quantity
 
 from flybystab.arguments import check_arguments
+from flybystab.constants import C_LIGHT
 from flybystab.encounter.encounter_arguments import checked_start, unit_vector
 from flybystab.encounter.encounter_path import EncounterPath
 from flybystab.encounter.reach import SETTLE, far_enough
@@ -135,7 +136,7 @@ class Encounter(EncounterPath):
                 lambda q, v: cls.hyperbolic(planet, q, v, start_distance, settle, j2, pole), periapsis, v_inf
             )
         q = to_si(periapsis, u.m, "periapsis", low=1.0)
-        v = to_si(v_inf, u.m / u.s, "v_inf", low=0.0)
+        v = to_si(v_inf, u.m / u.s, "v_inf", low=0.0, high=C_LIGHT)
         wait = to_si(settle, u.s, "settle", low=0.0)
         if start_distance is None:
             start = 10.0 * max(body.radius, q)
@@ -384,7 +385,7 @@ def _array(
 ) -> Any:  # the type of a Quantity does not distinguish scalars from arrays
     """Array of encounters, of the shape to which the arrays of periapsis and speed broadcast."""
     q = to_si(periapsis, u.m, "periapsis", shape=None, low=1.0)
-    v = to_si(v_inf, u.m / u.s, "v_inf", shape=None, low=0.0)
+    v = to_si(v_inf, u.m / u.s, "v_inf", shape=None, low=0.0, high=C_LIGHT)
     try:
         q, v = np.broadcast_arrays(q, v)
     except ValueError:

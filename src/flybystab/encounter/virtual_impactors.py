@@ -187,16 +187,24 @@ def _impact(
     along = matrix @ way
     covariance = matrix @ matrix.T
     stretch = float(np.linalg.norm(along))
-    across = np.array([-along[1], along[0]]) / stretch
     return {
         "time": later(time, float(best[0])),
         "distance": float(best[1]),
         "sigma": sigma,
         "stretching": stretch,
-        "width": float(np.linalg.norm(across @ matrix)),
+        "width": _width(matrix, along),
         "v_inf": float(best[4]),
         "probability": disc_probability(best[2:4] - matrix @ z0, covariance, disc),
     }
+
+
+def _width(matrix: Array, along: Array) -> float:
+    """1-sigma of the target plane normal to the direction of the line, from the linear map (2, n).
+
+    A norm, since rounding can make the quadratic form of the covariance of a narrow ellipse negative.
+    """
+    across = np.array([-along[1], along[0]]) / np.linalg.norm(along)
+    return float(np.linalg.norm(across @ matrix))
 
 
 def _distinct(rows: list[Document]) -> list[Document]:

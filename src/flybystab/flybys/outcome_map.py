@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from flybystab.arguments import check_arguments
 from flybystab.body.body import Body
+from flybystab.constants import C_LIGHT
 from flybystab.encounter.attitude import about_z, periapsis_axes
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
@@ -116,7 +117,10 @@ def outcome_map(
     InvalidInput, UnitMismatch, UnknownName
     """
     q = np.atleast_1d(to_si(periapsis, u.m, "periapsis", shape=None, low=0.0, open_low=True))
-    v = np.atleast_1d(to_si(v_inf, u.m / u.s, "v_inf", shape=None, low=0.0))
+    v = np.atleast_1d(to_si(v_inf, u.m / u.s, "v_inf", shape=None, low=0.0, high=C_LIGHT))
+    for name, given in (("periapsis", q), ("v_inf", v)):
+        if not given.size:
+            raise InvalidInput(name, "no values", "at least one value")
     if phases < 1:
         raise InvalidInput("phases", phases, "at least one phase")
     where = planet(on)
@@ -216,7 +220,7 @@ def target_map(
     """
     where = planet(on)
     q = np.atleast_1d(to_si(periapsis, u.m, "periapsis", shape=None, low=0.0, open_low=True))
-    v = to_si(v_inf, u.m / u.s, "v_inf", low=0.0, open_low=True)
+    v = to_si(v_inf, u.m / u.s, "v_inf", low=0.0, high=C_LIGHT, open_low=True)
     turn = np.array([[1.0, 0, 0], [0, 1.0, 0], [0, 0, 1.0]]) if attitude is None else np.asarray(attitude)
     if attitude is None:
         turn = turn @ np.diag([1.0, -1.0, -1.0])

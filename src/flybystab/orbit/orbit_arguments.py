@@ -90,17 +90,18 @@ def given_elements(
     ------
     UnitMismatch, InvalidInput
     """
-    si = {
-        name: None if value is None else to_si(_angle(value), u.rad, name) for name, value in angles.items()
-    }
-    if time_of_perihelion is not None:
-        checked_time(time_of_perihelion, "Tp")
+    limits = {"i": (0.0, np.pi * (1.0 + 1e-15))}
+    si = {}
+    for name, value in angles.items():
+        low, high = limits.get(name, (-np.inf, np.inf))
+        si[name] = None if value is None else to_si(_angle(value), u.rad, name, low=low, high=high)
+    perihelion = None if time_of_perihelion is None else checked_time(time_of_perihelion, "Tp")
     return GivenElements(
         a=None if a is None else to_si(a, u.m, "a", low=-_FARTHEST, high=_FARTHEST),
         q=None if q is None else to_si(q, u.m, "q", low=0.0, high=_FARTHEST),
         e=None if e is None else to_si(e, u.dimensionless_unscaled, "e", low=0.0),
         **si,
-        Tp=None if time_of_perihelion is None else seconds(epoch, time_of_perihelion),
+        Tp=None if perihelion is None else seconds(epoch, perihelion),
     )
 
 

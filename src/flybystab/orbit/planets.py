@@ -33,6 +33,7 @@ from astropy.units import Quantity
 
 from flybystab.constants import AU, GM_EARTH, R_EARTH, YEAR
 from flybystab.errors import InvalidInput, UnknownName
+from flybystab.units import to_si
 
 
 @dataclass(frozen=True)
@@ -82,6 +83,12 @@ class Planet:
     j4: float = 0.0
     orbit_eccentricity: float = 0.0
     orbit_inclination: float = 0.0
+
+    def __post_init__(self) -> None:
+        for name in ("gm", "radius"):
+            to_si(getattr(self, name), u.one, name, low=0.0, open_low=True)
+        for name in ("atmosphere", "orbit_radius"):
+            to_si(getattr(self, name), u.one, name, low=0.0)
 
     @property
     def impact_distance(self) -> float:

@@ -67,7 +67,7 @@ COLUMNS: dict[str, Column] = {
 
 
 def classification(
-    asteroids: str | Path | Sequence[Asteroid | str | int | Path] | None = None,
+    asteroids: str | Path | Asteroid | Sequence[Asteroid | str | int | Path] | None = None,
     *,
     material: Material | None = None,
     dilatancy: float = 1.0,

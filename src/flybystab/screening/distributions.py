@@ -52,7 +52,7 @@ class Distribution:
                 "distribution",
                 str(self.kind),
                 get_close_matches(str(self.kind), _KINDS),
-                f"(known: {list(_KINDS)})",
+                f"(known: {', '.join(_KINDS)})",
             )
         for f in fields(self)[1:]:
             x = getattr(self, f.name)

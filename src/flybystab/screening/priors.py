@@ -112,7 +112,7 @@ class Population:
         for key, value in data.items():
             if key not in known:
                 near = get_close_matches(key, known)
-                raise UnknownName("population key", key, near, f"(known: {sorted(known)})")
+                raise UnknownName("population key", key, near, f"(known: {', '.join(sorted(known))})")
             if key == "replace_assumed":
                 if not isinstance(value, bool):
                     raise InvalidInput(key, value, "true or false")

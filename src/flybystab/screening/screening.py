@@ -189,7 +189,7 @@ class Screening:
 
 @check_arguments
 def screen(
-    asteroids: str | Path | Sequence[Asteroid | str | int | Path] | None,
+    asteroids: str | Path | Asteroid | Sequence[Asteroid | str | int | Path] | None,
     start: Time | str,
     stop: Time | str,
     planets: Sequence[str] = ("earth",),

@@ -12,7 +12,9 @@ from flybystab.catalogues.completion import foreign, with_physical_data
 from flybystab.errors import InvalidInput
 
 
-def listed(asteroids: str | Path | Sequence[Asteroid | str | int | Path] | None) -> tuple[Asteroid, ...]:
+def listed(
+    asteroids: str | Path | Asteroid | Sequence[Asteroid | str | int | Path] | None,
+) -> tuple[Asteroid, ...]:
     """Asteroids from what `screen` accepts; tables of orbits are completed by the embedded physical data."""
     if asteroids is None:
         return catalogue()
@@ -20,6 +22,8 @@ def listed(asteroids: str | Path | Sequence[Asteroid | str | int | Path] | None)
         path = Path(asteroids)
         named = isinstance(asteroids, str) and not path.suffix and not path.exists()
         asteroids = [str(asteroids) if named else path]
+    if isinstance(asteroids, Asteroid):
+        asteroids = [asteroids]
     if not isinstance(asteroids, Iterable) or isinstance(asteroids, bytes):
         raise InvalidInput("asteroids", asteroids, "asteroids, names, or paths of catalogue files")
     found: list[Asteroid] = []

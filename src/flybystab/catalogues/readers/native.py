@@ -28,7 +28,9 @@ def read_native(text: str, file: str) -> list[Entry]:
     columns = header_of(text)
     known = (*TEXTS, *UNITS)
     if any(";" in c or "\t" in c for c in columns):
-        raise InvalidInput("columns", ", ".join(columns), f"commas between the columns of {file}")
+        shown = ", ".join(columns)
+        shown = shown if len(shown) <= 60 else shown[:60] + " ..."
+        raise InvalidInput("columns", shown, f"commas between the columns of {file}, no semicolons or tabs")
     if text.strip() and not set(known) & set(columns):
         raise InvalidInput(
             "catalogue file",
