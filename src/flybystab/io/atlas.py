@@ -189,8 +189,8 @@ def _index(pages: jinja2.Environment, table: QTable, entries: list[Document], ti
     span = _span(settings, dates)
     summary = (
         f"{number_of(len(entries), 'encounter')} of {number_of(asteroids, 'asteroid')}, {span}. P(intact) is the "
-        "fraction of INTACT among all samples of the uncertain inputs, P(yield) the fraction that yields or reaches the "
-        "planet among the samples in equilibrium before the encounter. The verdict applies to the catalogue values "
+        "fraction of INTACT among all samples of the uncertain inputs, P(yield) the fraction that yields or reaches "
+        "the planet among the samples in equilibrium before the encounter. The verdict applies to the catalogue values "
         "and the chosen material."
     )
     return pages.get_template("index.html").render(
