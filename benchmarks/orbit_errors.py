@@ -35,9 +35,9 @@ from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.predictability import deviations_of
 from flybystab.orbit.search import neighbours
 from flybystab.orbit.search.acceleration import field
-from flybystab.orbit.search.dop853 import empty_room
 from flybystab.orbit.search.encounter_finder import find_encounters
 from flybystab.orbit.search.neighbours import carry, spread
+from flybystab.orbit.search.steps import empty_room
 from flybystab.screening.draws import identity
 
 DATA = Path(os.environ.get("FLYBYSTAB_SHARED", Path(__file__).resolve().parents[1] / "../shared")) / "data"

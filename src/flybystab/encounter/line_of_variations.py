@@ -28,9 +28,9 @@ from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.orbit_arguments import as_ephemeris
 from flybystab.orbit.planets import Planet
 from flybystab.orbit.search.acceleration import field
-from flybystab.orbit.search.dop853 import empty_room
 from flybystab.orbit.search.encounter_finder import find_encounters
 from flybystab.orbit.search.neighbours import carry
+from flybystab.orbit.search.steps import empty_room
 from flybystab.result_table import ResultTable
 from flybystab.typing import Array
 
@@ -44,7 +44,7 @@ _NODES, _SPLINE = 65, 5e-3
 #: Largest ratio of the distances between nodes: beyond an encounter the derivatives vary along the line.
 _EVEN = 1.25
 #: Interval of the candidate times, s, and tolerance of the integration to them.
-_PAUSE, _FINE = 0.5 * YEAR, 1e-15
+_PAUSE, _FINE = 0.5 * YEAR, 1e-14
 
 
 class _Ahead(NamedTuple):

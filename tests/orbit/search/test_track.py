@@ -7,13 +7,13 @@ from astropy.time import Time
 import flybystab as fs
 from flybystab.core.numerics.jit import kernel
 from flybystab.orbit.forces import FORCES
-from flybystab.orbit.search.dop853 import borrowed_room, empty_room
+from flybystab.orbit.search.steps import borrowed_room, empty_room
 
 
 @kernel
 def marked(room, spare):
     room, spare = borrowed_room(room), borrowed_room(spare)
-    more = np.zeros((13, 6))
+    more = np.zeros((18, 6))
     room.k[:] = 1.0
     spare.k[:] = 2.0
     more[:] = 3.0

@@ -16,7 +16,7 @@ from flybystab.orbit.forces import NonGravitational
 from flybystab.orbit.osculating_state import heliocentric
 from flybystab.orbit.search import neighbours
 from flybystab.orbit.search.acceleration import field
-from flybystab.orbit.search.dop853 import empty_room
+from flybystab.orbit.search.steps import empty_room
 from flybystab.orbit.search.variational import carry_with_deviations
 
 

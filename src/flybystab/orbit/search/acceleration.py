@@ -42,7 +42,8 @@ from flybystab.orbit.relativity import of_source
 from flybystab.typing import Array
 
 _SUN = int(SLOT[SUN])
-
+#: Acceleration by zonal harmonics that is left out, m/s2: a displacement of 9 m in a century if its direction is fixed.
+_NEGLIGIBLE = 2e-18
 
 #: Zonal harmonics of a body: grid (0 fast, 1 slow) and slot of its position, ``J2 GM a^2`` (m5/s2) and so on, pole at
 #: t = 0 and its rate (1/s), square of the radius of the smooth core (m2).
@@ -240,6 +241,8 @@ def _oblate_pull(
         dy = y - p[slots + s]
         dz = z - p[slots + slots + s]
         r2 = dx * dx + dy * dy + dz * dz
+        if 3.0 * abs(body.j2) < _NEGLIGIBLE * r2 * r2:
+            continue
         d = np.sqrt(r2)
         px, py, pz = (
             body.pole_x + t * body.rate_x,

@@ -84,9 +84,9 @@ def find_encounters(
         by the end of the span is below a tenth of this. J2 of Sun, Earth and `planets`, and the non-gravitational
         acceleration are always included.
     tolerance : float, optional
-        Error per step of the integration, in units of 1.5e11 m and 30 km/s. By default
-        ``1e-12 (error/0.1 km) (10 yr/span)^2``, from 1e-15 to 1e-8: the error of the median asteroid is then below
-        `error` at the end of the span.
+        Estimated error per step of the integration, in units of 1.5e11 m and 30 km/s; values below 1e-14, where
+        rounding errors limit the accuracy, count as 1e-14. By default ``1e-12 (error/0.1 km) (10 yr/span)``, from
+        1e-14 to 1e-8: the error of nine of ten asteroids is then below `error` at the end of the span.
     forces : tuple of str, optional
         Exactly these forces, names as in ``flybystab.orbit.forces.FORCES``, instead of choosing by `error`.
     growth : bool

@@ -8,9 +8,9 @@ from flybystab.orbit.ephemeris import Window
 from flybystab.orbit.kepler import time_at_distance
 from flybystab.orbit.nongravitational import NonGravitationalParameters
 from flybystab.orbit.search.acceleration import Field
-from flybystab.orbit.search.dop853 import empty_room
 from flybystab.orbit.search.minima import two_body
 from flybystab.orbit.search.neighbours import carry
+from flybystab.orbit.search.steps import empty_room
 from flybystab.typing import Array
 
 

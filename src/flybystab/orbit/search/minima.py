@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from flybystab.core.numerics.dop853 import N_STAGES
 from flybystab.core.numerics.jit import kernel
+from flybystab.core.numerics.rkn12 import N_STAGES
 from flybystab.orbit.almanac import Places
 from flybystab.orbit.closest_approach import STATE, TIME, between
 from flybystab.orbit.ephemeris import BODIES, body_state
@@ -21,7 +21,7 @@ from flybystab.orbit.kepler import time_at_distance
 from flybystab.orbit.nongravitational import NonGravitationalParameters
 from flybystab.orbit.planets import PLANETS
 from flybystab.orbit.search.acceleration import Field
-from flybystab.orbit.search.dop853 import step
+from flybystab.orbit.search.steps import step
 from flybystab.typing import Array
 
 #: An encounter: place of the body in ``BODIES``; time of the minimum (s), state relative to the body (m, m/s) and
@@ -57,6 +57,8 @@ BENDING = np.array(
         for name in BODIES
     ]
 )
+#: Upper bound of the distance of each of ``BODIES`` from the Sun, m, for an eccentricity of 0.3; inf for the Sun.
+FARTHEST = np.array([1.3 * PLANETS[name].orbit_radius if name != "sun" else np.inf for name in BODIES])
 
 
 @kernel

@@ -16,8 +16,8 @@ from astropy.table import QTable
 from numpy.typing import NDArray
 
 from flybystab.constants import DAY, YEAR
-from flybystab.core.numerics.dop853 import N_STAGES
 from flybystab.core.numerics.jit import kernel
+from flybystab.core.numerics.rkn12 import N_STAGES
 from flybystab.core.numerics.threads import in_order
 from flybystab.orbit.covariance import NONGRAV_PARAMETERS
 from flybystab.orbit.elements import GM_SUN
@@ -28,14 +28,14 @@ from flybystab.orbit.nongravitational import NONE, NonGravitationalParameters, d
 from flybystab.orbit.planets import planet
 from flybystab.orbit.predictability import Deviations, predictability, undisturbed_error
 from flybystab.orbit.search.acceleration import Field, borrowed_field, first_rate
-from flybystab.orbit.search.dop853 import Room, advance, borrowed_room, empty_room
+from flybystab.orbit.search.steps import Room, advance, borrowed_room, empty_room
 from flybystab.orbit.search.variational import carry_with_deviations
 from flybystab.typing import Array
 
 #: Differences (m) of two-body motion, tolerance of the search for the encounter in an interval, longest interval, s.
 _STEP, _LOOSE, _INTERVAL = 1e4, 1e-10, 0.25 * YEAR
 #: Tolerance of state transition matrices; it can be larger than for differences of orbits.
-_FINE = 1e-12
+_FINE = 1e-11
 #: Largest displacement for the linear theory, over the distance from the nearest body at any time before.
 _LINEAR = 0.02
 #: An interval contains an encounter if its transition matrix exceeds that of two-body motion by this factor.
@@ -58,7 +58,8 @@ def carry(
     Steps as in :func:`flybystab.orbit.search.track.track_encounters`. Returns the number written.
     """
     field = borrowed_field(field)
-    k, places = borrowed_room(room)
+    room = borrowed_room(room)
+    k, places = room.k, room.places
     y = y0.copy()
     new = np.empty(6)
     h = DAY
@@ -66,7 +67,7 @@ def carry(
     first_rate(field, law, t, y, places, k[0])
     for n in range(times.size):
         while t != times[n]:
-            t, h = advance(field, law, t, y, h, times[n], tolerance, k, new, places)
+            t, h = advance(field, law, t, y, h, times[n], tolerance, room, new)
             if t != t:  # the step size collapsed
                 return n
             y[:] = new

@@ -29,9 +29,11 @@ _SPEED = u.m / u.s
 
 #: Margin of the integration beyond the span, so that a minimum at its end is bracketed, s.
 _MARGIN = 60.0
-#: Tolerance over the error (m) of the median asteroid after ten years; the error grows with the square of time
-#: (``flybystab bench sky``).
-_AT_10_YEARS, _TOLERANCES = 1e-12 / 100.0, (1e-15, 1e-8)
+#: Tolerance over the error (m) allowed after ten years. The median asteroid stays far below it (``flybystab bench
+#: sky``); the margin is for encounters, which amplify errors. Below the least tolerance rounding errors dominate.
+_AT_10_YEARS, LEAST_TOLERANCE, _LARGEST_TOLERANCE = 1e-12 / 100.0, 1e-14, 1e-8
+#: Largest tolerance where encounters amplify the errors of the integration.
+_WITH_GROWTH = 1e-13
 
 
 class SearchSpan(NamedTuple):
@@ -153,11 +155,10 @@ def search_tolerances(
 ) -> Array:
     """Tolerance of the integration of each asteroid, from the allowed error (m) if none is given."""
     if tolerance is not None:
-        return np.full(len(epochs), float(tolerance))
+        return np.full(len(epochs), max(float(tolerance), LEAST_TOLERANCE))
     longest = np.maximum(np.abs(epochs - span.start), np.abs(epochs - span.stop))
-    tolerances = np.clip(_AT_10_YEARS * accuracy * (10.0 * YEAR / longest) ** 2, *_TOLERANCES)
-    # encounters also amplify the errors of the integration
-    return np.minimum(tolerances, 1e-14) if growth else tolerances
+    tolerances = _AT_10_YEARS * accuracy * 10.0 * YEAR / longest
+    return np.clip(tolerances, LEAST_TOLERANCE, _WITH_GROWTH if growth else _LARGEST_TOLERANCE)
 
 
 def reach_of(found: list[Planet], distances: Array) -> Reach:

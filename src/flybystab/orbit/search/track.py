@@ -13,16 +13,23 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.constants import DAY
-from flybystab.core.numerics.dop853 import N_STAGES
 from flybystab.core.numerics.jit import code, inlined, kernel
+from flybystab.core.numerics.rkn12 import N_STAGES
 from flybystab.orbit.almanac import gather
 from flybystab.orbit.closest_approach import ACCELERATION, LOG_WIDTH, STATE, TIME
-from flybystab.orbit.ephemeris import N_BODIES, body_state
+from flybystab.orbit.ephemeris import N_BODIES, SUN, body_state
 from flybystab.orbit.nongravitational import NonGravitationalParameters, parameters_of
 from flybystab.orbit.search.acceleration import Field, borrowed_field, empty_places, first_rate
-from flybystab.orbit.search.dop853 import Room, advance, borrowed_room, empty_room
 from flybystab.orbit.search.force_selection import reduced, shares_along
-from flybystab.orbit.search.minima import BENDING, FINE, chord_distance, minima_in_step, write_impact
+from flybystab.orbit.search.minima import (
+    BENDING,
+    FARTHEST,
+    FINE,
+    chord_distance,
+    minima_in_step,
+    write_impact,
+)
+from flybystab.orbit.search.steps import Room, advance, borrowed_room, empty_room
 from flybystab.typing import Array
 
 #: Status of a search: `out` too small, step size collapsed, start inside a body or its atmosphere, `MAX_STEPS` taken.
@@ -120,8 +127,8 @@ def track_encounters(
         Time reached, s; for `INSIDE` the number of the body.
     """
     field = borrowed_field(field)
-    k, places = borrowed_room(room)
-    spare, spare_places = borrowed_room(spare_room)
+    room, spare = borrowed_room(room), borrowed_room(spare_room)
+    k, places = room.k, room.places
     limits, floors = reach
     y = y0.copy()
     new = np.empty(6)
@@ -142,7 +149,7 @@ def track_encounters(
         if count > MAX_STEPS:
             return n, EXHAUSTED, t
         stop = t_quiet if (t_quiet - t) * sign > 0.0 else t_end
-        t_new, h = advance(field, law, t, y, h, stop, tolerance, k, new, places)
+        t_new, h = advance(field, law, t, y, h, stop, tolerance, room, new)
         if t_new != t_new:
             return n, STALLED, t
         old[:] = now
@@ -150,10 +157,12 @@ def track_encounters(
         counts = (t - t_quiet) * sign >= 0.0
         bend = _write_ends(t, y, t_new, new, k, pair)
         bulge = 0.125 * (t_new - t) ** 2
+        from_sun = chord_distance(y, old[SUN], new, now[SUN]) - bulge * (bend + BENDING[SUN])
         for body in range(N_BODIES):
-            limit = limits[body] if counts else 0.0
-            far = max(limit, floors[body]) + bulge * (bend + BENDING[body])
-            if chord_distance(y, old[body], new, now[body]) > far:
+            limit = max(limits[body] if counts else 0.0, floors[body])
+            if from_sun > FARTHEST[body] + limit:
+                continue
+            if chord_distance(y, old[body], new, now[body]) > limit + bulge * (bend + BENDING[body]):
                 continue
             if n + FINE > out.shape[0]:
                 return n, FULL, t
@@ -165,7 +174,7 @@ def track_encounters(
                 return n + 1, 0, t_new
             earlier = k[0] if sign > 0.0 else k[N_STAGES]
             n, hit = minima_in_step(
-                field, law, pair, earlier, body, limit, floors[body], out, n, spare, spare_places
+                field, law, pair, earlier, body, limit, floors[body], out, n, spare.k, spare.places
             )
             if hit == hit:
                 return n, 0, hit

@@ -4,8 +4,8 @@ Small deviations d = (dr, dv) of an orbit and dp of its non-gravitational parame
 
     dr' = dv,   dv' = (da/dr) dr + (da/dv) dv + (da/dp) dp
 
-along the orbit (e.g. Montenbruck & Gill 2000, section 7.2). They are integrated by the stages of DOP853 that the orbit
-itself has taken, so that the result is the derivative of the integrated orbit. The gradients are those of
+along the orbit (e.g. Montenbruck & Gill 2000, section 7.2). They are integrated by the stages of RKN12(10) that the
+orbit itself has taken, so that the result is the derivative of the integrated orbit. The gradients are those of
 :mod:`flybystab.orbit.gradients` and :mod:`flybystab.orbit.nongravitational`; those below 1e-9 of that of the attracting
 body are left out.
 """
@@ -15,8 +15,8 @@ from __future__ import annotations
 import numpy as np
 
 from flybystab.constants import DAY
-from flybystab.core.numerics.dop853 import FROM, N_STAGES, NODE, STAGE, WEIGHT, stage_state_6
 from flybystab.core.numerics.jit import kernel
+from flybystab.core.numerics.rkn12 import FROM, IN_POSITION, IN_VELOCITY, N_STAGES, NODE, STAGE, stage_state
 from flybystab.orbit.almanac import N_BELT, N_FAST, N_SLOW, Places, find_places, has_belt
 from flybystab.orbit.ephemeris import SUN
 from flybystab.orbit.gradients import (
@@ -40,7 +40,7 @@ from flybystab.orbit.search.acceleration import (
     first_rate,
     heliocentric,
 )
-from flybystab.orbit.search.dop853 import Room, advance, borrowed_room
+from flybystab.orbit.search.steps import Room, advance, borrowed_room
 from flybystab.typing import Array
 
 #: Gradients below this fraction of that of the attracting body are left out.
@@ -121,7 +121,7 @@ def vary(
     ----------
     t, y, h : float, ndarray, float
         Beginning of the step (s; m, m/s), and its length.
-    k : ndarray, shape (13, 6)
+    k : ndarray, shape (18, 6)
         Rates of the orbit at the stages of the step.
     by_parameters, by_delay : bool
         True if non-gravitational parameters deviate, and if DT is among them.
@@ -129,38 +129,41 @@ def vary(
         Deviations of A1, A2, A3, DT, AMRAT that go with each column.
     columns : ndarray, shape (6, m)
         The deviations, one a column (m, m/s); replaced by those at the end of the step.
-    rates, now, places : ndarray (12, 6, m), ndarray (6, m), Places
-        Work space.
+    rates, now, places : ndarray (17, 3, m), ndarray (6, m), Places
+        Work space; `rates` are second derivatives of the deviations of position.
     """
     a = np.empty((3, 6))
     by_law = np.zeros((N_PARAMETERS, 3))
     state = np.empty(6)
     count = columns.shape[1]
-    flat, before = now.reshape(6 * count), columns.reshape(6 * count)
-    all_rates = rates.reshape((N_STAGES, 6 * count))
+    half = 3 * count
+    flat, before = now.reshape(2 * half), columns.reshape(2 * half)
+    all_rates = rates.reshape((N_STAGES, half))
     for s in range(N_STAGES + 1):
-        flat[:] = before
+        for j in range(half):
+            flat[j] = before[j] + NODE[s] * h * before[half + j]
+            flat[half + j] = before[half + j]
         for m in range(FROM[s], FROM[s + 1]):
-            w = h * WEIGHT[m]
+            in_position, in_velocity = h * h * IN_POSITION[m], h * IN_VELOCITY[m]
             its = all_rates[STAGE[m]]
-            for j in range(6 * count):
-                flat[j] += w * its[j]
+            for j in range(half):
+                flat[j] += in_position * its[j]
+                flat[half + j] += in_velocity * its[j]
         if s == N_STAGES:
             before[:] = flat
             return
-        stage_state_6(s, y, h, k, state)
+        stage_state(s, y, h, k, state)
         gradient(field, law, t + NODE[s] * h, state, by_parameters, by_delay, places, a, by_law)
         out = rates[s]
-        out[:3] = now[3:]
-        out[3:] = 0.0
+        out[:] = 0.0
         for j in range(3):
             for m in range(6):
                 for c in range(count):
-                    out[3 + j, c] += a[j, m] * now[m, c]
+                    out[j, c] += a[j, m] * now[m, c]
             if by_parameters:
                 for m in range(N_PARAMETERS):
                     for c in range(count):
-                        out[3 + j, c] += by_law[m, j] * more[m, c]
+                        out[j, c] += by_law[m, j] * more[m, c]
 
 
 @kernel
@@ -198,7 +201,8 @@ def carry_with_deviations(
         Number of times reached.
     """
     field = borrowed_field(field)
-    k, places = borrowed_room(room)
+    room = borrowed_room(room)
+    k, places = room.k, room.places
     spare = empty_places()
     q = more.shape[0]
     unit = np.zeros((6, 6 + q))
@@ -210,7 +214,7 @@ def carry_with_deviations(
     by_parameters = q > 0
     by_delay = by_parameters and np.abs(more[:, BY_DT]).max() > 0.0
     columns, now = np.empty((6, 6 + q)), np.empty((6, 6 + q))
-    rates = np.empty((N_STAGES, 6, 6 + q))
+    rates = np.empty((N_STAGES, 3, 6 + q))
     y = y0.copy()
     new = np.empty(6)
     h = DAY
@@ -219,7 +223,7 @@ def carry_with_deviations(
     for n in range(times.size):
         columns[:] = unit
         while t != times[n]:
-            t_new, h = advance(field, law, t, y, h, times[n], tolerance, k, new, places)
+            t_new, h = advance(field, law, t, y, h, times[n], tolerance, room, new)
             if t_new != t_new:  # the step size collapsed
                 return n
             vary(field, law, t, y, t_new - t, k, by_parameters, by_delay, by, columns, rates, now, spare)

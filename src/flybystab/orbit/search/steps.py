@@ -1,0 +1,128 @@
+"""Steps of RKN12(10) (:mod:`flybystab.core.numerics.rkn12`) in the field of the planets, and their control."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from flybystab.constants import DAY
+from flybystab.core.numerics.jit import borrowed, kernel, pasted_kernel, summing_kernel
+from flybystab.core.numerics.rkn12 import ERROR_ORDER, N_STAGES, NODE, stage_state, step_error
+from flybystab.orbit.almanac import Places
+from flybystab.orbit.nongravitational import NonGravitationalParameters
+from flybystab.orbit.search.acceleration import Field, empty_places, rate
+from flybystab.typing import Array
+
+#: Units of position (m) and velocity (m/s) of the tolerance.
+_LENGTH, _SPEED = 1.5e11, 3.0e4
+#: Longest step, and the step below which the step size counts as collapsed, s.
+LONGEST, SHORTEST = 100.0 * DAY, 1e-3
+#: Of the step size that would meet the tolerance, this fraction is used; limits of its change.
+_SAFETY, _LEAST, _MOST = 0.88, 0.1, 5.0
+_POWER = -1.0 / ERROR_ORDER
+
+
+class Room(NamedTuple):
+    """Buffers of an integration.
+
+    Attributes
+    ----------
+    k : ndarray, shape (18, 6)
+        Velocity (m/s) and acceleration (m/s2) at the stages of a step, and at its end.
+    last : ndarray, shape (2,)
+        Length (s; 0 before the first) of the last step whose length followed from its error, and that error over the
+        tolerance.
+    places : Places
+        Positions of the bodies.
+    """
+
+    k: Array
+    last: Array
+    places: Places
+
+
+@kernel
+def empty_room() -> Room:
+    """Buffers for one integration."""
+    return Room(np.empty((N_STAGES + 1, 6)), np.zeros(2), empty_places())
+
+
+@kernel
+def borrowed_room(room: Room) -> Room:
+    """The same buffers for a new integration, without reference counts, inside a kernel that has it as an argument."""
+    p = room.places
+    room.last[0] = 0.0
+    return Room(
+        borrowed(room.k),
+        borrowed(room.last),
+        Places(borrowed(p.fast), borrowed(p.slow), borrowed(p.belt), borrowed(p.heavy)),
+    )
+
+
+@summing_kernel
+def step(
+    field: Field,
+    law: NonGravitationalParameters,
+    t: float,
+    y: Array,
+    h: float,
+    k: Array,
+    new: Array,
+    places: Places,
+) -> float:
+    """One step from ``y[6]`` at ``t`` over ``h`` s with the rate there in ``k[0]``.
+
+    Writes the new state, the rates ``k[18, 6]`` (the last is that of the new state) and the places at its end;
+    returns the estimated error in units of 1.5e11 m and 30 km/s.
+    """
+    for s in range(1, N_STAGES + 1):
+        stage_state(s, y, h, k, new)
+        rate(field, law, t + NODE[s] * h, new, places, k[s])
+    return step_error(h, k, _LENGTH, _SPEED)
+
+
+@pasted_kernel
+def advance(
+    field: Field,
+    law: NonGravitationalParameters,
+    t: float,
+    y: Array,
+    h: float,
+    stop: float,
+    tolerance: float,
+    room: Room,
+    new: Array,
+) -> tuple[float, float]:
+    """One step of at most ``|h|`` s toward ``stop``, shortened until its error is below ``tolerance``.
+
+    The next step length is the smaller of two: that for which the error of this step would meet the tolerance, and
+    that which continues the change from the last step to this one (Gustafsson 1994, ACM Trans. Math. Softw. 20, 496).
+    On the way to periapsis the second avoids rejected steps.
+
+    Writes as :func:`step`.
+
+    Returns
+    -------
+    float
+        Time reached, s; exactly ``stop`` in the last step; nan where the step size collapsed.
+    float
+        Length of the next step, positive, s: `h` itself if ``stop`` shortened the step.
+    """
+    h = abs(h)
+    sign = 1.0 if stop > t else -1.0
+    while h > SHORTEST:
+        to_stop = abs(stop - t) <= h
+        length = stop - t if to_stop else sign * h
+        error = step(field, law, t, y, length, room.k, new, room.places) / tolerance
+        scale = _SAFETY * error**_POWER if error > 0.0 else _MOST
+        if error <= 1.0:
+            if not to_stop or scale < 1.0:
+                size, before = abs(length), room.last[0]
+                if before > 0.0:
+                    scale = min(scale, scale * size / before * (room.last[1] / max(error, 1e-30)) ** -_POWER)
+                room.last[0], room.last[1] = size, max(error, 1e-30)
+                h = size * min(max(scale, 0.2), _MOST)
+            return stop if to_stop else t + length, min(h, LONGEST)
+        h = abs(length) * (max(scale, _LEAST) if error < 1e30 else _LEAST)
+    return np.nan, h
