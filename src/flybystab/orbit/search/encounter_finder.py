@@ -38,7 +38,7 @@ from flybystab.orbit.search.search_setup import (
     reach_of,
     search_forces,
     search_span,
-    search_tolerances,
+    search_tolerance,
 )
 from flybystab.orbit.search.track import EXHAUSTED, INSIDE, MAX_STEPS, STALLED, Reach, search
 from flybystab.progress import check_progress, progress_bar
@@ -85,8 +85,8 @@ def find_encounters(
         acceleration are always included.
     tolerance : float, optional
         Estimated error per step of the integration, in units of 1.5e11 m and 30 km/s; values below 1e-14, where
-        rounding errors limit the accuracy, count as 1e-14. By default ``1e-12 (error/0.1 km) (10 yr/span)``, from
-        1e-14 to 1e-8: the error of nine of ten asteroids is then below `error` at the end of the span.
+        rounding errors limit the accuracy, count as 1e-14. By default ``1e-12 error/km``, from 1e-14 to 1e-8: the
+        error of nine of ten asteroids is then below `error` for a century.
     forces : tuple of str, optional
         Exactly these forces, names as in ``flybystab.orbit.forces.FORCES``, instead of choosing by `error`.
     growth : bool
@@ -138,9 +138,9 @@ def find_encounters(
     # A tenth: the displacements add up, and encounters amplify them.
     least = 0.1 * accuracy if forces is None and not growth else 0.0
     acting = search_forces(rows, found, forces, least, span.window, epochs, states)
-    tolerances = search_tolerances(span, epochs, accuracy, tolerance, growth)
+    allowed = search_tolerance(accuracy, tolerance, growth)
     shares = np.zeros((len(rows), N_SHARES))
-    job = _Search(rows, span, acting, epochs, states, reach_of(found, distances), tolerances, shares, {})
+    job = _Search(rows, span, acting, epochs, states, reach_of(found, distances), allowed, shares, {})
     raw = _without_early_impacts(job, _integrated(job, workers, progress))
     # An impact on the Sun ends an orbit and always has a row.
     requested = np.isin(raw["body"], [SUN, *(BODIES.index(b.name) for b in found)])
@@ -157,14 +157,14 @@ def find_encounters(
             acting.laws,
             span.window,
             lambda i: acting.of(i, job.shares[i]),
-            tolerances,
+            allowed,
             workers,
         )
     return out
 
 
 class _Search(NamedTuple):
-    """A search: orbits (n), span, forces, distances, tolerances, and the output of the integration.
+    """A search: orbits (n), span, forces, distances, tolerance, and the output of the integration.
 
     Attributes
     ----------
@@ -180,7 +180,7 @@ class _Search(NamedTuple):
     epochs: Array
     states: Array
     reach: Reach
-    tolerances: Array
+    tolerance: float
     shares: Array
     failed: dict[int, dict[str, str]]
 
@@ -263,7 +263,7 @@ def _part(job: _Search, part: slice) -> list[NDArray[Any]]:
             span.begin,
             span.end,
             job.reach,
-            job.tolerances[part],
+            job.tolerance,
             forces.least,
             forces.always,
             job.shares[part],
@@ -323,7 +323,7 @@ def _metadata(job: _Search, elsewhere: NDArray[Any]) -> dict[str, Any]:
         "failed": [job.failed[i] for i in sorted(job.failed)],
         "frame": "ICRF",
         "time_scale": "TDB",
-        "tolerance": float(job.tolerances.min(initial=1.0)),
+        "tolerance": job.tolerance,
     }
 
 

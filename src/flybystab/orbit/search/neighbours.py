@@ -336,7 +336,7 @@ def add_growth(
     laws: Array,
     window: Window,
     field_of: Callable[[int], Field],
-    tolerances: Array,
+    tolerance: float,
     threads: int,
 ) -> None:
     """Add to a table of encounters ``displacement``, ``model_error`` (km), ``growth`` and ``predictability``.
@@ -355,7 +355,7 @@ def add_growth(
     laws : ndarray, shape (n, N_LAW)
         Non-gravitational acceleration of each asteroid: rows of
         :class:`flybystab.orbit.nongravitational.NonGravitationalParameters`.
-    window, tolerances
+    window, tolerance
         Of the search.
     field_of : callable
         Function from the number of an asteroid to the forces on it.
@@ -365,7 +365,7 @@ def add_growth(
 
     def one(i: int) -> None:
         rows = np.flatnonzero(index == i)
-        found = spread(beside[i], field_of(i), parameters_of(laws[i]), window, times[rows], tolerances[i])
+        found = spread(beside[i], field_of(i), parameters_of(laws[i]), window, times[rows], tolerance)
         out[:, rows] = found.displacement, found.growth, found.model_error
 
     for _ in in_order(one, np.unique(index).tolist(), threads):

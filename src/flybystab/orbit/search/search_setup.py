@@ -1,4 +1,4 @@
-"""Set-up of a search for encounters: span, forces, tolerances and initial states of the asteroids."""
+"""Set-up of a search for encounters: span, forces, tolerance and initial states of the asteroids."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import astropy.units as u
 import numpy as np
 from astropy.time import Time
 
-from flybystab.constants import DAY, YEAR
+from flybystab.constants import DAY
 from flybystab.orbit.almanac import GRID, N_FAST, N_SLOW, SLOT
 from flybystab.orbit.barycentre import barycentre_in
 from flybystab.orbit.default_forces import TWIN_DISTANCE, TWIN_SPEED, default_forces
@@ -29,9 +29,9 @@ _SPEED = u.m / u.s
 
 #: Margin of the integration beyond the span, so that a minimum at its end is bracketed, s.
 _MARGIN = 60.0
-#: Tolerance over the error (m) allowed after ten years. The median asteroid stays far below it (``flybystab bench
-#: sky``); the margin is for encounters, which amplify errors. Below the least tolerance rounding errors dominate.
-_AT_10_YEARS, LEAST_TOLERANCE, _LARGEST_TOLERANCE = 1e-12 / 100.0, 1e-14, 1e-8
+#: Tolerance over the allowed error, m: with it nine of ten asteroids stay below half of the error for 76 years
+#: (``python benchmarks/completeness.py stages``). Below the least tolerance rounding errors dominate.
+_PER_ERROR, LEAST_TOLERANCE, _LARGEST_TOLERANCE = 1e-15, 1e-14, 1e-8
 #: Largest tolerance where encounters amplify the errors of the integration.
 _WITH_GROWTH = 1e-13
 
@@ -150,15 +150,12 @@ def search_forces(
     return SearchForces(chosen, everything, own, laws, least, always)
 
 
-def search_tolerances(
-    span: SearchSpan, epochs: Array, accuracy: float, tolerance: float | None, growth: bool
-) -> Array:
-    """Tolerance of the integration of each asteroid, from the allowed error (m) if none is given."""
+def search_tolerance(accuracy: float, tolerance: float | None, growth: bool) -> float:
+    """Tolerance of the integration, from the allowed error (m) if none is given."""
     if tolerance is not None:
-        return np.full(len(epochs), max(float(tolerance), LEAST_TOLERANCE))
-    longest = np.maximum(np.abs(epochs - span.start), np.abs(epochs - span.stop))
-    tolerances = _AT_10_YEARS * accuracy * 10.0 * YEAR / longest
-    return np.clip(tolerances, LEAST_TOLERANCE, _WITH_GROWTH if growth else _LARGEST_TOLERANCE)
+        return max(float(tolerance), LEAST_TOLERANCE)
+    largest = _WITH_GROWTH if growth else _LARGEST_TOLERANCE
+    return min(max(_PER_ERROR * accuracy, LEAST_TOLERANCE), largest)
 
 
 def reach_of(found: list[Planet], distances: Array) -> Reach:

@@ -193,7 +193,7 @@ def search(
     t_start: float,
     t_stop: float,
     reach: Reach,
-    tolerances: Array,
+    tolerance: float,
     least: float,
     always: Array,
     shares: Array,
@@ -237,7 +237,7 @@ def search(
             else:
                 continue
             m, status, t = track_encounters(
-                field, law, t0, y, quiet, end, reach, tolerances[i], room, spare_room, out, m
+                field, law, t0, y, quiet, end, reach, tolerance, room, spare_room, out, m
             )
             if status != 0:
                 return i, n, status, t
