@@ -122,28 +122,14 @@ class Passage:
 
 def passages(asteroid: Asteroid, settings: Settings) -> list[Passage]:
     """Encounters of an asteroid in order of time."""
-    from flybystab.orbit.search.encounter_finder import find_encounters
+    from flybystab.orbit.search.encounter_finder import approaches
 
-    table = find_encounters(
-        asteroid.orbit,
-        Time(settings.start, format="jd", scale="tdb"),
-        Time(settings.stop, format="jd", scale="tdb"),
-        planets=list(settings.planets),
-        within=settings.within * u.m,
-        workers=1,
-    )
-    found = [
-        Passage(
-            asteroid,
-            str(row["planet"]),
-            row["time"],
-            float(row["distance"].to_value(u.m)),
-            float(row["v_inf"].to_value(u.m / u.s)),
-        )
-        for row in table
-        if row["planet"] != "sun"
+    start, stop = (Time(jd, format="jd", scale="tdb") for jd in (settings.start, settings.stop))
+    found = approaches(asteroid.orbit, start, stop, settings.planets, settings.within)
+    return [
+        Passage(asteroid, a.planet, a.time, a.distance, a.v_inf)
+        for a in sorted(found, key=lambda a: (a.time.tdb.jd, a.planet))
     ]
-    return sorted(found, key=lambda p: (p.time.tdb.jd, p.planet))
 
 
 #: Function that finds the encounters of an asteroid; worker processes import it.

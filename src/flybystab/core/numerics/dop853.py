@@ -66,27 +66,6 @@ def stage_state(s: int, y: Array, n: int, h: float, k: Array, out: Array) -> Non
 
 
 @pasted_kernel
-def stage_state_6(s: int, y: Array, h: float, k: Array, out: Array) -> None:
-    """`stage_state` for six numbers (a position and a velocity), with the sums in registers."""
-    w0 = w1 = w2 = w3 = w4 = w5 = 0.0
-    for m in range(FROM[s], FROM[s + 1]):
-        a = WEIGHT[m]
-        i = STAGE[m]
-        w0 += a * k[i, 0]
-        w1 += a * k[i, 1]
-        w2 += a * k[i, 2]
-        w3 += a * k[i, 3]
-        w4 += a * k[i, 4]
-        w5 += a * k[i, 5]
-    out[0] = y[0] + h * w0
-    out[1] = y[1] + h * w1
-    out[2] = y[2] + h * w2
-    out[3] = y[3] + h * w3
-    out[4] = y[4] + h * w4
-    out[5] = y[5] + h * w5
-
-
-@pasted_kernel
 def error_sums(n: int, k: Array, scale: Array) -> tuple[float, float]:
     """Sums of squares of the error estimates of order 5 and 3, over ``scale[n]``, from the rates ``k[13, n]``."""
     five = 0.0

@@ -17,6 +17,7 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.arguments import check_arguments
+from flybystab.constants import DAY
 from flybystab.core.numerics.threads import in_order, worker_count
 from flybystab.errors import Impact, InvalidInput, NotConverged
 from flybystab.orbit.ephemeris import BODIES, SUN, Ephemeris
@@ -46,6 +47,9 @@ from flybystab.result_table import ResultTable
 from flybystab.typing import Array
 from flybystab.units import checked_time, to_si
 
+#: Default of the allowed displacement.
+ERROR = 0.1 * u.km
+
 
 @check_arguments
 def find_encounters(
@@ -56,7 +60,7 @@ def find_encounters(
     within: Quantity = 0.05 * u.au,
     *,
     ephemeris: str | Ephemeris | None = None,
-    error: Quantity = 0.1 * u.km,
+    error: Quantity = ERROR,
     tolerance: float | None = None,
     forces: tuple[str, ...] | None = None,
     growth: bool = False,
@@ -133,30 +137,24 @@ def find_encounters(
     found, distances = _planets_within(planets, within)
     accuracy = to_si(error, u.m, "error", low=0.0)
     eph = as_ephemeris(ephemeris)
-    span, epochs = search_span(rows, start, stop, eph, growth)
-    states = initial_states(rows, span.window, epochs)
-    # A tenth: the displacements add up, and encounters amplify them.
-    least = 0.1 * accuracy if forces is None and not growth else 0.0
-    acting = search_forces(rows, found, forces, least, span.window, epochs, states)
     allowed = search_tolerance(accuracy, tolerance, growth)
-    shares = np.zeros((len(rows), N_SHARES))
-    job = _Search(rows, span, acting, epochs, states, reach_of(found, distances), allowed, shares, {})
+    job = _prepared(rows, start, stop, found, distances, eph, accuracy, allowed, forces, growth)
     raw = _without_early_impacts(job, _integrated(job, workers, progress))
     # An impact on the Sun ends an orbit and always has a row.
     requested = np.isin(raw["body"], [SUN, *(BODIES.index(b.name) for b in found)])
     meta = _metadata(job, raw[~requested])
     raw = raw[requested]
     contacts = _contacts(job, raw)
-    out = encounter_table(rows, raw, contacts, span.middle, span.window, meta)
+    out = encounter_table(rows, raw, contacts, job.span.middle, job.span.window, meta)
     if growth:
         beside = {i: deviations_of(rows[i][1], eph) for i in np.unique(out["index"]).tolist()}
         add_growth(
             out,
             contacts[:, 0],
             beside,
-            acting.laws,
-            span.window,
-            lambda i: acting.of(i, job.shares[i]),
+            job.forces.laws,
+            job.span.window,
+            lambda i: job.forces.of(i, job.shares[i]),
             allowed,
             workers,
         )
@@ -189,6 +187,78 @@ class _Search(NamedTuple):
         if len(self.rows) == 1:
             raise error
         self.failed[i] = {"asteroid": self.rows[i][0], "why": str(error)}
+
+
+def _prepared(
+    rows: list[tuple[str, Orbit]],
+    start: Time,
+    stop: Time,
+    found: list[Planet],
+    distances: Array,
+    eph: Ephemeris,
+    accuracy: float,
+    tolerance: float,
+    forces: tuple[str, ...] | None,
+    growth: bool,
+) -> _Search:
+    """The search, before the integration."""
+    span, epochs = search_span(rows, start, stop, eph, growth)
+    states = initial_states(rows, span.window, epochs)
+    # A tenth: the displacements add up, and encounters amplify them.
+    least = 0.1 * accuracy if forces is None and not growth else 0.0
+    acting = search_forces(rows, found, forces, least, span.window, epochs, states)
+    shares = np.zeros((len(rows), N_SHARES))
+    return _Search(rows, span, acting, epochs, states, reach_of(found, distances), tolerance, shares, {})
+
+
+class Approach(NamedTuple):
+    """A closest approach: planet, time (TDB), distance (m) and hyperbolic excess speed (m/s; 0 for a bound one)."""
+
+    planet: str
+    time: Time
+    distance: float
+    v_inf: float
+
+
+def approaches(
+    orbit: Orbit, start: Time, stop: Time, planets: Sequence[str], within: float
+) -> list[Approach]:
+    """Closest approaches of one orbit to planets within a distance (m), in order of time, without a table.
+
+    Those of :func:`find_encounters` with its defaults, in the calling thread, without impacts on the Sun.
+
+    Raises
+    ------
+    OutOfSpan, Impact, NotConverged
+    """
+    found = [planet(n) for n in planets]
+    accuracy = ERROR.to_value(u.m)
+    tolerance = search_tolerance(accuracy, None, False)
+    distances = np.full(len(found), within)
+    job = _prepared(
+        [(orbit.name or "0", orbit)],
+        start,
+        stop,
+        found,
+        distances,
+        as_ephemeris(None),
+        accuracy,
+        tolerance,
+        None,
+        False,
+    )
+    raw = _without_early_impacts(job, _integrated(job, 1, False))
+    raw = raw[np.isin(raw["body"], [BODIES.index(b.name) for b in found])]
+    zero = job.span.middle.tdb
+    return [
+        Approach(
+            BODIES[r["body"]],
+            Time(zero.jd1, zero.jd2 + r["time"] / DAY, format="jd", scale="tdb"),
+            float(r["distance"]),
+            float(np.sqrt(max(r["v_inf2"], 0.0))),
+        )
+        for r in raw
+    ]
 
 
 def _check_options(start: Time, stop: Time, forces: tuple[str, ...] | None, tolerance: float | None) -> None:

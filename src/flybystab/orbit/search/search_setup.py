@@ -9,7 +9,7 @@ import astropy.units as u
 import numpy as np
 from astropy.time import Time
 
-from flybystab.constants import DAY
+from flybystab.constants import DAY, YEAR
 from flybystab.orbit.almanac import GRID, N_FAST, N_SLOW, SLOT
 from flybystab.orbit.barycentre import barycentre_in
 from flybystab.orbit.default_forces import TWIN_DISTANCE, TWIN_SPEED, default_forces
@@ -91,10 +91,21 @@ class SearchForces(NamedTuple):
         return reduced(self.own.get(i, self.everything), shares, self.least, self.always)
 
 
+#: The window of an ephemeris extends to multiples of this fraction of the span, or of a year, from its middle, so that
+#: asteroids of similar epochs have the same window, almanac and field.
+_BLOCK = 0.25
+
+
 @lru_cache(maxsize=4)
 def _window(eph: Ephemeris, day: float, fraction: float, start: float, stop: float) -> Window:
     """The ephemeris over a search; cached, with its almanac, for the next asteroid of the same epoch."""
     return eph.window(Time(day, fraction, format="jd", scale="tdb"), start, stop)
+
+
+@lru_cache(maxsize=8)
+def _field(window: Window, names: tuple[str, ...]) -> Field:
+    """The named forces; cached for the next asteroid of the same window."""
+    return field(window, names)
 
 
 def search_span(
@@ -112,7 +123,10 @@ def search_span(
     if first <= t_start and t_stop <= last:
         begin, end = max(begin, first + 1e-3), min(end, last - 1e-3)
     every = [begin, end, *epochs, *known]
-    window = _window(ephemeris, middle.tdb.jd1, middle.tdb.jd2, min(every), max(every))
+    block = max(_BLOCK * (end - begin), YEAR)
+    low = max(block * np.floor(min(every) / block), min(first, *every))
+    high = min(block * np.ceil(max(every) / block), max(last, *every))
+    window = _window(ephemeris, middle.tdb.jd1, middle.tdb.jd2, float(low), float(high))
     return SearchSpan(middle, t_start, t_stop, begin, end, window), epochs
 
 
@@ -131,7 +145,7 @@ def search_forces(
         kinds = {orbit.nongrav.active: orbit for _, orbit in rows}
         used = {name for orbit in kinds.values() for name in default_forces(orbit, *(b.name for b in found))}
         chosen = tuple(name for name in FORCES if name in used)
-    everything = field(window, [n for n in chosen if n != "non-gravitational"])
+    everything = _field(window, tuple(n for n in chosen if n != "non-gravitational"))
     always = np.zeros(N_FAST + N_SLOW, dtype=bool)
     for name in ("sun", *(b.name for b in found)):
         b = BODIES.index(name)
@@ -144,7 +158,7 @@ def search_forces(
     # A massive asteroid does not attract itself.
     twins = {} if forces is not None else _twins(window, epochs, states)
     own = {
-        i: field(window, [n for n in chosen if n not in ("non-gravitational", f"{name} point mass")])
+        i: _field(window, tuple(n for n in chosen if n not in ("non-gravitational", f"{name} point mass")))
         for i, name in twins.items()
     }
     return SearchForces(chosen, everything, own, laws, least, always)
