@@ -2,12 +2,14 @@
 
 python benchmarks/versions.py OLD [NEW]         folders of two checkouts; NEW is this one by default
 python benchmarks/versions.py calls OLD [NEW]   the same for calls of the public functions
+python benchmarks/versions.py search OLD [NEW]  the same for searches for encounters, with their errors
 
 Each version runs in a process of its own with compiled kernels. Without `calls`: the pile of `flybystab bench flyby` in
 300 attitudes at 6 and 3 radii (rigid), 2.2 radii (a third of them flow) and 300 random scenes of `campaign.py stress`;
 the ratio is the median over the rounds; outcomes that differ are counted. With `calls`: the same pile at 3 radii,
 without yield, and at 2.2 radii, where it flows, in a default `fs.flyby` and in a row of `fs.flyby_many` over 200 random
-attitudes on one thread; medians of the rounds.
+attitudes on one thread; medians of the rounds. With `search`: encounters of the asteroids of the embedded catalogue
+with the Earth below 0.05 au, with the default error; errors of the distance are against NEW at its least tolerance.
 """
 
 from __future__ import annotations
@@ -26,6 +28,11 @@ from typing import Any
 ROUNDS, NUMBER = 15, 300
 #: The same for calls of the public functions.
 ROUNDS_CALLS, N_ROWS = 7, 200
+#: Rounds and spans of the searches.
+ROUNDS_SEARCH, SPANS = (
+    5,
+    {"24 years": ("2025-01-01", "2049-01-01"), "100 years": ("1950-01-01", "2050-01-01")},
+)
 
 
 def cases() -> dict[str, tuple[Any, Any]]:
@@ -116,6 +123,38 @@ def calls() -> Callable[[], dict[str, Any]]:
     return times
 
 
+def search() -> Callable[[], dict[str, Any]]:
+    """A function that returns processor time (s), numbers of the asteroids, JD and distances (km) of each span."""
+    import flybystab as fs
+
+    asteroids = fs.catalogue()
+
+    def found(
+        span: tuple[str, str], tolerance: float | None
+    ) -> tuple[float, list[int], list[float], list[float]]:
+        start = time.process_time()
+        table = fs.find_encounters(asteroids, *span, tolerance=tolerance, workers=1)
+        took = time.process_time() - start
+        return (
+            took,
+            table["index"].tolist(),
+            table["time"].jd.tolist(),
+            table["distance"].to_value("km").tolist(),
+        )
+
+    def times() -> dict[str, Any]:
+        answer: dict[str, Any] = {"asteroids": len(asteroids)}
+        for name, span in SPANS.items():
+            answer[name] = found(span, None)
+            if not truth:
+                answer[f"{name}, tight"] = found(span, 1e-14)
+        truth.append(True)
+        return answer
+
+    truth: list[bool] = []
+    return times
+
+
 def serve(prepare: Callable[[], Callable[[], dict[str, Any]]]) -> None:
     """Run all cases for each line that comes in, and write their times and outcomes."""
     times = prepare()
@@ -183,20 +222,48 @@ def print_kernels(folders: list[Path]) -> None:
         )
 
 
+def print_search(folders: list[Path]) -> None:
+    """Print rates of the searches and errors of their distances."""
+    import numpy as np
+
+    both = [answers(folder, "search") for folder in folders]
+    first = [next(a) for a in both]  # compiles
+    rounds = [[next(a) for a in both] for _ in range(ROUNDS_SEARCH)]
+    asteroids = first[1]["asteroids"]
+    print(
+        f"{asteroids} asteroids of the embedded catalogue, one thread, processor time, least of {ROUNDS_SEARCH} rounds"
+    )
+    print(
+        f"{'span':>10} {'':>4} {'object-years/s':>14} {'encounters':>10} {'median (km)':>11} {'p90 (km)':>9}"
+    )
+    for name in SPANS:
+        _, index, days, km = (np.array(x) for x in first[1][f"{name}, tight"])
+        for k, version in enumerate(("old", "new")):
+            _, i, d, x = (np.array(column) for column in first[k][name])
+            gaps = [
+                np.abs(x - b)[(i == a) & (np.abs(d - t) < 1.0)].min(initial=np.inf)
+                for a, t, b in zip(index, days, km, strict=True)
+            ]
+            years = float(name.split()[0])
+            took = min(r[k][name][0] for r in rounds)
+            median, most = np.percentile(gaps, [50, 90])
+            print(
+                f"{name:>10} {version:>4} {asteroids * years / took:14.0f} {len(i):10d} {median:11.2g} {most:9.2g}"
+            )
+
+
 def main() -> int:
     words = sys.argv[1:]
-    public = words[:1] == ["calls"]
-    words = words[public:]
+    modes = {"calls": print_calls, "search": print_search}
+    show = modes.get(words[0], print_kernels) if words else print_kernels
+    words = words[show is not print_kernels :]
     if not 1 <= len(words) <= 2:
         print(__doc__)
         return 2
     folders = [Path(word).resolve() for word in words]
     if len(folders) == 1:
         folders.append(Path(__file__).resolve().parents[1])
-    if public:
-        print_calls(folders)
-    else:
-        print_kernels(folders)
+    show(folders)
     return 0
 
 

@@ -1,4 +1,4 @@
-"""Integration of asteroids, one at a time, with DOP853, and the search for encounters within each step.
+"""Integration of asteroids, one at a time, with RKN12(10), and the search for encounters within each step.
 
 Each asteroid has its own step size and its own selection of forces. After each step the distances from the
 requested planets are checked for minima (:mod:`flybystab.orbit.search.minima`). An impact on any body is reported and
