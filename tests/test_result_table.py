@@ -120,7 +120,7 @@ def test_a_notebook_shows_the_main_columns(tables, kind):
 def test_dates_and_numbers_of_a_notebook_are_short(tables):
     page = tables["encounters"]._repr_html_()
     assert "<td>2029-04-13 21:46:12</td>" in page
-    assert re.search(r"<td>38011\.3[78]\d</td>", page)
+    assert re.search(r"<td>38011\.3\d{0,2}</td>", page)
     assert tables["encounters"]["distance"].info.format is None  # the table itself is unchanged
 
 
