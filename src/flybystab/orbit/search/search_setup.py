@@ -123,9 +123,10 @@ def search_span(
     if first <= t_start and t_stop <= last:
         begin, end = max(begin, first + 1e-3), min(end, last - 1e-3)
     every = [begin, end, *epochs, *known]
-    block = max(_BLOCK * (end - begin), YEAR)
-    low = max(block * np.floor(min(every) / block), min(first, *every))
-    high = min(block * np.ceil(max(every) / block), max(last, *every))
+    block = max(_BLOCK * (t_stop - t_start), YEAR)
+    low = block * np.floor((min(every) + _MARGIN) / block) - _MARGIN
+    high = block * np.ceil((max(every) - _MARGIN) / block) + _MARGIN
+    low, high = max(low, min(first, *every)), min(high, max(last, *every))
     window = _window(ephemeris, middle.tdb.jd1, middle.tdb.jd2, float(low), float(high))
     return SearchSpan(middle, t_start, t_stop, begin, end, window), epochs
 
