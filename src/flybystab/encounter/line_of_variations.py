@@ -43,8 +43,9 @@ _SMALL = 1e-2
 _NODES, _SPLINE = 65, 5e-3
 #: Largest ratio of the distances between nodes: beyond an encounter the derivatives vary along the line.
 _EVEN = 1.25
-#: Interval of the candidate times, s, and tolerance of the integration to them.
-_PAUSE, _FINE = 0.5 * YEAR, 1e-14
+#: Interval of the candidate times, s, and tolerance of the integration to them. The tolerance is at the rounding error:
+#: differences of neighbouring orbits of Bennu, 0.1 m at the epoch, are smooth only then.
+_PAUSE, _FINE = 0.5 * YEAR, 1e-16
 
 
 class _Ahead(NamedTuple):

@@ -17,7 +17,7 @@ from flybystab.typing import Array
 #: Units of position (m) and velocity (m/s) of the tolerance.
 _LENGTH, _SPEED = 1.5e11, 3.0e4
 #: Longest step, and the step below which the step size counts as collapsed, s.
-LONGEST, SHORTEST = 100.0 * DAY, 1e-3
+LONGEST, SHORTEST = 100.0 * DAY, 1e-5
 #: Of the step size that would meet the tolerance, this fraction is used; limits of its change.
 _SAFETY, _LEAST, _MOST = 0.88, 0.1, 5.0
 _POWER = -1.0 / ERROR_ORDER
