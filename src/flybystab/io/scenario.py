@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
@@ -95,10 +96,11 @@ def scenario(path: str | Path) -> Scenario:
 
 
 def quantity(value: object, name: str) -> Quantity:
-    """A quantity from text such as ``"6 h"``, ``"2.2 R_earth"`` or ``"1400, 850, 750 m"``."""
+    """A quantity from text such as ``"6 h"``, ``"2.2 R_earth"``, ``"1400, 850, 750 m"`` or ``"1400 x 850 x 750 m"``."""
+    example = '"1400, 850, 750 m"' if name.endswith("axes") else '"6 h" or "1400, 850, 750 m"'
     if not isinstance(value, str):
-        raise InvalidInput(name, value, 'text with a unit, for example "6 h"')
-    text = value.strip()
+        raise InvalidInput(name, value, f"text with a unit, for example {example}")
+    text = re.sub(r"(?<=\d)\s*[x×]\s*(?=[\d.])", ", ", value.strip())
     scale: Quantity | float = 1.0
     head, mark, where = text.rpartition("R_")
     if mark:  # in radii of a planet
@@ -111,9 +113,7 @@ def quantity(value: object, name: str) -> Quantity:
             return np.array([float(x) for x in [*first, tail[0]]]) * unit * scale
         return Quantity(text) * scale
     except (TypeError, ValueError):
-        raise InvalidInput(
-            name, value, 'numbers and a unit, for example "6 h" or "1400, 850, 750 m"'
-        ) from None
+        raise InvalidInput(name, value, f"numbers and a unit, for example {example}") from None
 
 
 def _check(section: Document, table: str) -> None:
