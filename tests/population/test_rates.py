@@ -7,13 +7,14 @@ import astropy.units as u
 import numpy as np
 import pytest
 from astropy.table import QTable
+from scipy.integrate import quad
 
 import flybystab as fs
 from flybystab.constants import AU
 from flybystab.errors import InvalidInput, UnitMismatch, UnknownName
 from flybystab.orbit.elements import GM_SUN, state_from_elements
 from flybystab.orbit.planets import Planet
-from flybystab.population.rates import elements_of
+from flybystab.population.rates import elements_of, smoothing
 
 ORBIT = QTable({"a": [1.3] * u.au, "e": [0.4], "i": [10.0] * u.deg})
 CIRCLE = (1.0 * u.au, 0.0, 0.0 * u.deg)
@@ -94,6 +95,8 @@ def test_rates_grow_with_the_focused_cross_section():
     near, far = (fs.encounter_rates(ORBIT, "earth", q, planet_orbit=CIRCLE) for q in (1e7 * u.m, 1e8 * u.m))
     f = near.planet.gm / near.v_inf[0].to_value(u.m / u.s) ** 2
     expected = 1e8 * (1e8 + 2 * f) / (1e7 * (1e7 + 2 * f))
+    sine = np.sin(np.radians([10.0]))  # 2e-6: mean density over discs of different size
+    expected *= (smoothing(sine, 1e8 / AU) / smoothing(sine, 1e7 / AU))[0]
     assert (far.rate / near.rate)[0].value == pytest.approx(expected, rel=1e-10)
 
 
@@ -203,3 +206,82 @@ def test_collisions_in_the_main_belt_have_the_published_probability():
     assert chance == pytest.approx(chance.T, rel=0.05)
     pairs = chance[np.triu_indices(6, 1)]
     assert np.mean(pairs[pairs > 0.0]) == pytest.approx(2.86e-18, rel=0.5)  # a factor pi would be 3.1
+
+
+#: A planet without attraction.
+BALL = Planet("ball", gm=1.0, radius=1e7, j2=0.0, pole=(0, 0, 1), atmosphere=0.0, target=0, orbit_radius=AU)
+
+
+def sampled_rate(a, e, i, reach, count):
+    """Rate (1/yr) and its error by positions at random angles near a planet on a circular orbit, on the x axis.
+
+    A position within `reach` contributes the inverse of the time in which its straight path crosses the sphere.
+    """
+    rng = np.random.default_rng(5)
+    mean, node, peri = rng.uniform(0.0, 2.0 * np.pi, (3, count))
+    anomaly = mean.copy()
+    for _ in range(6):
+        anomaly -= (anomaly - e * np.sin(anomaly) - mean) / (1.0 - e * np.cos(anomaly))
+    x, y = a * (np.cos(anomaly) - e), a * np.sqrt(1.0 - e * e) * np.sin(anomaly)
+    speed = np.sqrt(GM_SUN / a) / (1.0 - e * np.cos(anomaly))
+    vx, vy = -speed * np.sin(anomaly), speed * np.sqrt(1.0 - e * e) * np.cos(anomaly)
+    cw, sw, cn, sn = np.cos(peri), np.sin(peri), np.cos(node), np.sin(node)
+
+    def turned(p, q):
+        along, across = cw * p - sw * q, sw * p + cw * q
+        return np.stack(
+            [cn * along - sn * np.cos(i) * across, sn * along + cn * np.cos(i) * across, np.sin(i) * across]
+        )
+
+    place, velocity = turned(x, y), turned(vx, vy)
+    place[0] -= AU
+    velocity[1] -= np.sqrt(GM_SUN / AU)
+    near = np.sum(place**2, axis=0) < reach**2
+    place, velocity = place[:, near], velocity[:, near]
+    u2 = np.sum(velocity**2, axis=0)
+    miss2 = np.sum(place**2, axis=0) - np.sum(place * velocity, axis=0) ** 2 / u2
+    weight = np.sqrt(u2) / (2.0 * np.sqrt(reach**2 - miss2)) * YEAR
+    return weight.sum() / count, np.sqrt((weight**2).sum()) / count
+
+
+@pytest.mark.parametrize("degrees", [0.3, 1.0, 3.0, 179.0])
+def test_orbits_of_low_inclination_agree_with_sampled_positions(degrees):
+    orbits = QTable({"a": [1.5] * u.au, "e": [0.45], "i": [degrees] * u.deg})
+    reach = 0.05 * AU
+    expected, error = sampled_rate(
+        1.5 * AU, 0.45, np.radians(degrees), reach, 4_000_000 if degrees == 3.0 else 1_000_000
+    )
+    found = fs.encounter_rates(orbits, BALL, reach * u.m, planet_orbit=CIRCLE).total.value
+    assert error < 0.05 * expected
+    assert (
+        abs(found - expected) < 4.0 * error + 0.03 * expected
+    )  # 3 %: curvature of the orbits within 0.05 au
+
+
+def test_coplanar_orbits_have_the_rate_of_the_plane():
+    """In the plane: density r-dependent over 2 pi r, times the speed and the diameter of the disc."""
+    a, e, reach = 1.5 * AU, 0.45, 1e9
+    inside = (AU - a * (1 - e)) * (a * (1 + e) - AU)
+    density = 1.0 / (np.pi * a * np.sqrt(inside)) / (2.0 * np.pi)
+    h = np.sqrt(GM_SUN * a * (1.0 - e * e)) / AU
+    radial2 = GM_SUN * (2.0 / AU - 1.0 / a) - h * h
+    for i, sign in ((0.0, 1.0), (180.0, -1.0), (1e-4, 1.0)):
+        speed = np.sqrt(radial2 + (sign * h - np.sqrt(GM_SUN / AU)) ** 2)
+        orbits = QTable({"a": [a] * u.m, "e": [e], "i": [i] * u.deg})
+        found = fs.encounter_rates(orbits, BALL, reach * u.m, planet_orbit=CIRCLE)
+        assert found.total.value == pytest.approx(density * 2.0 * reach * speed * YEAR, rel=1e-6)
+        half = found.within(0.5 * reach * u.m).total.value
+        assert half == pytest.approx(0.5 * found.total.value, rel=1e-6)
+
+
+def test_the_mean_density_over_a_disc_is_its_integral():
+    for sin_i, width in ((0.5, 0.05), (0.06, 0.05), (0.05, 0.05), (0.04, 0.05), (1e-7, 0.05), (5.0, 0.01)):
+        m = min(sin_i, width)
+
+        def inner(angle, m=m, sin_i=sin_i, width=width):
+            s = m * np.sin(angle)
+            root = np.sqrt(max(sin_i**2 - s * s, 1e-300))
+            return np.sqrt(max(width**2 - s * s, 0.0)) / root * m * np.cos(angle)
+
+        mean = quad(inner, -np.pi / 2, np.pi / 2, epsabs=0.0)[0] * 2.0 / (np.pi * width) ** 2
+        assert smoothing(np.array([sin_i]), width)[0] == pytest.approx(mean * np.pi * sin_i, rel=1e-6)

@@ -10,6 +10,7 @@ import astropy.units as u
 import numpy as np
 from astropy.table import QTable, Table
 from astropy.units import Quantity
+from scipy.special import ellipe, ellipkm1
 
 from flybystab.arguments import check_arguments
 from flybystab.catalogues.asteroid import Asteroid
@@ -26,6 +27,8 @@ from flybystab.units import to_si, whole
 
 #: Orbits of one task of a thread.
 BLOCK = 20_000
+#: Inclination, rad, that replaces a smaller one; the rate does not depend on such angles (:func:`smoothing`).
+_LEAST_INCLINATION = 1e-7
 #: Orbits of a population: a table with columns ``a``, ``e`` and ``i``, orbits, or asteroids.
 Orbits: TypeAlias = Table | Orbit | Asteroid | Iterable[Orbit | Asteroid]
 
@@ -156,12 +159,14 @@ def encounter_rates(
     -----
     Angles are taken to circulate uniformly (:mod:`flybystab.population.wetherill`): resonances, correlated returns and
     the evolution of ``a``, ``e`` and ``i`` are neglected. For a single asteroid the rate over the next centuries can
-    differ arbitrarily; for a population the mean rate agrees with counted encounters (tests/population).
+    differ arbitrarily; for a population the mean rate agrees with counted encounters (tests/population). The density of
+    orbits of low inclination is averaged over the target disc of a planet in the reference plane (:func:`smoothing`).
     """
     body = planet(planet_name)
     distance = body.radius * u.m if periapsis is None else periapsis
     limit = to_si(distance, u.m, "periapsis", low=0.0, open_low=True)
     elements, weight = _elements(orbits), _weight(orbits)
+    elements[:, 2] = np.clip(elements[:, 2], _LEAST_INCLINATION, np.pi - _LEAST_INCLINATION)
     if planet_orbit is None:
         target = _mean_orbit(body)
     else:
@@ -200,6 +205,8 @@ def _rates(
     body: Planet, limit: float, weight: Array, elements: Array, target: Array, sums: Array
 ) -> EncounterRates:
     rate, mean, square = rate_and_moments(sums, body.gm, limit)
+    if target[2] == 0.0:
+        rate = rate * smoothing(np.sin(elements[:, 2]), limit / target[0])
     dispersion = np.sqrt(np.maximum(0.0, square - mean**2))
     return EncounterRates(
         body,
@@ -212,6 +219,27 @@ def _rates(
         target,
         sums,
     )
+
+
+def smoothing(sin_i: Array, width: float) -> Array:
+    """Mean density of an orbit over the target disc of a planet in the reference plane, over that at its centre.
+
+    The density ``1/(pi sqrt(sin^2 i - s^2))`` in the sine ``s`` of the latitude diverges as the inclination goes to
+    zero. Its mean over a disc is finite: normal to the plane, as the relative velocities of such orbits are in it. For
+    ``i = 0`` the rate is that of two coplanar orbits.
+
+    Parameters
+    ----------
+    sin_i : ndarray (n,)
+        Above zero.
+    width : float
+        Radius of the disc over the distance from the Sun.
+    """
+    k2 = np.minimum((width / sin_i) ** 2, 1.0)
+    m = np.clip(k2, 1e-4, 1.0 - 1e-12)
+    thin = np.where(k2 < m, np.pi / 4.0 * (1.0 + k2 / 8.0), (ellipe(m) - (1.0 - m) * ellipkm1(1.0 - m)) / m)
+    thick = sin_i / width * ellipe(np.minimum((sin_i / width) ** 2, 1.0))
+    return np.asarray(4.0 / np.pi * np.where(sin_i > width, thin, thick))
 
 
 def elements_table(orbits: Orbits) -> QTable:
