@@ -47,6 +47,7 @@ clones = fs.encounter_distribution(apophis, "earth", "2029-04-13", n=300, seed=1
 orbits = fs.known_population()
 rates = [fs.encounter_rates(orbits, name) for name in ("venus", "earth", "mars")]
 verdicts = fs.disruption_rates(orbits, ["venus", "earth", "mars"], samples=1200, seed=1)
+of_any_size = fs.disruption_rates(orbits, ["venus", "earth", "mars"], samples=1200, seed=1, diameter=None)
 """
 
 #: Name, what it shows and the code, by section. `axes` are matplotlib axes, `solid_axes` those with three dimensions.
@@ -113,7 +114,7 @@ SECTIONS = {
         ("rate_plot", "The same for several planets", "population.rate_plot(axes, rates)"),
         ("verdict_rates", "`DisruptionRates`: rate of each verdict by planet", "verdicts.plot(axes)"),
         ("probability_plot", "Probability of a change over periapsis and speed", "population.probability_plot(axes, verdicts)"),
-        ("size_plot", "Cumulative rate against diameter", "population.size_plot(axes, verdicts)"),
+        ("size_plot", "Cumulative rate against diameter, for sizes that follow from H", "population.size_plot(axes, of_any_size)"),
         ("contributor_plot", "Orbits that contribute most", 'population.contributor_plot(axes, verdicts, orbits["designation"])'),
     ],
 }  # fmt: skip
