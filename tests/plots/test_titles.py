@@ -51,3 +51,11 @@ def test_an_asteroid_is_named_with_the_date_of_its_encounter():
     encounter = fs.Encounter.from_orbit(apophis.orbit, "earth", "2029-04-13")
     title = fs.spin_sample(apophis, encounter, n=2).plot().get_title()
     assert title.startswith("Earth, 2029-04-13, 38,011 km\n(99942) Apophis\n2 attitudes")
+
+
+def test_phases_without_a_sufficient_value_are_counted_in_the_title():
+    near = fs.Encounter.hyperbolic("earth", 2.2 * fs.R_earth, 5 * u.km / u.s)
+    found = fs.critical(BODY, near, "friction_angle", phases=4, tolerance=0.1, high=50 * u.deg)
+    failing = int((found.value.value == float("inf")).sum())
+    assert 0 < failing < 4
+    assert f"no value of the range suffices at {failing} of 4 phases" in found.plot().get_title()

@@ -72,7 +72,7 @@ def test_lifetime_and_change_of_spin(earth):
     assert earth.lifetime("RESHAPED", "BEYOND MODEL").value == pytest.approx(
         50e-6 / disturbed.value, rel=1e-12
     )
-    assert earth.spin_change_rate(0.0) <= earth.rate("INTACT")
+    assert earth.spin_change_rate(0.0) <= earth.rate("INTACT") * (1.0 + 1e-12)  # sums in another order
     assert earth.spin_change_rate(0.5) <= earth.spin_change_rate(0.1)
 
 

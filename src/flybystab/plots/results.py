@@ -132,7 +132,9 @@ def _(result: CriticalValues, axes: Axes) -> Axes:
     axes.plot(result.phase.to_value(u.deg), result.value.value, "o-", color=BLUE)
     axes.set_xlabel("spin phase at closest approach (deg)")
     axes.set_ylabel(f"least {result.quantity.replace('_', ' ')} ({unit})\nfor {result.outcome}")
-    return subject_title(axes, result.subject)
+    failing = int(np.isinf(result.value.value).sum())
+    note = f"no value of the range suffices at {failing} of {len(result)} phases" if failing else ""
+    return subject_title(axes, result.subject, note)
 
 
 @_plot.register
