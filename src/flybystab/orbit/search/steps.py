@@ -21,6 +21,8 @@ LONGEST, SHORTEST = 100.0 * DAY, 1e-5
 #: Of the step size that would meet the tolerance, this fraction is used; limits of its change.
 _SAFETY, _LEAST, _MOST = 0.88, 0.1, 5.0
 _POWER = -1.0 / ERROR_ORDER
+#: In place of an estimated error of zero, over the tolerance.
+_TINY = 1e-30
 
 
 class Room(NamedTuple):
@@ -115,14 +117,16 @@ def advance(
         to_stop = abs(stop - t) <= h
         length = stop - t if to_stop else sign * h
         error = step(field, law, t, y, length, room.k, new, room.places) / tolerance
-        scale = _SAFETY * error**_POWER if error > 0.0 else _MOST
-        if error <= 1.0:
-            if not to_stop or scale < 1.0:
-                size, before = abs(length), room.last[0]
-                if before > 0.0:
-                    scale = min(scale, scale * size / before * (room.last[1] / max(error, 1e-30)) ** -_POWER)
-                room.last[0], room.last[1] = size, max(error, 1e-30)
-                h = size * min(max(scale, 0.2), _MOST)
-            return stop if to_stop else t + length, min(h, LONGEST)
-        h = abs(length) * (max(scale, _LEAST) if error < 1e30 else _LEAST)
+        if not error <= 1.0:
+            h = abs(length) * (max(_SAFETY * error**_POWER, _LEAST) if error < np.inf else _LEAST)
+            continue
+        error = max(error, _TINY)
+        scale = _SAFETY * error**_POWER
+        if not to_stop or scale < 1.0:
+            size, before = abs(length), room.last[0]
+            if before > 0.0:
+                scale = min(scale, scale * size / before * (room.last[1] / error) ** -_POWER)
+            room.last[0], room.last[1] = size, error
+            h = size * min(max(scale, _LEAST), _MOST)
+        return stop if to_stop else t + length, min(h, LONGEST)
     return np.nan, h
