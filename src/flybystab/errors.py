@@ -6,6 +6,9 @@ Every error derives from :class:`FlybystabError`; those caused by an argument ar
 
 from __future__ import annotations
 
+#: Characters of a value that a message shows in full.
+LONGEST = 400
+
 
 class FlybystabError(Exception):
     """Base class of the errors of the package."""
@@ -30,7 +33,10 @@ class InvalidInput(FlybystabError, ValueError):
 
     def __init__(self, name: str, value: object, expected: str) -> None:
         self.name, self.value, self.expected = name, value, expected
-        super().__init__(f"{name} = {value!s}: expected {expected}")
+        text = str(value)
+        if len(text) > LONGEST:  # such as a long array
+            text = f"{text[: LONGEST // 2]} ... {text[-LONGEST // 4 :]}"
+        super().__init__(f"{name} = {text}: expected {expected}")
 
 
 class UnitMismatch(InvalidInput):

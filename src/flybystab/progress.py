@@ -26,8 +26,8 @@ DELAY = 2.0
 QUIET = 30.0
 #: Seconds between two updates of a bar, on a terminal and in a notebook, which may keep all of them.
 FRAME, NOTEBOOK_FRAME = 0.1, 0.5
-_FORMAT = "{desc}[{bar:20}] {n_fmt}/{total_fmt}{unit}, {rate_fmt}, {remaining} left{postfix}"
-_LINE = "{desc}{n_fmt}/{total_fmt}{unit}, {rate_fmt}, {remaining} left{postfix}"
+_FORMAT = "{desc}[{bar:20}] {n_fmt}/{total_fmt}{unit}, {rate_noinv_fmt}, {remaining} left{postfix}"
+_LINE = "{desc}{n_fmt}/{total_fmt}{unit}, {rate_noinv_fmt}, {remaining} left{postfix}"
 #: Held while a bar is shown; calculations nested in that one show none.
 _busy = threading.Lock()
 

@@ -103,3 +103,28 @@ def test_bad_trajectories_are_named():
         Encounter.from_trajectory(t, r, r, "earth")
     with pytest.raises(UnitMismatch, match="times"):
         Encounter.from_trajectory(t.value, r, v, "earth")
+
+
+@pytest.mark.parametrize("n", [3, 4, 5, 9, 200])
+@pytest.mark.parametrize("v_inf", [0.0, 5.0, 30.0])
+def test_widely_spaced_samples_of_a_true_motion_are_accepted(n, v_inf):
+    e = Encounter.hyperbolic("earth", 1.5 * R_E, v_inf * u.km / u.s, start_distance=30 * R_E)
+    times = np.linspace(e.t_start, -0.9 * e.t_start, n) * u.s
+    assert resampled(e, times).distance.to_value(u.m) == pytest.approx(e.distance.to_value(u.m), rel=1e-6)
+
+
+def test_velocities_that_are_not_those_of_the_positions_are_refused():
+    e = earth(3)
+    times = np.linspace(e.t_start, e.t_stop, 60) * u.s
+    r, v = e.position(times), e.velocity(times)
+    turned = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    for t, x, w in (
+        (times, r, 1e-3 * v),  # m/s for km/s
+        (times.value * u.d, r, v),  # days for seconds
+        (times, 1e-3 * r, v),
+        (times, r, -v),
+        (times, r, v @ turned.T),  # another frame
+    ):
+        with pytest.raises(InvalidInput, match="the rates of change of the positions") as error:
+            Encounter.from_trajectory(t, x, w, "earth")
+        assert len(str(error.value)) < 700  # long arrays are cut
