@@ -12,7 +12,6 @@ the end by a central difference of two orbits. The same method gives the displac
 
 from __future__ import annotations
 
-import csv
 import os
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -26,6 +25,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.interpolate import BPoly
 
+from flybystab.bench.reference_states import reference_orbits
 from flybystab.constants import DAY
 from flybystab.errors import MissingExtra
 from flybystab.orbit.ephemeris import BELT, BODIES, Window, ephemeris
@@ -51,20 +51,6 @@ TESSERAL = {
 #: TDB - UT1 in 2029, s; a second turns the Earth by 15".
 TDB_UT1 = 69.6
 Vector = NDArray[np.float64]
-
-
-def reference_orbits(folder: Path = DATA) -> tuple[Orbit, Orbit]:
-    """JPL's states before and after the encounter."""
-    with open(folder / "states_reference.csv") as file:
-        rows = {row["id"]: row for row in csv.DictReader(file)}
-    out = []
-    for key in ("apophis_pre", "apophis_post"):
-        row = rows[key]
-        r, v = ([float(row[p + c]) for c in "xyz"] for p in ("", "v"))
-        push = [float(row[f"A{k}_au_d2"]) * UNIT for k in (1, 2, 3)]
-        when = Time(float(row["epoch_jd_tdb"]), format="jd", scale="tdb")
-        out.append(Orbit.from_state(when, r * u.au, v * u.au / u.d, "sun", "ICRF", *push))
-    return out[0], out[1]
 
 
 def pole_of_j2000(self: Planet, time: Time) -> tuple[float, float, float]:
@@ -208,7 +194,8 @@ def third_zonal(r: Vector, jd: float) -> Vector:
 
 def rows() -> list[tuple[str, float, float | None]]:
     """Label, displacement (km) and distance from JPL (km) by row."""
-    orbits = reference_orbits()
+    states = reference_orbits(DATA / "states_reference.csv")
+    orbits = states["apophis_pre"], states["apophis_post"]
     budget = Budget.of(*orbits)
     base = budget.final()
 

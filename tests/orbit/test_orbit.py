@@ -1,6 +1,5 @@
 """Orbits: elements to states and back in time, forces in closed form, impacts, captures."""
 
-import csv
 from dataclasses import replace
 
 import astropy.units as u
@@ -9,6 +8,7 @@ import pytest
 from astropy.time import Time
 from reference import need_ephemeris
 
+from flybystab.bench.reference_states import reference_orbits
 from flybystab.constants import AU, C_LIGHT, OBLIQUITY_J2000, YEAR
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput, NoEncounter, UnitMismatch, UnknownName
@@ -339,16 +339,8 @@ def test_apophis_after_2029_is_where_jpl_has_it(shared, monkeypatch):
     Julian date, to 20 us; 20 us of it are 2.3 km, nearly along one line. Across that line the places agree to 20 m.
     """
     need_ephemeris("de440")
-    with open(shared / "states_reference.csv") as file:
-        rows = {row["id"]: row for row in csv.DictReader(file)}
-    orbits = []
-    for key in ("apophis_pre", "apophis_post"):
-        row = rows[key]
-        r, v = ([float(row[p + c]) for c in "xyz"] for p in ("", "v"))
-        push = [float(row[f"A{k}_au_d2"]) * u.au / u.d**2 for k in (1, 2, 3)]
-        when = Time(float(row["epoch_jd_tdb"]), format="jd", scale="tdb")
-        orbits.append(Orbit.from_state(when, r * u.au, v * u.au / u.d, "sun", "ICRF", *push))
-    before, after = orbits
+    states = reference_orbits(shared / "states_reference.csv")
+    before, after = states["apophis_pre"], states["apophis_post"]
 
     def gap(late=0.0):
         """From JPL's place, km, if the first date is `late` s later."""
@@ -369,16 +361,11 @@ def test_apophis_after_2029_is_where_jpl_has_it(shared, monkeypatch):
 def test_didymos_is_where_jpl_has_it_after_eight_years(shared):
     """Barycentric states of JPL, 3,000 d apart: 5 m off; without Pluto, which pulls the Sun of DE440, 385 m."""
     need_ephemeris("de440")
-    with open(shared / "states_reference.csv") as file:
-        rows = {row["id"]: row for row in csv.DictReader(file)}
-    first, last = rows["grss_didymos_t0"], rows["grss_didymos_t1"]
-    r, v = ([float(first[p + c]) for c in "xyz"] for p in ("", "v"))
-    push = [float(first[f"A{k}_au_d2"]) * u.au / u.d**2 for k in (1, 2, 3)]
-    epochs = [Time(float(row["epoch_jd_tdb"]), format="jd", scale="tdb") for row in (first, last)]
-    orbit = Orbit.from_state(epochs[0], r * u.au, v * u.au / u.d, "ssb", "ICRF", *push)
-    place, velocity = orbit.at(epochs[1], "ssb", "de440")
-    assert np.linalg.norm(place.to_value(u.m) - [float(last[c]) for c in "xyz"]) < 20.0
-    assert np.linalg.norm(velocity.to_value(u.m / u.s) - [float(last["v" + c]) for c in "xyz"]) < 1e-5
+    states = reference_orbits(shared / "states_reference.csv")
+    first, last = states["grss_didymos_t0"], states["grss_didymos_t1"]
+    place, velocity = first.at(last.epoch, "ssb", "de440")
+    assert np.linalg.norm((place - last.position).to_value(u.m)) < 20.0
+    assert np.linalg.norm((velocity - last.velocity).to_value(u.m / u.s)) < 1e-5
 
 
 def test_a_start_inside_a_planet_is_refused():
