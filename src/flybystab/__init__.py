@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from flybystab._version import __version__
 
@@ -184,7 +184,7 @@ if TYPE_CHECKING:
     from flybystab.units import R_earth
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     if name not in _HOME:
         raise AttributeError(f"module 'flybystab' has no attribute {name!r}")
     value = getattr(import_module(f"flybystab.{_HOME[name]}"), name)

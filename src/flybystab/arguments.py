@@ -11,7 +11,7 @@ import math
 import os
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache, wraps
-from typing import Any, ParamSpec, TypeVar
+from typing import ParamSpec, TypeVar
 
 import numpy as np
 
@@ -22,7 +22,7 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
-def _number(value: Any) -> bool:
+def _number(value: object) -> bool:
     if isinstance(value, np.ndarray) and value.shape == ():
         value = value[()]
     if isinstance(value, bool | np.bool_) or not isinstance(value, int | float | np.integer | np.floating):
@@ -30,9 +30,8 @@ def _number(value: Any) -> bool:
     return isinstance(value, float | np.floating) or abs(int(value)) < 2**1023
 
 
-def _whole(value: Any) -> bool:
-    plain = isinstance(value, int | np.integer) and not isinstance(value, bool)
-    return plain and abs(int(value)) < 2**63
+def _whole(value: object) -> bool:
+    return isinstance(value, int | np.integer) and not isinstance(value, bool) and abs(int(value)) < 2**63
 
 
 def _numbers(value: object) -> bool:
@@ -143,7 +142,7 @@ def finite(value: float, name: str, low: float = -math.inf, high: float = math.i
     return float(value)
 
 
-def vector(value: object, name: str) -> Any:
+def vector(value: object, name: str) -> Array:
     """The value as an array of three finite numbers, not all zero.
 
     Raises

@@ -42,7 +42,7 @@ LARGEST = 2 * 2**30
 _MODULE = re.compile(r"flybystab(\.[a-z][a-z0-9_]*)+")
 
 
-def encoded(value: Any) -> Any:
+def encoded(value: object) -> object:
     """The value in plain types.
 
     Raises
@@ -124,7 +124,7 @@ def stored_fields(kind: type) -> tuple[str, ...]:
     return own if own is not None else tuple(f.name for f in fields(kind) if f.init)
 
 
-def decoded(value: Any) -> Any:
+def decoded(value: object) -> Any:
     """The value that :func:`encoded` made.
 
     Raises

@@ -148,7 +148,7 @@ def parse_toml(text: str, what: str, path: str | Path) -> Document:
         raise InvalidInput(what, path, f"valid TOML ({error})") from None
 
 
-def csv_rows(text: str, what: str, path: str | Path, **dialect: Any) -> Iterator[list[str]]:
+def csv_rows(text: str, what: str, path: str | Path) -> Iterator[list[str]]:
     """Rows of a CSV text.
 
     Raises
@@ -157,7 +157,7 @@ def csv_rows(text: str, what: str, path: str | Path, **dialect: Any) -> Iterator
         A cell is longer than `FIELD_LIMIT`, or the quoting is wrong.
     """
     # csv.field_size_limit belongs to the whole process; its default equals FIELD_LIMIT and is not changed here.
-    reader = csv.reader(io.StringIO(text, newline=""), **dialect)
+    reader = csv.reader(io.StringIO(text, newline=""))
     while True:
         try:
             row = next(reader)

@@ -6,7 +6,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence, Sized
 from dataclasses import MISSING, fields, is_dataclass
 from html import escape
 from importlib import import_module
@@ -288,7 +288,7 @@ class Record(Results):
 class Collection(Record):
     """Mixin of a result with several rows and further content: its table has one row for each part."""
 
-    def _rows(self) -> Mapping[str, Any]:
+    def _rows(self) -> Mapping[str, Sized]:
         """Columns of the table."""
         raise NotImplementedError
 

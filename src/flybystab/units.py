@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from datetime import UTC, date, datetime
-from typing import Any
+from typing import overload
 
 import astropy.units as u
 import numpy as np
@@ -14,10 +14,39 @@ from numpy.typing import ArrayLike
 
 from flybystab.constants import R_EARTH
 from flybystab.errors import InvalidInput, UnitMismatch
+from flybystab.typing import Array
+
+
+@overload
+def to_si(
+    value: object,
+    unit: u.UnitBase,
+    name: str,
+    *,
+    shape: tuple[()] = ...,
+    low: float = ...,
+    high: float = ...,
+    open_low: bool = ...,
+    open_high: bool = ...,
+) -> float: ...
+
+
+@overload
+def to_si(
+    value: object,
+    unit: u.UnitBase,
+    name: str,
+    *,
+    shape: tuple[int, ...] | None,
+    low: float = ...,
+    high: float = ...,
+    open_low: bool = ...,
+    open_high: bool = ...,
+) -> Array: ...
 
 
 def to_si(
-    value: Any,
+    value: object,
     unit: u.UnitBase,
     name: str,
     *,
@@ -26,7 +55,7 @@ def to_si(
     high: float = np.inf,
     open_low: bool = False,
     open_high: bool = False,
-) -> Any:
+) -> float | Array:
     """SI value of a quantity after checks.
 
     Parameters
@@ -54,20 +83,21 @@ def to_si(
     InvalidInput
         Wrong shape, masked (missing), not finite, or out of range.
     """
-    if not isinstance(value, Quantity):
+    given = value
+    if not isinstance(given, Quantity):
         if unit != u.dimensionless_unscaled:
             raise UnitMismatch(name, value, f"a Quantity in {unit}, e.g. {name} = 1 * u.Unit('{unit}')")
         try:
-            value = np.asarray(value, dtype=float) * u.dimensionless_unscaled
+            given = np.asarray(value, dtype=float) * u.dimensionless_unscaled
         except (TypeError, ValueError, OverflowError):
             raise InvalidInput(name, value, "a number") from None
-    if np.any(getattr(value, "mask", False)):
+    if np.any(getattr(given, "mask", False)):
         raise InvalidInput(name, value, "values without gaps: some are masked (missing)")
-    if np.iscomplexobj(value.value):
+    if np.iscomplexobj(given.value):
         raise InvalidInput(name, value, "real numbers")
     try:
         # A copy: later changes of the caller's array have no effect.
-        array = np.array(value.to_value(unit), dtype=float)
+        array: Array = np.array(given.to_value(unit), dtype=float)
     except u.UnitConversionError:
         raise UnitMismatch(name, value, f"a unit that converts to {unit}") from None
     except (TypeError, ValueError):

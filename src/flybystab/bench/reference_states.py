@@ -24,10 +24,10 @@ def reference_orbits(path: Path) -> dict[str, Orbit]:
         for row in csv.DictReader(file):
             length, speed = (u.Unit(text) for text in row["units"].split("_"))
             position, velocity = ([float(row[p + c]) for c in "xyz"] for p in ("", "v"))
-            nongrav = (float(row[f"A{k}_au_d2"]) * u.au / u.d**2 for k in (1, 2, 3))
+            a1, a2, a3 = (float(row[f"A{k}_au_d2"]) * u.au / u.d**2 for k in (1, 2, 3))
             epoch = Time(float(row["epoch_jd_tdb"]), format="jd", scale="tdb")
             centre = _CENTRES[row["center"]]
             out[row["id"]] = Orbit.from_state(
-                epoch, position * length, velocity * speed, centre, "ICRF", *nongrav, name=row["object"]
+                epoch, position * length, velocity * speed, centre, "ICRF", a1, a2, a3, name=row["object"]
             )
     return out

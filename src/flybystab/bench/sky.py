@@ -13,11 +13,12 @@ from __future__ import annotations
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import astropy.units as u
 import numpy as np
 from astropy.time import Time
+from astropy.units import Quantity
 
 from flybystab.bench import oracle
 from flybystab.bench.jpl import SPAN, approaches, orbits
@@ -128,9 +129,20 @@ def _speed(chosen: list[Orbit], years: float) -> list[Document]:
     span = len(chosen) * years
     out: list[Document] = []
 
-    def ours(**how: Any) -> tuple[list[Array], float]:
+    def ours(
+        error: Quantity = 0.1 * u.km, forces: tuple[str, ...] | None = None, tolerance: float | None = None
+    ) -> tuple[list[Array], float]:
         begin = time.process_time()
-        table = find_encounters(chosen, start, stop, within=WITHIN * u.au, workers=1, **how)
+        table = find_encounters(
+            chosen,
+            start,
+            stop,
+            within=WITHIN * u.au,
+            workers=1,
+            error=error,
+            forces=forces,
+            tolerance=tolerance,
+        )
         used = time.process_time() - begin
         flat = np.column_stack([table["time"].jd - start.jd, table["distance"].to_value(u.m)])
         index = np.array(table["index"])

@@ -93,7 +93,7 @@ def linear_plane(points: Array, nominal: Row, body: Planet) -> LinearPlane | Non
     bent = 0.5 * (pairs[:, 0] + pairs[:, 1])[:, 2:] - centre
     matrix = half[:, 2:].T @ half[:, 2:]
     sigma = np.sqrt(np.sum(half**2, axis=0))
-    disc = capture_radius(body.gm, body.impact_distance, nominal["v_inf"].to_value(u.m / u.s))
+    disc = float(capture_radius(body.gm, body.impact_distance, nominal["v_inf"].to_value(u.m / u.s)))
     longest = float(np.sqrt(np.linalg.eigvalsh(matrix)[-1]))
     return LinearPlane(
         centre=(centre * u.m).to(u.km),

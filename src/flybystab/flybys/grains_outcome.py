@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sized
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, ClassVar
 
@@ -156,7 +157,7 @@ class GrainsOutcome(Collection):
     modelled: tuple[str, ...] = field(repr=False)
     wall_time: Quantity = field(repr=False)
 
-    def _rows(self) -> dict[str, object]:
+    def _rows(self) -> dict[str, Sized]:
         tables = [run.to_table() for run in self.runs]
         names = [name for name in tables[0].colnames if name not in ("axes_directions", "wall_time")]
         return {

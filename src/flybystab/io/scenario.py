@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass
 from difflib import get_close_matches
 from pathlib import Path
-from typing import Any
+from typing import TypeVar
 
 import astropy.units as u
 import numpy as np
@@ -24,6 +24,9 @@ from flybystab.orbit.planets import planet
 from flybystab.plots.formats import FIGURES, FILMS
 from flybystab.typing import Document
 from flybystab.units import DATES, parsed_time, to_si
+
+T = TypeVar("T")
+D = TypeVar("D")
 
 #: Allowed keys of each table.
 KEYS: dict[str, tuple[str, ...]] = {
@@ -124,37 +127,41 @@ def _check(section: Document, table: str) -> None:
             raise UnknownName(where, key, near, f"(known: {', '.join(KEYS[table])})")
 
 
-def _need(section: Document, table: str, key: str) -> Any:
+def _need(section: Document, table: str, key: str) -> object:
     if key not in section:
         raise InvalidInput(f"{table}.{key}", "(missing)", f"a value for {key} in [{table}]")
     return section[key]
 
 
-def _typed(section: Document, table: str, key: str, kind: type, default: Any) -> Any:
+def _typed(section: Document, table: str, key: str, kind: type[T], default: D) -> T | D:
     """A value that is not a quantity; its TOML type is checked, so that the text ``"no"`` is not taken as false."""
     if key not in section:
         return default
-    value = section[key]
+    value: object = section[key]
     if kind is float and isinstance(value, int) and not isinstance(value, bool):
         value = float(value)
     if not isinstance(value, kind):
-        words = {
+        expected: dict[type, str] = {
             bool: "true or false, without quotes",
             float: "a number, without quotes",
             int: "a whole number, without quotes",
             str: "text",
         }
-        raise InvalidInput(f"{table}.{key}" if table else key, value, words[kind])
+        raise InvalidInput(f"{table}.{key}" if table else key, value, expected[kind])
     return value
 
 
 def _material(section: Document) -> Material:
-    kinds = {"dilatancy": float, "yield_surface": str, "brittle": bool}
-    plain = {k: _typed(section, "material", k, kinds[k], None) for k in section if k in kinds}
+    default = Material()
     units = {
         k: quantity(v, f"material.{k}") for k, v in section.items() if k in ("friction_angle", "cohesion")
     }
-    return Material(**plain, **units)
+    return Material(
+        dilatancy=_typed(section, "material", "dilatancy", float, default.dilatancy),
+        yield_surface=_typed(section, "material", "yield_surface", str, default.yield_surface),
+        brittle=_typed(section, "material", "brittle", bool, default.brittle),
+        **units,
+    )
 
 
 def _shape(section: Document, folder: Path) -> Shape | None:

@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 from importlib import resources
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from astropy.time import Time
@@ -244,7 +243,7 @@ def _belt() -> Array:
 
 
 @lru_cache(maxsize=4)
-def _series(path: Path) -> dict[tuple[int, int], tuple[Any, float, float]]:
+def _series(path: Path) -> dict[tuple[int, int], tuple[Array, float, float]]:
     """Per (centre, target): records (n, 3, coefficients), km, mapped; start, s of J2000; length, s."""
     from jplephem.spk import SPK
 

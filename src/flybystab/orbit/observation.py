@@ -7,13 +7,14 @@ built-in tables (nothing is downloaded); the path is that of :mod:`flybystab.orb
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import Any
 
 import astropy.units as u
 import numpy as np
 from astropy.table import QTable
 from astropy.time import Time
 from skyfield.api import load, wgs84
+from skyfield.timelib import Time as SkyfieldTime
+from skyfield.timelib import Timescale
 
 from flybystab.orbit.ephemeris import Ephemeris, ephemeris
 from flybystab.orbit.observatories import Observer
@@ -28,12 +29,12 @@ SLOPE = 0.15
 
 
 @lru_cache(maxsize=1)
-def timescale() -> Any:
+def timescale() -> Timescale:
     """The time scale of skyfield with its built-in leap seconds and Delta T."""
     return load.timescale(builtin=True)
 
 
-def skyfield_times(time: Time, shift: float = 0.0) -> Any:
+def skyfield_times(time: Time, shift: float = 0.0) -> SkyfieldTime:
     """Times in skyfield, `shift` days later; whole and fractional days are passed separately."""
     tt = time.tt
     return timescale().tt_jd(np.atleast_1d(tt.jd1), np.atleast_1d(tt.jd2) + shift)

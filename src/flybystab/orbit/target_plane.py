@@ -8,7 +8,6 @@ focusing by the planet does not enter: the errors of an orbit form an ellipse in
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any
 
 import numpy as np
 
@@ -19,7 +18,9 @@ from flybystab.typing import Array
 NORTH = (0.0, 0.0, 1.0)
 
 
-def target_plane(states: Array, gm: float | Array, north: Sequence[float] = NORTH) -> tuple[Array, Array]:
+def target_plane(
+    states: Array, gm: float | Array, north: Sequence[float] | Array = NORTH
+) -> tuple[Array, Array]:
     """Target-plane coordinates of the two-body hyperbolas through states relative to a planet.
 
     With ``h = r x v``, the eccentricity vector ``e = v x h/gm - r/|r|`` and ``v_inf``:
@@ -58,7 +59,7 @@ def target_plane(states: Array, gm: float | Array, north: Sequence[float] = NORT
     return np.stack([np.sum(b * t, axis=1), np.sum(b * np.cross(asymptote, t), axis=1)], axis=1), speed
 
 
-def capture_radius(gm: float, distance: float | Array, v_inf: float | Array) -> Any:
+def capture_radius(gm: float, distance: float | Array, v_inf: float | Array) -> Array:
     """Impact parameter (m) of a path with periapsis ``distance`` (m): ``d sqrt(1 + 2 gm/(d v_inf^2))``."""
     return distance * np.sqrt(1.0 + 2.0 * gm / (distance * np.square(v_inf)))
 

@@ -7,10 +7,10 @@ that of :meth:`flybystab.orbit.orbit.Orbit.at`: all forces, IAS15 at the tighter
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from skyfield.api import load_file
+from skyfield.jpllib import SpiceKernel
+from skyfield.timelib import Time
 from skyfield.vectorlib import VectorFunction
 
 from flybystab.constants import AU, DAY
@@ -29,7 +29,7 @@ CENTRES = {"sun": 10, "ssb": 0}
 _MARGIN = 10.0 * DAY
 
 
-def ephemeris_file(name: str | Ephemeris | None = None) -> Any:
+def ephemeris_file(name: str | Ephemeris | None = None) -> SpiceKernel:
     """The file of an ephemeris as skyfield opens it, for observers and other targets.
 
     Parameters
@@ -44,14 +44,14 @@ def ephemeris_file(name: str | Ephemeris | None = None) -> Any:
     return load_file(str((name if isinstance(name, Ephemeris) else ephemeris(name)).path))
 
 
-def whole_and_fraction(t: Any) -> tuple[Array, Array]:
+def whole_and_fraction(t: Time) -> tuple[Array, Array]:
     """TDB of skyfield times as whole and fractional Julian dates, without loss of digits."""
     return np.atleast_1d(np.asarray(t.whole, dtype=float)), np.atleast_1d(
         np.asarray(t.tdb_fraction, dtype=float)
     )
 
 
-def shaped(states: Array, t: Any) -> tuple[Array, Array, None, None]:
+def shaped(states: Array, t: Time) -> tuple[Array, Array, None, None]:
     """States (m, m/s), shape (n, 6), in the form of skyfield: au and au/d, shape (3,) or (3, n)."""
     r, v = states[:, :3].T / AU, states[:, 3:].T * (DAY / AU)
     if np.ndim(t.tt) == 0:
@@ -122,7 +122,7 @@ class OrbitVector(VectorFunction):
                 out[i] = flight.to(float(t[i])) if t[i] != flight.t else flight.state
         return out
 
-    def _at(self, t: Any) -> tuple[Array, Array, None, None]:
+    def _at(self, t: Time) -> tuple[Array, Array, None, None]:
         whole, fraction = whole_and_fraction(t)
         zero = self._orbit.epoch.tdb
         seconds = ((whole - zero.jd1) + (fraction - zero.jd2)) * DAY

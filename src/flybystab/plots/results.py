@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import singledispatch
-from typing import Any
 
 import astropy.units as u
 import numpy as np
@@ -153,7 +152,7 @@ def _(result: DisruptionRates, axes: Axes) -> Axes:
 
 
 #: Figures without options, by class of result.
-_DISTRIBUTIONS: Mapping[type, Callable[[Axes, Any], Axes]] = {
+_DISTRIBUTIONS: Mapping[type, Callable[..., Axes]] = {
     SurfaceSlopes: distributions.slope_plot,
     SlopeChange: distributions.slope_change_plot,
     SurfaceHistory: distributions.surface_history_plot,
@@ -168,7 +167,7 @@ _DISTRIBUTIONS: Mapping[type, Callable[[Axes, Any], Axes]] = {
 }
 
 
-def _register(kind: type, function: Callable[[Axes, Any], Axes]) -> None:
+def _register(kind: type, function: Callable[..., Axes]) -> None:
     @_plot.register(kind)
     def _(result: object, axes: Axes) -> Axes:
         return function(axes, result)

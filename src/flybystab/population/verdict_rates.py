@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Sequence, Sized
 from dataclasses import dataclass
 
 import astropy.units as u
@@ -49,7 +49,7 @@ class DisruptionRates(Collection):
     bodies: float
     diameter: Quantity | None
 
-    def _rows(self) -> dict[str, object]:
+    def _rows(self) -> dict[str, Sized]:
         return {name: self.table[name] for name in self.table.colnames}
 
     @check_arguments

@@ -8,7 +8,7 @@ state their centre, it is checked by comparing the mean motion or the period, if
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -60,7 +60,7 @@ def read_ecsv(text: str, file: str) -> list[Entry]:
     return entries_of(table, file)
 
 
-def _text(value: Any) -> str:
+def _text(value: object) -> str:
     return "" if value is np.ma.masked or value is None or value != value else str(value)
 
 
@@ -89,14 +89,14 @@ def entries_of(table: Table, file: str) -> list[Entry]:
     ]
 
 
-def _known(value: Any) -> bool:
+def _known(value: object) -> bool:
     """Whether a cell has a value, neither masked nor nan."""
     return not (
         value is None or bool(np.any(getattr(value, "mask", False))) or _text(value) in ("", "nan", "--")
     )
 
 
-def _value(cells: Mapping[str, tuple[Any, Any]], name: str, unit: str) -> float:
+def _value(cells: Mapping[str, tuple[object, object]], name: str, unit: str) -> float:
     import astropy.units as u
     from astropy.units import Quantity
 
@@ -104,7 +104,7 @@ def _value(cells: Mapping[str, tuple[Any, Any]], name: str, unit: str) -> float:
     given = value.unit if isinstance(value, Quantity) else getattr(column, "unit", None)
     try:
         if unit == "":
-            return float(value)
+            return float(Quantity(value).to_value(u.dimensionless_unscaled))
         if given is None or not isinstance(given, u.UnitBase):
             raise InvalidInput(name, value, f"a column with a unit ({unit})")
         return float(Quantity(value, given).to_value(unit))
@@ -112,7 +112,7 @@ def _value(cells: Mapping[str, tuple[Any, Any]], name: str, unit: str) -> float:
         raise InvalidInput(name, value, f"a number in {unit or 'no unit'} ({error})") from None
 
 
-def _day(cells: Mapping[str, tuple[Any, Any]], name: str) -> float:
+def _day(cells: Mapping[str, tuple[object, object]], name: str) -> float:
     """Julian date (TDB) from a Time, or from a Julian date in days."""
     from astropy.time import Time
 
@@ -123,7 +123,7 @@ def _day(cells: Mapping[str, tuple[Any, Any]], name: str) -> float:
     return float(value.tdb.jd)
 
 
-def _entry(cells: Mapping[str, tuple[Any, Any]], file: str) -> Entry:
+def _entry(cells: Mapping[str, tuple[object, object]], file: str) -> Entry:
     label = " ".join(_text(cells[k][0]) for k in ("number", "name", "designation") if k in cells)
     missing = [k for k in ("epoch", "e", "i", "node", "peri") if k not in cells]
     if missing:
@@ -150,7 +150,7 @@ def _entry(cells: Mapping[str, tuple[Any, Any]], file: str) -> Entry:
     return row | perihelion_row(jd, (q, e, *angles), since), None
 
 
-def _check_centre(cells: Mapping[str, tuple[Any, Any]], a: float, file: str) -> None:
+def _check_centre(cells: Mapping[str, tuple[object, object]], a: float, file: str) -> None:
     """Raise InvalidInput if axis and mean motion are not those of an orbit about the Sun."""
     from flybystab.orbit.elements import GM_SUN
 
