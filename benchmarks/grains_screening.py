@@ -18,7 +18,7 @@ from astropy.time import Time
 from flybystab.catalogues.catalogue import Asteroid
 from flybystab.encounter.encounter import Encounter
 from flybystab.flybys.escalation import ESCALATED
-from flybystab.screening.encounters import Passage
+from flybystab.screening.encounters import CloseApproach
 from flybystab.screening.screening import Screening
 from flybystab.screening.settings import settings
 from flybystab.units import R_earth
@@ -30,11 +30,11 @@ class At:
     def __init__(self, q: float) -> None:
         self.encounter = Encounter.hyperbolic("earth", q * R_earth, v_inf=6 * u.km / u.s)
 
-    def __call__(self, asteroid: Asteroid, settings: object) -> list[Passage]:
+    def __call__(self, asteroid: Asteroid, settings: object) -> list[CloseApproach]:
         """The encounter."""
         when = Time(2462000.5, format="jd", scale="tdb")
         distance = self.encounter.distance.to_value(u.m)
-        return [Passage(asteroid, "earth", when, distance, 6000.0, self.encounter)]
+        return [CloseApproach(asteroid, "earth", when, distance, 6000.0, self.encounter)]
 
 
 def screened(q: float, samples: int, grains: int | None) -> tuple[list[dict[str, object]], float]:

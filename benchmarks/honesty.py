@@ -31,7 +31,7 @@ from flybystab.encounter.encounter import Encounter
 from flybystab.errors import FlybystabError
 from flybystab.orbit.planets import planet
 from flybystab.screening.draws import Attitudes, draws
-from flybystab.screening.encounters import passages
+from flybystab.screening.encounters import close_approaches
 from flybystab.screening.sample_verdicts import sample_verdicts
 from flybystab.screening.settings import settings
 
@@ -184,7 +184,7 @@ def real(args: argparse.Namespace) -> int:
     ratios, false, samples, dynamic = [], 0, 0, 0
     for asteroid in catalogue()[:: args.every]:
         d = draws(asteroid, wanted.samples, args.seed)
-        for p in passages(asteroid, wanted):
+        for p in close_approaches(asteroid, wanted):
             blind = p.bounds()
             try:
                 size = p.close_bounds()

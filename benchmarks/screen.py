@@ -32,7 +32,7 @@ from flybystab.catalogues.catalogue import Asteroid, catalogue, key_of
 from flybystab.catalogues.completion import with_physical_data
 from flybystab.constants import AU, R_EARTH
 from flybystab.encounter.encounter import Encounter
-from flybystab.screening.encounters import Passage
+from flybystab.screening.encounters import CloseApproach
 from flybystab.screening.progress import ProgressBar
 from flybystab.screening.results import read_results
 from flybystab.screening.screening import Screening
@@ -43,24 +43,24 @@ SPAN = ("2026-01-01", "2050-01-01")
 DISTANCES = {"0.02 au": 0.02 * AU, "10 R_E": 10 * R_EARTH, "4 R_E": 4 * R_EARTH, "2 R_E": 2 * R_EARTH}
 
 
-def at(q: float, asteroid: Asteroid, settings: Settings) -> list[Passage]:
+def at(q: float, asteroid: Asteroid, settings: Settings) -> list[CloseApproach]:
     e = Encounter.hyperbolic("earth", periapsis=q * u.m, v_inf=6 * u.km / u.s)
-    return [Passage(asteroid, "earth", Time(2462000.5, format="jd", scale="tdb"), q, 6000.0, e)]
+    return [CloseApproach(asteroid, "earth", Time(2462000.5, format="jd", scale="tdb"), q, 6000.0, e)]
 
 
-def far(asteroid: Asteroid, settings: Settings) -> list[Passage]:
+def far(asteroid: Asteroid, settings: Settings) -> list[CloseApproach]:
     return at(DISTANCES["0.02 au"], asteroid, settings)
 
 
-def ten(asteroid: Asteroid, settings: Settings) -> list[Passage]:
+def ten(asteroid: Asteroid, settings: Settings) -> list[CloseApproach]:
     return at(DISTANCES["10 R_E"], asteroid, settings)
 
 
-def four(asteroid: Asteroid, settings: Settings) -> list[Passage]:
+def four(asteroid: Asteroid, settings: Settings) -> list[CloseApproach]:
     return at(DISTANCES["4 R_E"], asteroid, settings)
 
 
-def two(asteroid: Asteroid, settings: Settings) -> list[Passage]:
+def two(asteroid: Asteroid, settings: Settings) -> list[CloseApproach]:
     return at(DISTANCES["2 R_E"], asteroid, settings)
 
 
@@ -175,7 +175,7 @@ def throughput() -> None:
         )
 
 
-def nowhere(asteroid: Asteroid, settings: Settings) -> list[Passage]:
+def nowhere(asteroid: Asteroid, settings: Settings) -> list[CloseApproach]:
     """No encounter: measures the overhead of a task."""
     return []
 

@@ -22,7 +22,7 @@ from flybystab.catalogues.completion import with_physical_data
 from flybystab.plots.screening import inference_figure, results_figure
 from flybystab.screening.columns import YIELDED
 from flybystab.screening.executors import open_executor
-from flybystab.screening.inference import infer, strongest_passage, survived
+from flybystab.screening.inference import infer, strongest_encounter, survived
 from flybystab.screening.priors import Population
 from flybystab.screening.progress import ProgressBar
 from flybystab.screening.results import read_results
@@ -212,7 +212,7 @@ def bounds():
         found = survived(asteroid, Time("1950-01-01", scale="tdb"), Time("2026-01-01", scale="tdb"))
         table = infer(asteroid, found)
         inference_figure(table, ROOT / "docs" / "images" / f"infer_{name.lower()}.png")
-        strongest = strongest_passage(table)
+        strongest = strongest_encounter(table)
         at = table[(table["cohesion"] == 0 * u.Pa) & (table["density"] == 2000 * u.kg / u.m**3)][0]
         rest, any_, every = (
             number(at[f"friction_{n}"].to_value(u.deg))

@@ -14,7 +14,7 @@ from flybystab.constants import AU, R_EARTH
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import NotConverged
 from flybystab.screening import table_files
-from flybystab.screening.encounters import Passage
+from flybystab.screening.encounters import CloseApproach
 from flybystab.screening.executors import open_executor
 from flybystab.screening.screening import Screening
 from flybystab.screening.settings import settings
@@ -43,9 +43,9 @@ def three(asteroid, settings):
     if asteroid.name == "Bennu":
         raise NotConverged("lost")
     v = 6000.0
-    far = Passage(asteroid, "earth", day(2461000.5), 0.02 * AU, v, FAR)
+    far = CloseApproach(asteroid, "earth", day(2461000.5), 0.02 * AU, v, FAR)
     rest = [
-        Passage(asteroid, "earth", day(2462000.5 + k), e.distance.to_value(u.m), v, e)
+        CloseApproach(asteroid, "earth", day(2462000.5 + k), e.distance.to_value(u.m), v, e)
         for k, e in enumerate((MIDDLE, NEAR))
     ]
     return [far, *rest]

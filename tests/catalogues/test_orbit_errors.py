@@ -18,7 +18,7 @@ from flybystab.orbit.kepler import two_body
 from flybystab.orbit.osculating_state import heliocentric
 from flybystab.orbit.predictability import deviations_of, predictability
 from flybystab.screening.clones import orbit_sampling
-from flybystab.screening.encounters import Passage
+from flybystab.screening.encounters import CloseApproach
 
 # MPCORB as of February 2026
 HEAD = "number,name,principal_desig,epoch_jd_tt,a_au,e,i_deg,node_deg,peri_deg,M_deg,n_deg_d,U,arc,last_obs"
@@ -137,7 +137,7 @@ def test_an_error_of_the_velocity_alone_has_a_growth():
 def test_a_screening_says_what_is_known():
     rock = mpc("Apophis")
     note = orbit_sampling(
-        Passage(rock, "earth", Time("2029-04-13 21:46", scale="tdb"), 3.8e7, 5.8e3), 10, 0
+        CloseApproach(rock, "earth", Time("2029-04-13 21:46", scale="tdb"), 3.8e7, 5.8e3), 10, 0
     ).note
     assert note == "orbit without errors (known only by the digits and U of its elements)"
 

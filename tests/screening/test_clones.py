@@ -14,7 +14,7 @@ from flybystab.encounter.encounter import Encounter
 from flybystab.errors import NotConverged
 from flybystab.orbit.orbit import Orbit
 from flybystab.screening.clones import Clones, orbit_sampling
-from flybystab.screening.encounters import Passage, passages
+from flybystab.screening.encounters import CloseApproach, close_approaches
 from flybystab.screening.screening import Screening, screen
 from flybystab.screening.settings import settings
 
@@ -29,7 +29,7 @@ def with_spread(factor):
 
 
 def only(asteroid):
-    (found,) = passages(asteroid, settings(*SPAN, within=0.01 * u.au))
+    (found,) = close_approaches(asteroid, settings(*SPAN, within=0.01 * u.au))
     return found
 
 
@@ -43,10 +43,10 @@ def test_a_well_known_orbit_is_shared_by_all_samples():
 def test_samples_of_a_badly_known_orbit_have_passages_of_their_own():
     many, few = (orbit_sampling(only(with_spread(1000.0)), n, 3) for n in (24, 8))
     assert many.sigma == pytest.approx(1.1e6, rel=0.05)
-    followed = many.clones.passages(0, 24)
+    followed = many.clones.close_approaches(0, 24)
     distances = np.array([p.distance for p in followed])
     assert distances.std(ddof=1) == pytest.approx(1.1e6, rel=0.35)  # four sigma of the sampling of 24
-    assert [p.distance for p in few.clones.passages(0, 8)] == pytest.approx(distances[:8], rel=1e-9)
+    assert [p.distance for p in few.clones.close_approaches(0, 8)] == pytest.approx(distances[:8], rel=1e-9)
     p = min(followed, key=lambda p: p.distance)
     assert p.meet().distance.to_value(u.m) == pytest.approx(p.distance, abs=1e3)
 
@@ -78,8 +78,8 @@ def test_rows_draw_the_orbit_and_name_the_distance_among_the_contributors(spread
 def test_clones_and_rows_are_the_same_to_the_bit_however_they_are_split(spread):
     run, together = spread
     clones = orbit_sampling(only(run.asteroids[0]), SAMPLES, 0).clones
-    whole = [p.distance for p in clones.passages(0, SAMPLES)]
-    assert whole == [clones.passages(k, k + 1)[0].distance for k in range(SAMPLES)]
+    whole = [p.distance for p in clones.close_approaches(0, SAMPLES)]
+    assert whole == [clones.close_approaches(k, k + 1)[0].distance for k in range(SAMPLES)]
     with ThreadPoolExecutor(2) as pool:
         ((_, split),) = run.results(pool, block=2)
     assert repr(split) == repr(together)  # nan is nan
@@ -122,7 +122,7 @@ def test_what_is_not_known_of_an_orbit_is_said():
 
 
 def test_a_clone_that_stays_away_is_judged_without_following_it():
-    p = Passage(APOPHIS, "earth", Time(2462240.5, format="jd", scale="tdb"), 4.5e9, 6000.0, missed=True)
+    p = CloseApproach(APOPHIS, "earth", Time(2462240.5, format="jd", scale="tdb"), 4.5e9, 6000.0, missed=True)
     assert np.isfinite(p.bounds()[0])
     with pytest.raises(LookupError, match="no encounter"):
         p.meet()

@@ -15,7 +15,7 @@ from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput
 from flybystab.flybys.flyby import flyby
 from flybystab.screening import grain_samples
-from flybystab.screening.encounters import Passage
+from flybystab.screening.encounters import CloseApproach
 from flybystab.screening.result_rows import catalogue_body
 from flybystab.screening.sample_verdicts import SampleVerdicts
 from flybystab.screening.screening import Screening, screen
@@ -33,7 +33,7 @@ def folder(tmp_path, monkeypatch):
 def two(asteroid, settings):
     """A deep encounter and a distant one."""
     return [
-        Passage(asteroid, "earth", day(2462000.5 + k), e.distance.to_value(u.m), 5000.0, e)
+        CloseApproach(asteroid, "earth", day(2462000.5 + k), e.distance.to_value(u.m), 5000.0, e)
         for k, e in enumerate((DEEP, FAR))
     ]
 

@@ -15,7 +15,7 @@ from flybystab.errors import InvalidInput
 from flybystab.flybys.flyby import flyby
 from flybystab.plots.screening import inference_figure
 from flybystab.screening import inference
-from flybystab.screening.inference import infer, strongest_passage, survived
+from flybystab.screening.inference import infer, strongest_encounter, survived
 
 DENSITIES = [1500, 2500] * u.kg / u.m**3
 
@@ -124,13 +124,13 @@ def test_toutatis_2004_is_among_its_passages_and_hardly_loads_it():
     assert 0 * u.deg <= rise < 1 * u.deg
 
 
-def test_the_strongest_passage_is_that_of_the_strongest_tide():
+def test_the_strongest_encounter_is_that_of_the_strongest_tide():
     a = Asteroid.from_catalogue("Toutatis")
     past = survived(a, Time("1992-01-01", scale="tdb"), Time("2010-01-01", scale="tdb"))
     assert len(past) > 1
     table = infer(a, past, densities=[2000] * u.kg / u.m**3, cohesions=[0] * u.Pa, attitudes=2)
-    assert "2004-09-29" in strongest_passage(table)["passage"]
-    assert strongest_passage(infer(a, densities=[2000] * u.kg / u.m**3, attitudes=1)) is None
+    assert "2004-09-29" in strongest_encounter(table)["passage"]
+    assert strongest_encounter(infer(a, densities=[2000] * u.kg / u.m**3, attitudes=1)) is None
 
 
 def test_figure_and_bad_input(tmp_path):

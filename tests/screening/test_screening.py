@@ -24,7 +24,7 @@ from flybystab.orbit.planets import planet
 from flybystab.screening import table_files, tasks
 from flybystab.screening.columns import COLUMNS, VERDICTS, share_of
 from flybystab.screening.draws import Attitudes, draws
-from flybystab.screening.encounters import Passage, passages
+from flybystab.screening.encounters import CloseApproach, close_approaches
 from flybystab.screening.priors import Population
 from flybystab.screening.progress import ProgressBar
 from flybystab.screening.results import read_results
@@ -85,7 +85,7 @@ def test_a_distant_passage_adds_nothing_to_what_a_tumbler_mobilises_alone():
 def test_an_orbit_into_the_planet_is_an_impact():
     def hit(asteroid, settings):
         e = Encounter.hyperbolic("earth", periapsis=0.5 * R_EARTH * u.m, v_inf=9 * u.km / u.s)
-        return [Passage(asteroid, "earth", day(2462000.5), e.distance.to_value(u.m), 9000.0, e)]
+        return [CloseApproach(asteroid, "earth", day(2462000.5), e.distance.to_value(u.m), 9000.0, e)]
 
     (row,) = screen(["Anteros"], *SPAN, samples=20, finder=hit)
     assert row["verdict"] == "IMPACT"
@@ -102,7 +102,7 @@ def test_a_body_that_may_touch_the_ground_is_not_left_to_the_bound():
     a = Asteroid(row, file="made")
     floor = planet("moon").impact_distance
     enc = Encounter.hyperbolic("moon", (floor + 1000.0) * u.m, 5 * u.km / u.s)
-    passage = Passage(a, "moon", day(2462000.5), floor + 1000.0, 5000.0, enc)
+    passage = CloseApproach(a, "moon", day(2462000.5), floor + 1000.0, 5000.0, enc)
     n = 12
     draw = draws(a, n, 3)._replace(axes=np.tile([1400.0, 850.0, 750.0], (n, 1)), cohesion=np.full(n, 1e6))
     attitudes = Attitudes.at(a, draw, 3, "moon")
@@ -192,7 +192,7 @@ def test_quick_verdicts_are_those_of_the_dynamics():
         for name in ("Apophis", "Anteros", "Geographos", "Toutatis"):
             a = Asteroid.from_catalogue(name)
             d = draws(a, 12, 5)
-            p = Passage(a, "earth", day(2462000.5), q * R_EARTH, 7000.0, enc)
+            p = CloseApproach(a, "earth", day(2462000.5), q * R_EARTH, 7000.0, enc)
             attitudes = Attitudes.at(a, d, 5, "earth")
             fast = sample_verdicts(p, d, attitudes, Material())
             full = sample_verdicts(p, d, attitudes, Material(), quick=False)
@@ -206,7 +206,7 @@ def test_quick_verdicts_are_those_of_the_dynamics():
 def test_bound_from_distance_and_speed_covers_the_tide():
     a = Asteroid.from_catalogue("Apophis")
     for distance, v in ((0.01, 3000.0), (0.02, 12000.0), (0.049, 25000.0)):
-        p = Passage(a, "earth", day(2461000.5), distance * AU, v)
+        p = CloseApproach(a, "earth", day(2461000.5), distance * AU, v)
         start = usual_start(planet("earth"), distance * AU)
         e = Encounter.hyperbolic(
             "earth", periapsis=distance * u.au, v_inf=v * u.m / u.s, start_distance=start * u.m
@@ -215,9 +215,9 @@ def test_bound_from_distance_and_speed_covers_the_tide():
         assert all(b >= x for b, x in zip(bound, exact, strict=True))
         assert bound[0] < 1.1 * exact[0] + 3e-13  # the Sun's share is taken at 0.7 au
     # Near the Moon's orbit, and where the Sun bends a slow path, distance and speed say nothing.
-    assert Passage(a, "earth", p.time, 4e8, 6000.0).bounds() == (np.inf, np.inf)
-    assert Passage(a, "earth", p.time, 0.05 * AU, 2000.0).bounds() == (np.inf, np.inf)
-    assert Passage(a, "venus", p.time, 4e8, 6000.0).bounds()[0] < 1e-8
+    assert CloseApproach(a, "earth", p.time, 4e8, 6000.0).bounds() == (np.inf, np.inf)
+    assert CloseApproach(a, "earth", p.time, 0.05 * AU, 2000.0).bounds() == (np.inf, np.inf)
+    assert CloseApproach(a, "venus", p.time, 4e8, 6000.0).bounds()[0] < 1e-8
 
 
 @pytest.mark.parametrize("suffix", ["ecsv", "parquet"])
@@ -537,7 +537,9 @@ def test_one_bad_row_never_ends_a_run(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         run.run(out, progress=interrupt)
     called = []
-    again = Screening(run.asteroids, run.settings, lambda a, s: called.append(a.name) or passages(a, s))
+    again = Screening(
+        run.asteroids, run.settings, lambda a, s: called.append(a.name) or close_approaches(a, s)
+    )
     again.run(out)
     assert called == list(BAD)[-1:]
     table = read_results(out)

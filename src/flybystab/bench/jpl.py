@@ -29,14 +29,14 @@ UNIT = u.au / u.d**2
 
 
 class Errors(NamedTuple):
-    """Each event of JPL's list compared with the passage found nearest in time.
+    """Each event of JPL's list compared with the encounter found nearest in time.
 
     Attributes
     ----------
     events : list of dict
         Rows of the list.
     distance : ndarray
-        Distance found minus distance listed, km; nan without a passage within a day.
+        Distance found minus distance listed, km; nan without an encounter within a day.
     time : ndarray
         Time found minus time listed, s.
     growth : ndarray

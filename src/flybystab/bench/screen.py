@@ -20,7 +20,7 @@ from flybystab.catalogues.asteroid import Asteroid
 from flybystab.encounter.encounter import Encounter
 from flybystab.plots.style import save
 from flybystab.screening.draws import Attitudes, draws
-from flybystab.screening.encounters import Passage
+from flybystab.screening.encounters import CloseApproach
 from flybystab.screening.sample_verdicts import SampleVerdicts, sample_verdicts
 from flybystab.typing import Document
 from flybystab.units import R_earth
@@ -43,10 +43,10 @@ def rows(figure: str | Path | None = None, samples: int = 200) -> list[Document]
     for distance in DISTANCES:
         e = Encounter.hyperbolic("earth", periapsis=distance * R_earth, v_inf=6 * u.km / u.s)
         q = e.distance.to_value(u.m)
-        passage = Passage(asteroid, "earth", Time(2462000.5, format="jd", scale="tdb"), q, 6000.0, e)
+        approach = CloseApproach(asteroid, "earth", Time(2462000.5, format="jd", scale="tdb"), q, 6000.0, e)
 
-        def run(tolerance: float, quick: bool, passage: Passage = passage) -> SampleVerdicts:
-            return sample_verdicts(passage, draw, attitudes, Material(), tolerance=tolerance, quick=quick)
+        def run(tolerance: float, quick: bool, approach: CloseApproach = approach) -> SampleVerdicts:
+            return sample_verdicts(approach, draw, attitudes, Material(), tolerance=tolerance, quick=quick)
 
         truth = run(1e-11, False)
         for tolerance, quick in ((1e-7, True), *((t, False) for t in TOLERANCES)):

@@ -18,7 +18,7 @@ from flybystab.plots.labels import label_points, literal
 from flybystab.plots.outcome_map import MARKERS, SCALE
 from flybystab.plots.style import new_figure, save, styled
 from flybystab.screening.columns import VERDICTS
-from flybystab.screening.inference import strongest_passage
+from flybystab.screening.inference import strongest_encounter
 from flybystab.screening.results import read_results
 from flybystab.screening.summary import summary
 from flybystab.typing import Array, Document
@@ -129,7 +129,7 @@ def inference_figure(table: QTable, path: str | Path) -> Path:
         _bounds_scale(figure, drawn[0], list(panels))
     axes = " x ".join(f"{2 * a:.0f}" for a in table.meta.get("semi_axes_m", []))
     title = f"{literal(table.meta.get('asteroid', ''))}: {axes} m, {table.meta.get('spin_period_h', np.nan):.4g} h"
-    strongest = strongest_passage(table)
+    strongest = strongest_encounter(table)
     if strongest is not None:
         title += f"; strongest tide: {strongest['passage']}"
     figure.suptitle(title)

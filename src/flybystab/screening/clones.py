@@ -21,7 +21,7 @@ from flybystab.errors import FlybystabError
 from flybystab.orbit.epochs import later
 from flybystab.orbit.planets import planet
 from flybystab.screening.draws import stream
-from flybystab.screening.encounters import Passage
+from flybystab.screening.encounters import CloseApproach
 from flybystab.typing import Array
 
 #: Clones are used if five sigma of the distance exceed this fraction of it; the relative change of the tide is three
@@ -40,7 +40,7 @@ class Clones(NamedTuple):
 
     Attributes
     ----------
-    passage : Passage
+    approach : CloseApproach
         Of the nominal orbit.
     time : Time
         Its closest approach.
@@ -50,15 +50,15 @@ class Clones(NamedTuple):
         Number of clones, and seed: clone k depends on `key` and k only.
     """
 
-    passage: Passage
+    approach: CloseApproach
     time: Time
     within: float
     samples: int
     key: int
 
-    def passages(self, first: int, last: int) -> list[Passage]:
+    def close_approaches(self, first: int, last: int) -> list[CloseApproach]:
         """Encounters of clones `first` to ``last - 1``; that of one clone does not depend on the others."""
-        p = self.passage
+        p = self.approach
         clones = p.asteroid.orbit.clones(self.samples, self.key, first=first, last=last)
         offset, distance, v_inf = clone_encounters(
             clones, p.planet, self.time, search=_SEARCH, within=self.within * u.m, workers=1
@@ -68,11 +68,13 @@ class Clones(NamedTuple):
             if np.isfinite(distance[k]):
                 time = later(self.time, float(offset[k]))
                 out.append(
-                    Passage(p.asteroid, p.planet, time, float(distance[k]), float(v_inf[k]), orbit=orbit)
+                    CloseApproach(
+                        p.asteroid, p.planet, time, float(distance[k]), float(v_inf[k]), orbit=orbit
+                    )
                 )
             else:
                 far = self.within, p.v_inf
-                out.append(Passage(p.asteroid, p.planet, self.time, *far, orbit=orbit, missed=True))
+                out.append(CloseApproach(p.asteroid, p.planet, self.time, *far, orbit=orbit, missed=True))
         return out
 
     def sigma(self, distance: Array) -> float:
@@ -99,18 +101,18 @@ class OrbitSampling(NamedTuple):
     note: str
 
 
-def orbit_sampling(passage: Passage, samples: int, seed: int) -> OrbitSampling:
+def orbit_sampling(approach: CloseApproach, samples: int, seed: int) -> OrbitSampling:
     """Decide whether each sample of an encounter has its own orbit, and prepare the clones.
 
     Parameters
     ----------
-    passage : Passage
+    approach : CloseApproach
         Of the nominal orbit.
     samples, seed : int
         Clone k depends on the seed, the asteroid and k only: it is the same in every encounter.
     """
-    asteroid = passage.asteroid
-    if passage.encounter is not None and passage.encounter.time is None:
+    asteroid = approach.asteroid
+    if approach.encounter is not None and approach.encounter.time is None:
         return OrbitSampling(None, np.nan, "scripted encounter")
     covariance = asteroid.orbit.covariance
     if covariance is None:
@@ -118,14 +120,14 @@ def orbit_sampling(passage: Passage, samples: int, seed: int) -> OrbitSampling:
     if not covariance.correlated:
         known = "1-sigmas" if covariance.caveat == "without correlations" else "known only"
         return OrbitSampling(None, np.nan, f"orbit without errors ({known} {covariance.caveat})")
-    body = planet(passage.planet)
+    body = planet(approach.planet)
     key = int(stream(seed, "orbit", identity(asteroid)).integers(2**62))
-    within = max(1.5 * passage.distance, far_enough(body))
+    within = max(1.5 * approach.distance, far_enough(body))
     try:
         few = encounter_distribution(
             asteroid.orbit,
             body.name,
-            passage.time,
+            approach.time,
             n=min(samples, _PROBES),
             seed=key,
             search=_SEARCH,
@@ -141,6 +143,6 @@ def orbit_sampling(passage: Passage, samples: int, seed: int) -> OrbitSampling:
         sigma = float(few.distance_sigma.to_value(u.m))
     else:
         sigma = np.nan
-    if 5.0 * sigma < MATTERS * passage.distance:
+    if 5.0 * sigma < MATTERS * approach.distance:
         return OrbitSampling(None, sigma, "")
-    return OrbitSampling(Clones(passage, few.time, within, samples, key), sigma, "")
+    return OrbitSampling(Clones(approach, few.time, within, samples, key), sigma, "")

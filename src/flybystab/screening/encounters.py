@@ -28,8 +28,8 @@ _SQRT6 = np.sqrt(6.0)
 
 
 @dataclass
-class Passage:
-    """One encounter of one asteroid; its tide is computed on first use.
+class CloseApproach:
+    """A close approach found by the search; the encounter and its tide are computed on first use.
 
     Attributes
     ----------
@@ -120,17 +120,17 @@ class Passage:
         return tide_size(e.tide, e.t_start, e.t_stop)
 
 
-def passages(asteroid: Asteroid, settings: Settings) -> list[Passage]:
+def close_approaches(asteroid: Asteroid, settings: Settings) -> list[CloseApproach]:
     """Encounters of an asteroid in order of time."""
     from flybystab.orbit.search.encounter_finder import approaches
 
     start, stop = (Time(jd, format="jd", scale="tdb") for jd in (settings.start, settings.stop))
     found = approaches(asteroid.orbit, start, stop, settings.planets, settings.within)
     return [
-        Passage(asteroid, a.planet, a.time, a.distance, a.v_inf)
+        CloseApproach(asteroid, a.planet, a.time, a.distance, a.v_inf)
         for a in sorted(found, key=lambda a: (a.time.tdb.jd, a.planet))
     ]
 
 
 #: Function that finds the encounters of an asteroid; worker processes import it.
-Finder = Callable[[Asteroid, Settings], list[Passage]]
+Finder = Callable[[Asteroid, Settings], list[CloseApproach]]

@@ -18,7 +18,7 @@ from flybystab.flybys.escalation import ESCALATED
 from flybystab.flybys.grains_flyby import grains_flyby
 from flybystab.screening.clones import Clones
 from flybystab.screening.draws import Attitudes
-from flybystab.screening.encounters import Passage
+from flybystab.screening.encounters import CloseApproach
 from flybystab.screening.sample_verdicts import SampleVerdicts
 from flybystab.screening.settings import Settings
 
@@ -32,7 +32,7 @@ class GrainSample:
 
     Attributes
     ----------
-    passage : Passage
+    approach : CloseApproach
     clones : Clones or None
         Set where each sample has its own orbit.
     number : int
@@ -43,7 +43,7 @@ class GrainSample:
         Of the ellipsoid; kept where the grains give none.
     """
 
-    passage: Passage
+    approach: CloseApproach
     clones: Clones | None
     number: int
     attitudes: Attitudes
@@ -51,12 +51,12 @@ class GrainSample:
 
     def judged(self, settings: Settings) -> SampleVerdicts:
         """Verdict of one pile of grains, or the reason why there is none."""
-        passage = self.passage
+        approach = self.approach
         error, verdict, largest = "", self.verdict, np.nan
         try:
             if self.clones is not None and self.number != CATALOGUE_BODY:
-                (passage,) = self.clones.passages(self.number, self.number + 1)
-            encounter = passage.meet()
+                (approach,) = self.clones.close_approaches(self.number, self.number + 1)
+            encounter = approach.meet()
             turn = periapsis_axes(encounter) @ self.attitudes.matrix(0)
             with warnings.catch_warnings():  # a small number of grains is warned of with the settings
                 warnings.simplefilter("ignore", UserWarning)

@@ -201,7 +201,7 @@ def _over_grid(
     return found
 
 
-def strongest_passage(table: QTable) -> Document | None:
+def strongest_encounter(table: QTable) -> Document | None:
     """The encounter with the strongest tide in ``meta["passages"]``; None without encounters.
 
     Encounters are ordered by tide, not by increase, since an increase may be an upper bound.

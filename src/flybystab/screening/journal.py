@@ -131,9 +131,9 @@ class Journal:
             return
         self._note(task, self._append({"task": task, **content}))
 
-    def add_part(self, task: int, passage: int, first: int, content: Mapping[str, object]) -> None:
+    def add_part(self, task: int, approach: int, first: int, content: Mapping[str, object]) -> None:
         """Record a part of a task: the samples from `first` on of one of its encounters."""
-        offset = self._append({"task": task, "passage": passage, "first": first, **content})
+        offset = self._append({"task": task, "passage": approach, "first": first, **content})
         self._parts.setdefault(task, []).append(offset)
 
     def add_file(self, path: Path) -> None:

@@ -15,7 +15,7 @@ from flybystab.orbit.ephemeris import ephemeris
 from flybystab.screening.clones import OrbitSampling
 from flybystab.screening.columns import VERDICTS, YIELDED, share_of
 from flybystab.screening.draws import Attitudes, Draws, free_rotation, nominal
-from flybystab.screening.encounters import Passage
+from flybystab.screening.encounters import CloseApproach
 from flybystab.screening.sample_verdicts import (
     SampleVerdicts,
     Tally,
@@ -40,22 +40,22 @@ def failed_row(asteroid: Asteroid, settings: Settings, error: Exception) -> Row:
     return _head(asteroid, settings) | {"error": f"{type(error).__name__}: {error}"}
 
 
-def body_row(passage: Passage, settings: Settings) -> Row:
+def body_row(approach: CloseApproach, settings: Settings) -> Row:
     """Row of an encounter for the catalogue body; without a verdict where it could not be computed."""
-    asteroid, material = passage.asteroid, settings.material
+    asteroid, material = approach.asteroid, settings.material
     row = _head(asteroid, settings) | {
-        "planet": passage.planet,
-        "time_tdb": passage.time.tdb.isot,
-        "jd_tdb": float(passage.time.tdb.jd),
-        "distance": passage.distance / AU,
-        "v_inf": passage.v_inf / 1000.0,
+        "planet": approach.planet,
+        "time_tdb": approach.time.tdb.isot,
+        "jd_tdb": float(approach.time.tdb.jd),
+        "distance": approach.distance / AU,
+        "v_inf": approach.v_inf / 1000.0,
     }
     try:
-        attitude = catalogue_body(passage, settings)
+        attitude = catalogue_body(approach, settings)
         known = attitude.draws
         rest = float(friction_at_rest(free_rotation(asteroid, known), material).max())
         main = sample_verdicts(
-            passage, known, attitude, material, tolerance=settings.tolerance, sharp=SHARP, measure=True
+            approach, known, attitude, material, tolerance=settings.tolerance, sharp=SHARP, measure=True
         )
     except FlybystabError as error:
         return row | {"error": f"{type(error).__name__}: {error}"}
@@ -70,8 +70,8 @@ def body_row(passage: Passage, settings: Settings) -> Row:
         "assumed": "; ".join(
             (*asteroid.assumptions, *(d for d in known.drawn if d.split(" (")[0] not in asteroid.assumptions))
         ),
-        "forces": "; ".join(passage.encounter.forces)
-        if passage.encounter
+        "forces": "; ".join(approach.encounter.forces)
+        if approach.encounter
         else "bound on the tide of all bodies",
         **{f"semi_axis_{x}": float(a) for x, a in zip("abc", known.axes[0], strict=True)},
         "density": float(known.rho[0]),
@@ -82,11 +82,11 @@ def body_row(passage: Passage, settings: Settings) -> Row:
     }
 
 
-def catalogue_body(passage: Passage, settings: Settings) -> Attitudes:
+def catalogue_body(approach: CloseApproach, settings: Settings) -> Attitudes:
     """The catalogue body with its attitude."""
-    asteroid = passage.asteroid
+    asteroid = approach.asteroid
     known = nominal(asteroid, settings.material, settings.population)
-    return Attitudes.at(asteroid, known, settings.seed, "nominal", *passage.key)
+    return Attitudes.at(asteroid, known, settings.seed, "nominal", *approach.key)
 
 
 def sampled_row(row: Row, orbits: OrbitSampling, tally: Tally, draw: Draws, result: SampleVerdicts) -> Row:
@@ -137,15 +137,15 @@ def _rise(most: float, rest: float) -> float:
     return max(most - rest, 0.0) if np.isfinite(rest) else np.nan
 
 
-def sample_rows(passage: Passage, attitudes: Attitudes, result: SampleVerdicts) -> Iterator[Row]:
+def sample_rows(approach: CloseApproach, attitudes: Attitudes, result: SampleVerdicts) -> Iterator[Row]:
     """Rows of the samples of one encounter."""
     draw, poles = attitudes.draws, attitudes.poles
     for i in range(len(draw.rho)):
         pole = poles[i]
         yield {
-            "asteroid": passage.asteroid.name,
-            "planet": passage.planet,
-            "jd_tdb": float(passage.time.tdb.jd),
+            "asteroid": approach.asteroid.name,
+            "planet": approach.planet,
+            "jd_tdb": float(approach.time.tdb.jd),
             "sample": i,
             "distance": float(result.distance[i]) / AU,
             **{f"semi_axis_{x}": float(a) for x, a in zip("abc", draw.axes[i], strict=True)},

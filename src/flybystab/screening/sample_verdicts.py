@@ -18,7 +18,7 @@ from flybystab.flybys.batch import comparison_tolerance
 from flybystab.flybys.flyby_many import follow_rows
 from flybystab.flybys.verdict import Verdict
 from flybystab.screening.draws import Attitudes, Draws
-from flybystab.screening.encounters import Passage
+from flybystab.screening.encounters import CloseApproach
 from flybystab.typing import Array, Document
 
 
@@ -164,7 +164,7 @@ class Tally(NamedTuple):
 
 
 def sample_verdicts(
-    passage: Passage,
+    approach: CloseApproach,
     draw: Draws,
     attitudes: Attitudes,
     material: Material,
@@ -178,7 +178,7 @@ def sample_verdicts(
 
     Parameters
     ----------
-    passage : Passage
+    approach : CloseApproach
     draw : Draws
     attitudes : Attitudes
         Of the same samples.
@@ -194,25 +194,25 @@ def sample_verdicts(
     """
     n = len(draw.rho)
     code = material.surface_code
-    friction, decided = _quick(draw, code, passage.bounds())
+    friction, decided = _quick(draw, code, approach.bounds())
     if not quick:
         decided[:] = UNDECIDED
     decided[(decided == INTACT) & (friction[:, 1] > friction[:, 0] + sharp)] = UNDECIDED
     failure = ""
     if np.any(decided == UNDECIDED):
         try:
-            encounter = passage.meet()
+            encounter = approach.meet()
         except FlybystabError as error:
             failure = f"{type(error).__name__}: {error}"
         else:
             if quick and not encounter.impact:
-                close, sharper = _quick(draw, code, passage.close_bounds())
+                close, sharper = _quick(draw, code, approach.close_bounds())
                 fresh = (decided == UNDECIDED) & (sharper != UNDECIDED)
                 fresh &= (sharper != INTACT) | (close[:, 1] <= close[:, 0] + sharp)
                 fresh &= draw.axes[:, 0] <= encounter.height  # clear of the ground at any attitude
                 friction[fresh], decided[fresh] = close[fresh], sharper[fresh]
     dynamic = decided == UNDECIDED
-    distance = np.full(n, passage.distance)
+    distance = np.full(n, approach.distance)
     out = SampleVerdicts([""] * n, np.full(n, np.nan), friction[:, 0].copy(), dynamic, [""] * n, distance)
     for i in (int(k) for k in np.flatnonzero(~dynamic)):
         intact = decided[i] == INTACT
@@ -223,7 +223,7 @@ def sample_verdicts(
         for i in todo:
             out.error[i] = failure
     elif todo:
-        encounter = passage.meet()
+        encounter = approach.meet()
         some = np.array(todo)
         rows = draw.rows(some, attitudes.matrices(some), material)
         table = follow_rows(rows, [encounter], tolerance=tolerance, workers=1)
@@ -239,7 +239,7 @@ def sample_verdicts(
 
 
 def verdicts_each(
-    passages: Sequence[Passage],
+    approaches: Sequence[CloseApproach],
     draw: Draws,
     attitudes: Attitudes,
     material: Material,
@@ -250,7 +250,7 @@ def verdicts_each(
     return SampleVerdicts.joined(
         [
             sample_verdicts(p, draw.part(i, i + 1), attitudes.part(i, i + 1), material, tolerance=tolerance)
-            for i, p in enumerate(passages)
+            for i, p in enumerate(approaches)
         ]
     )
 

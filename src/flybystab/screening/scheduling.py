@@ -17,7 +17,7 @@ from flybystab.screening.encounters import Finder
 from flybystab.screening.grain_samples import GrainSample
 from flybystab.screening.sample_verdicts import SampleVerdicts
 from flybystab.screening.settings import Settings
-from flybystab.screening.tasks import OpenPassage, Part, Rows, begin, joined
+from flybystab.screening.tasks import OpenApproach, Part, Rows, begin, joined
 from flybystab.typing import Document
 
 P = ParamSpec("P")
@@ -26,7 +26,7 @@ R = TypeVar("R")
 
 def _begin(
     asteroids: list[Asteroid], settings: Settings, finder: Finder, block: int
-) -> list[list[Rows | OpenPassage]]:
+) -> list[list[Rows | OpenApproach]]:
     return [begin(a, settings, finder, block) for a in asteroids]
 
 
@@ -39,7 +39,7 @@ class _Asteroid:
     """An asteroid in progress: its encounters, the number of open ones, and their initial number of samples."""
 
     position: int
-    work: list[Rows | OpenPassage]
+    work: list[Rows | OpenApproach]
     open: int
     samples: int
     done: int = 0
@@ -50,18 +50,18 @@ class _Piece(NamedTuple):
 
     asteroid: _Asteroid
     number: int
-    passage: OpenPassage
+    approach: OpenApproach
     first: int
 
 
 class Parts(Protocol):
     """Store of finished parts of long tasks."""
 
-    def add(self, asteroid: int, passage: int, first: int, judged: SampleVerdicts) -> None:
+    def add(self, asteroid: int, approach: int, first: int, judged: SampleVerdicts) -> None:
         """Store a part: samples from `first` on of one encounter of the asteroid."""
 
     def of(self, asteroid: int) -> Sequence[Document]:
-        """Stored parts of an asteroid, with ``passage``, ``first`` and the result of `SampleVerdicts.stored`."""
+        """Stored parts of an asteroid: ``passage`` (a number), ``first`` and the result of `SampleVerdicts.stored`."""
 
 
 class SerialExecutor(Executor):
@@ -217,14 +217,14 @@ class _Schedule:
 
     def take(self, piece: _Piece, verdicts: SampleVerdicts) -> Rows | None:
         """Store the verdicts of a part; the rows of its asteroid if it was the last one."""
-        asteroid, passage = piece.asteroid, piece.passage
-        passage.take(piece.first, verdicts)
+        asteroid, approach = piece.asteroid, piece.approach
+        approach.take(piece.first, verdicts)
         if self.parts is not None:
             self.parts.add(asteroid.position, piece.number, piece.first, verdicts)
-        asteroid.open -= not passage.left
-        if not passage.unjudged and passage.needed and not passage.sent:
-            asteroid.samples += len(passage.needed)
-            self.waiting.appendleft(_grain_pieces(asteroid, piece.number, passage))
+        asteroid.open -= not approach.left
+        if not approach.unjudged and approach.needed and not approach.sent:
+            asteroid.samples += len(approach.needed)
+            self.waiting.appendleft(_grain_pieces(asteroid, piece.number, approach))
         asteroid.done += len(verdicts.verdict)
         self.completed[asteroid.position] = asteroid.done / asteroid.samples
         if asteroid.open:
@@ -232,13 +232,13 @@ class _Schedule:
         del self.completed[asteroid.position]
         return joined(asteroid.work, self.settings)
 
-    def start(self, position: int, work: list[Rows | OpenPassage]) -> Rows | None:
+    def start(self, position: int, work: list[Rows | OpenApproach]) -> Rows | None:
         """Restore stored parts of an asteroid and queue the others; its rows if there are none."""
         for part in () if self.parts is None else self.parts.of(position):
             found = work[part["passage"]] if part["passage"] < len(work) else None
-            if isinstance(found, OpenPassage):
+            if isinstance(found, OpenApproach):
                 found.take_stored([part])
-        left = [(n, w) for n, w in enumerate(work) if isinstance(w, OpenPassage) and w.left]
+        left = [(n, w) for n, w in enumerate(work) if isinstance(w, OpenApproach) and w.left]
         if not left:
             return joined(work, self.settings)
         samples = sum(w.left for _, w in left)
@@ -247,19 +247,19 @@ class _Schedule:
 
 
 def _pieces(
-    asteroid: _Asteroid, left: Sequence[tuple[int, OpenPassage]]
+    asteroid: _Asteroid, left: Sequence[tuple[int, OpenApproach]]
 ) -> Iterator[tuple[_Piece, Part | GrainSample]]:
-    for number, passage in left:
-        for first, part in list(passage.parts()):
-            yield _Piece(asteroid, number, passage, first), part
-        yield from _grain_pieces(asteroid, number, passage)
+    for number, approach in left:
+        for first, part in list(approach.parts()):
+            yield _Piece(asteroid, number, approach, first), part
+        yield from _grain_pieces(asteroid, number, approach)
 
 
 def _grain_pieces(
-    asteroid: _Asteroid, number: int, passage: OpenPassage
+    asteroid: _Asteroid, number: int, approach: OpenApproach
 ) -> Iterator[tuple[_Piece, Part | GrainSample]]:
-    for k, sample in passage.grain_samples():
-        yield _Piece(asteroid, number, passage, k), sample
+    for k, sample in approach.grain_samples():
+        yield _Piece(asteroid, number, approach, k), sample
 
 
 def _failed_workers(error: Exception, executor: Executor) -> str | None:

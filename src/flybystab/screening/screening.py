@@ -33,7 +33,7 @@ from flybystab.orbit.ephemeris import ephemeris
 from flybystab.progress import check_progress, progress_bar
 from flybystab.result_table import ResultTable
 from flybystab.screening.columns import COLUMNS
-from flybystab.screening.encounters import Finder, passages
+from flybystab.screening.encounters import Finder, close_approaches
 from flybystab.screening.priors import Population
 from flybystab.screening.progress import Progress
 from flybystab.screening.result_rows import Row
@@ -57,7 +57,9 @@ class Screening:
         Finds the encounters of an asteroid; by default those of its orbit.
     """
 
-    def __init__(self, asteroids: Sequence[Asteroid], settings: Settings, finder: Finder = passages) -> None:
+    def __init__(
+        self, asteroids: Sequence[Asteroid], settings: Settings, finder: Finder = close_approaches
+    ) -> None:
         self.asteroids = tuple(asteroids)
         self.settings = settings
         self.finder = finder
@@ -203,7 +205,7 @@ def screen(
     tolerance: float = 1e-7,
     grains: int | None = None,
     progress: bool | Callable[[Progress], None] | None = None,
-    finder: Finder = passages,
+    finder: Finder = close_approaches,
 ) -> ResultTable:
     """Verdicts on the encounters of asteroids, modelled as rubble piles.
 

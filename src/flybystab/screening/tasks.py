@@ -18,7 +18,7 @@ from flybystab.catalogues.catalogue import Asteroid
 from flybystab.errors import FlybystabError
 from flybystab.screening.clones import Clones, OrbitSampling, orbit_sampling
 from flybystab.screening.draws import Attitudes, Samples
-from flybystab.screening.encounters import Finder, Passage
+from flybystab.screening.encounters import CloseApproach, Finder
 from flybystab.screening.grain_samples import CATALOGUE_BODY, GrainSample, needing_grains
 from flybystab.screening.result_rows import (
     Row,
@@ -54,7 +54,7 @@ class Part:
 
     Attributes
     ----------
-    passage : Passage
+    approach : CloseApproach
     clones : Clones or None
         Set where each sample has its own orbit.
     first, last : int
@@ -63,7 +63,7 @@ class Part:
         All samples of the encounter; those of the part are drawn by the worker.
     """
 
-    passage: Passage
+    approach: CloseApproach
     clones: Clones | None
     first: int
     last: int
@@ -74,10 +74,10 @@ class Part:
         attitudes = self.samples.part(self.first, self.last)
         given = attitudes.draws, attitudes, settings.material
         if self.clones is None:
-            return sample_verdicts(self.passage, *given, tolerance=settings.tolerance)
+            return sample_verdicts(self.approach, *given, tolerance=settings.tolerance)
         n = attitudes.count
         try:
-            followed = self.clones.passages(self.first, self.first + n)
+            followed = self.clones.close_approaches(self.first, self.first + n)
         except FlybystabError:
             # The sample that fails is isolated, so that the result does not depend on the division into parts.
             return SampleVerdicts.joined(
@@ -88,19 +88,19 @@ class Part:
     def _one(self, clones: Clones, one: Attitudes, number: int, settings: Settings) -> SampleVerdicts:
         """Verdict on one sample alone."""
         try:
-            followed = clones.passages(number, number + 1)
+            followed = clones.close_approaches(number, number + 1)
         except FlybystabError as error:
             return SampleVerdicts.failed(f"{type(error).__name__}: {error}", clones.within)
         return verdicts_each(followed, one.draws, one, settings.material, tolerance=settings.tolerance)
 
 
 @dataclass
-class OpenPassage:
+class OpenApproach:
     """An encounter with samples that have no verdict yet.
 
     Attributes
     ----------
-    passage : Passage
+    approach : CloseApproach
     row : dict
         Of the catalogue body.
     orbits : OrbitSampling
@@ -126,7 +126,7 @@ class OpenPassage:
         The samples for grains have been given out.
     """
 
-    passage: Passage
+    approach: CloseApproach
     row: Row
     orbits: OrbitSampling
     attitudes: Samples | Attitudes
@@ -175,11 +175,11 @@ class OpenPassage:
         self.sent = True
         for k, verdict in sorted(self.needed.items()):
             one = self.nominal if k == CATALOGUE_BODY else self.attitudes.part(k, k + 1)
-            yield k, GrainSample(self.passage, self.orbits.clones, k, one, verdict)
+            yield k, GrainSample(self.approach, self.orbits.clones, k, one, verdict)
 
     def part(self, first: int, last: int) -> Part:
         """Samples `first` to ``last - 1``."""
-        return Part(self.passage, self.orbits.clones, first, last, self.attitudes)
+        return Part(self.approach, self.orbits.clones, first, last, self.attitudes)
 
     def parts(self) -> Iterator[tuple[int, Part]]:
         """Parts without verdicts, with the numbers of their first samples."""
@@ -221,33 +221,33 @@ class OpenPassage:
         if not settings.keep_samples:
             return {"rows": [row], "samples": []}
         everyone = self.attitudes.part(0, self.attitudes.count)
-        return {"rows": [row], "samples": list(sample_rows(self.passage, everyone, result))}
+        return {"rows": [row], "samples": list(sample_rows(self.approach, everyone, result))}
 
 
-def opened(passage: Passage, settings: Settings, block: int) -> Rows | OpenPassage:
+def opened(approach: CloseApproach, settings: Settings, block: int) -> Rows | OpenApproach:
     """The rows of an encounter, or the encounter with its open samples.
 
     Parameters
     ----------
-    passage : Passage
+    approach : CloseApproach
     settings : Settings
     block : int
         Integrated samples in one part.
     """
-    row = body_row(passage, settings)
+    row = body_row(approach, settings)
     n = settings.samples
     if "verdict" not in row or (n <= 1 and not settings.grains):
         return {"rows": [row], "samples": []}
-    nominal = catalogue_body(passage, settings) if settings.grains else None
+    nominal = catalogue_body(approach, settings) if settings.grains else None
     if n <= 1 and nominal is not None:
-        alone = OpenPassage(
-            passage, row, OrbitSampling(None, np.nan, ""), nominal.part(0, 0), nominal, size=1
+        alone = OpenApproach(
+            approach, row, OrbitSampling(None, np.nan, ""), nominal.part(0, 0), nominal, size=1
         )
         return alone if alone.left else alone.rows(settings)
-    samples = Samples(passage.asteroid, n, settings.seed, settings.population, passage.key)
-    orbits = orbit_sampling(passage, n, settings.seed)
+    samples = Samples(approach.asteroid, n, settings.seed, settings.population, approach.key)
+    orbits = orbit_sampling(approach, n, settings.seed)
     whole = settings.keep_samples or nominal is not None or orbits.clones is not None
-    work = OpenPassage(passage, row, orbits, samples, nominal, whole)
+    work = OpenApproach(approach, row, orbits, samples, nominal, whole)
     probe = min(n, block, _PROBE)
     first = work.take(0, work.part(0, probe).judged(settings))
     if work.unjudged:
@@ -260,7 +260,7 @@ def opened(passage: Passage, settings: Settings, block: int) -> Rows | OpenPassa
     return work if work.left else work.rows(settings)
 
 
-def begin(asteroid: Asteroid, settings: Settings, finder: Finder, block: int) -> list[Rows | OpenPassage]:
+def begin(asteroid: Asteroid, settings: Settings, finder: Finder, block: int) -> list[Rows | OpenApproach]:
     """Encounters of an asteroid, each as its rows or with its open samples.
 
     An asteroid that fails or exceeds the time limit of the settings has one row with the reason: it does not end
@@ -268,12 +268,12 @@ def begin(asteroid: Asteroid, settings: Settings, finder: Finder, block: int) ->
     """
     try:
         with time_limit(settings.time_limit, asteroid.name):
-            return [opened(passage, settings, block) for passage in finder(asteroid, settings)]
+            return [opened(approach, settings, block) for approach in finder(asteroid, settings)]
     except Exception as error:
         return [{"rows": [failed_row(asteroid, settings, error)], "samples": []}]
 
 
-def joined(work: Sequence[Rows | OpenPassage], settings: Settings) -> Rows:
+def joined(work: Sequence[Rows | OpenApproach], settings: Settings) -> Rows:
     """The rows of an asteroid whose encounters are all finished."""
-    rows = [w.rows(settings) if isinstance(w, OpenPassage) else w for w in work]
+    rows = [w.rows(settings) if isinstance(w, OpenApproach) else w for w in work]
     return {kind: [r for w in rows for r in w[kind]] for kind in ("rows", "samples")}

@@ -23,7 +23,7 @@ from flybystab.core.ellipsoid.yield_bound import (
 from flybystab.core.material.yield_surface import slope
 from flybystab.encounter.encounter import Encounter
 from flybystab.screening.draws import Attitudes, draws
-from flybystab.screening.encounters import passages
+from flybystab.screening.encounters import close_approaches
 from flybystab.screening.sample_verdicts import sample_verdicts as judged
 from flybystab.screening.settings import settings
 
@@ -72,7 +72,7 @@ def test_samples_on_real_orbits_by_the_bound_and_by_the_dynamics():
         a = Asteroid.from_catalogue(name)
         wanted = settings(start, stop, ["earth", "moon", "venus", "mars"], within=0.1 * u.au)
         d = draws(a, 8, 3)
-        found = passages(a, wanted)
+        found = close_approaches(a, wanted)
         assert found
         for p in found:
             where = Attitudes.at(a, d, 3, p.planet, p.time.jd)
