@@ -1,4 +1,4 @@
-"""The uncertainty of an orbit in the samples of its passages."""
+"""The uncertainty of an orbit in the samples of its encounters."""
 
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import replace
@@ -40,7 +40,7 @@ def test_a_well_known_orbit_is_shared_by_all_samples():
     assert s.note == ""
 
 
-def test_samples_of_a_badly_known_orbit_have_passages_of_their_own():
+def test_samples_of_a_badly_known_orbit_have_encounters_of_their_own():
     many, few = (orbit_sampling(only(with_spread(1000.0)), n, 3) for n in (24, 8))
     assert many.sigma == pytest.approx(1.1e6, rel=0.05)
     followed = many.clones.close_approaches(0, 24)
@@ -89,14 +89,14 @@ def test_clones_and_rows_are_the_same_to_the_bit_however_they_are_split(spread):
 def test_a_clone_that_cannot_be_followed_costs_its_own_sample_only(monkeypatch, spread):
     run, whole = spread
     lost = 3
-    original = Clones.passages
+    original = Clones.close_approaches
 
-    def passages_but_one(self, first, last):
+    def approaches_but_one(self, first, last):
         if first <= lost < last:
             raise NotConverged(f"clone {lost}: the step size collapsed")
         return original(self, first, last)
 
-    monkeypatch.setattr(Clones, "passages", passages_but_one)
+    monkeypatch.setattr(Clones, "close_approaches", approaches_but_one)
     for block in (SAMPLES, 2):
         ((_, found),) = Screening(run.asteroids, run.settings).results(block=block)
         errors = [s["error"] for s in found["samples"]]
