@@ -6,7 +6,7 @@ the second. Each row of the table changes one thing: "moves" is the displacement
 JPL" the distance of the final position from JPL's.
 
 The tesseral harmonics of the Earth are not a force of the package. Their displacement is that of the linearised
-equations of motion over three days around the encounter, driven by their acceleration along the path, and carried to
+equations of motion over three days around the encounter, driven by their acceleration along the path, and propagated to
 the end by a central difference of two orbits. The same method gives the displacement by J3 within 0.1 %.
 """
 

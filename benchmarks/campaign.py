@@ -1,8 +1,8 @@
-"""Random flybys over the whole domain: does any hang, fail, gain energy, change its verdict, or miss its own error?
+"""Random flybys over the whole domain: failures, energy gained, verdicts by tolerance, error estimates.
 
 python benchmarks/campaign.py stress [N [SEED]]       two tolerances, energy, verdicts; 1000 flybys, seed 1
 python benchmarks/campaign.py extremes [N [SEED]]     the same at the ends of every range, several at once; 1000, seed 4
-python benchmarks/campaign.py integrators [N [SEED]]  against the integrator that knows no events; 300, seed 2
+python benchmarks/campaign.py integrators [N [SEED]]  against the integrator without events; 300, seed 2
 python benchmarks/campaign.py tolerances [N [SEED]]   time, errors, verdicts and coverage by step tolerance
 python benchmarks/campaign.py coverage [N [SEED]]     the error estimate against a run at 1e-11; 100 with flow of each
                                                       yield surface at dilatancy 0 and 1, seed 3
@@ -10,11 +10,11 @@ python benchmarks/campaign.py verdicts [N [SEED]]     verdicts, bound mass fract
 
 `stress` and `integrators` draw semi-axes to 1 : 0.1 : 0.1, 1 m to 1000 km, 1000 to 4000 kg/m3, any spin up to 1.2 times
 the cohesionless limit of a sphere, any attitude; friction 0.1 to 60 deg, the four surfaces, dilatancy 0 to 1, cohesion
-or none, brittle or not; Earth at 1.01 to 5 radii with 0 to 20 km/s. `extremes` takes each of these from a few values
-at or beside the ends: spheres, needles and discs, bodies at the limit of their equilibrium, friction 0 to 75 deg, a
-cohesion of next to nothing or of rock, 500 to 8000 kg/m3, orbits that graze, parabolas, 70 km/s, several planets and a
-made-up one. Energy is checked where it can only fall: the plastic power along the flow, and the kinetic energy across
-every impulse and arrest.
+or none, brittle or not; Earth at 1.01 to 5 radii with 0 to 20 km/s. `extremes` takes each of these from a few values at
+or beside the ends: spheres, needles and discs, bodies at the limit of their equilibrium, friction 0 to 75 deg, a
+negligible cohesion or that of rock, 500 to 8000 kg/m3, grazing orbits, parabolas, 70 km/s, several planets and a
+fictitious one. Energy is checked where it can only fall: the plastic power along the flow, and the kinetic energy
+across every impulse and arrest.
 """
 
 from __future__ import annotations
@@ -354,7 +354,7 @@ def integrators(n: int, seed: int) -> Counter[str]:
 
 
 def pile(rng: np.random.Generator, surface: str, dilatancy: float) -> Scene:
-    """A pile of ordinary shape, friction and spin on a passage that makes about half of them flow."""
+    """A pile of ordinary shape, friction and spin in an encounter in which about half of them flow."""
     body = fs.Body(
         semi_axes=np.sort(rng.uniform(0.45, 1.0, 3))[::-1] * u.km,
         density=rng.uniform(1500, 2500) * u.kg / u.m**3,
@@ -478,7 +478,7 @@ def tolerances(n: int, seed: int) -> dict[float, dict[str, float]]:
 
 
 def verdicts(n: int, seed: int) -> Counter[str]:
-    """Verdicts of bodies in equilibrium, and what is known of those that leave the model."""
+    """Verdicts of bodies in equilibrium, and bounds on the mass of those that leave the model."""
     rng = np.random.default_rng(seed)
     scenes = []
     while len(scenes) < n:

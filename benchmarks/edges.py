@@ -4,9 +4,10 @@ Usage: ``python benchmarks/edges.py [CASES]``, 240 cases without a number. Reads
 
 - windows: a span of ten years is cut at random times, at periapses, and 1e-9 to 1e-6 s or 0.3 s beside them; the parts
   have to give the encounters of the whole exactly once (to 0.1 km and 0.1 s: the forces left out depend on the span).
-- epochs: the orbit is carried to another epoch inside or outside of the span, or to a periapsis; it has to give the
+- epochs: the orbit is propagated to another epoch inside or outside of the span, or to a periapsis; it has to give the
   same encounters.
-- backwards: the orbit is carried beyond the end of the span and searched backwards; it has to give the same encounters.
+- backwards: the orbit is propagated beyond the end of the span and searched backwards; it has to give the same
+  encounters.
 - sun: orbits with a perihelion inside the Sun give one row with an impact, and ``Orbit.at`` beyond it an error.
 """
 

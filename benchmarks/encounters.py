@@ -1,4 +1,4 @@
-"""Encounters with planets other than the Earth, and tracks through flybys, point by point, as tables.
+"""Encounters with planets other than the Earth, and tracks through flybys compared point by point, as tables.
 
 Usage: ``python benchmarks/encounters.py [planets] [tracks]``. Reference data are read from ``../shared/data`` (or
 ``$FLYBYSTAB_SHARED/data``); nothing is downloaded.
@@ -101,7 +101,7 @@ def planets(folder: Path = DATA) -> list[dict[str, object]]:
             f"{des:10} {body:8} {len(some):5d} {sum(bool(r['holds']) for r in some):5d} "
             f"{np.median(error):12.3f} {error.max():12.3f} {np.median(late):11.1f}"
         )
-    print("\nrows that do not hold (time off by more than 90 s, or 18 h where only the date is given)")
+    print("\nrows that disagree (time off by more than 90 s, or 18 h where only the date is given)")
     for r in out:
         if not r["holds"]:
             print(

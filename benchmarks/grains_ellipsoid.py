@@ -1,4 +1,4 @@
-"""What grains say of the ellipsoid: random flybys of piles beside the ellipsoid on several yield surfaces.
+"""Comparison of the ellipsoid with grains: random flybys of piles and of the ellipsoid on several yield surfaces.
 
 python benchmarks/grains_ellipsoid.py cases [--cases N] [--grains N] [--minutes M] [--jobs J]   random flybys
 python benchmarks/grains_ellipsoid.py map [--grains N]                          outcomes over periapsis and v_inf
@@ -178,9 +178,10 @@ def table(rows: list[list[float]], grains: int) -> None:
     counts = np.bincount(found, minlength=3)
     n = len(run)
     print(
-        f"{n} flybys of one pile of {grains} grains each ({len(rows) - n} drawn ones do not stand at rest); grains: "
-        f"{counts[0]} kept\n(a1 within {MOVED:.0%}), {counts[1]} moved, {counts[2]} lost (largest clump < {LOST:g}). "
-        "Too safe: lost called moved + moved or lost\ncalled kept. In % of all flybys, with 95 % intervals; "
+        f"{n} flybys of one pile of {grains} grains each ({len(rows) - n} drawn ones are not in equilibrium at rest); "
+        f"grains: {counts[0]} kept\n(a1 within {MOVED:.0%}), {counts[1]} moved, {counts[2]} lost "
+        f"(largest clump < {LOST:g}). Too safe: lost called moved + moved or lost\n"
+        "called kept. In % of all flybys, with 95 % intervals; "
         "rms of ln(a1 of the model/of grains) where both moved.\n"
     )
     head = f"{'too safe':>9s} {'%':>16s} {'too careful':>12s} {'%':>16s} {'rms ln(a1)':>11s}"

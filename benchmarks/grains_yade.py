@@ -2,7 +2,7 @@
 
 python benchmarks/grains_yade.py [--grains N] [--periapsis Q] [--seed K]
 
-Both codes start from the same grains with the same spin and feel the same tide (Earth, v_inf 5 km/s, from 10 Earth
+Both codes start from the same grains with the same spin and the same tide (Earth, v_inf 5 km/s, from 10 Earth
 radii). Yade 2023.02 (Debian package ``yade``) has Hertz-Mindlin contacts with friction 0.6, a rolling moment of at most
 0.1 of the normal force times the radius, and a restitution of 0.3; gravity, the direct sum, is given to it every 10 s,
 as in this package. Skipped where ``yade`` is missing.

@@ -1,4 +1,4 @@
-"""What digits and U of a catalogue say of its orbits, held against later and better orbits, as tables.
+"""Errors of orbits estimated from printed digits and U, compared with later and better orbits, as tables.
 
 Usage: ``python benchmarks/orbit_errors.py [runoff] [digits] [impacts] [model] [factor] [coverage] [growth]``. Reference
 data are read from ``../shared/data`` (or ``$FLYBYSTAB_SHARED/data``); nothing is downloaded.
@@ -88,7 +88,7 @@ def places(orbits: Sequence[Orbit], time: Time, window: Window) -> NDArray[np.fl
 
 
 def displacement(orbit: Orbit, time: Time, window: Window) -> float:
-    """One sigma of an orbit in the direction least known at a time, m."""
+    """1-sigma error of an orbit in the least certain direction at a time, m."""
     forces = field(window, [n for n in FORCES if n.endswith("point mass") or n == "1PN"])
     law = orbit.nongrav.parameters
     times = np.array([seconds(time, window.epoch)])
@@ -135,7 +135,7 @@ def runoff() -> list[str]:
 
 
 def digits() -> list[str]:
-    """Orbits of the MPC against JPL's, by U, in sigma of what digits and U say along the direction least known."""
+    """Orbits of the MPC compared with JPL's, by U, in sigma by digits and U in the least certain direction."""
     mpc, new = read(MPC), read(NEW)
     keys = [k for k in mpc if k in new and mpc[k].orbit.covariance is not None]
     keys = [k for k in keys if abs(seconds(new[k].epoch, MEETING)) < 2.0 * YEAR]
@@ -163,7 +163,7 @@ def digits() -> list[str]:
 
 
 def impacts() -> list[str]:
-    """Asteroids that were seen before they fell: entry on the orbit of the MPC, and how well that says it is known."""
+    """Asteroids discovered before their impact: entry on the orbit of the MPC, and its predictability."""
     mpc = read(MPC)
     out = [
         "Asteroids seen before they fell, on orbits of the MPC: where they reach 100 km",
@@ -188,7 +188,7 @@ def impacts() -> list[str]:
 
 
 def deviation(orbit: Orbit, truth: Orbit, time: Time, window: Window) -> float:
-    """Distance of an orbit from the truth along the direction least known, in its sigma, at a time."""
+    """Error of an orbit at a time in the least certain direction, in units of its sigma."""
     pairs = orbit.sigma_points("de440")
     points = places([x for pair in pairs for x in pair] + [orbit, truth], time, window)
     columns = 0.5 * (points[0:-2:2] - points[1:-2:2])
@@ -279,7 +279,7 @@ def factor(size: int = 500) -> list[str]:
 
 
 def coverage() -> list[str]:
-    """Stated errors of orbits against later orbits, along the direction least known: fractions within 1 and 3 sigma."""
+    """Stated errors of orbits compared with later orbits: fractions within 1 and 3 sigma, least certain direction."""
     window = ephemeris("de440").window(MEETING, -8.0 * YEAR, 2.0 * YEAR)
     out = [
         "Stated errors against JPL's orbits of 2026-07 at their epoch, along the direction least known",

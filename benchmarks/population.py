@@ -1,4 +1,4 @@
-"""Encounter rates of the known near-Earth asteroids, against counts and published figures; and what encounters do.
+"""Encounter rates of the known near-Earth asteroids compared with counts and published values, and their outcomes.
 
 Usage: ``python benchmarks/population.py counts|search|published|answers|nbody|verdicts|convergence|scale|binaries``.
 The MPC catalogue and CNEOS's list of close approaches are read from ``../shared/data`` (or ``FLYBYSTAB_SHARED``).

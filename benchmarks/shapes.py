@@ -1,7 +1,7 @@
 """Polyhedra: gravity, surfaces, freshness and stress. Usage: ``python benchmarks/shapes.py [MODE] [FILE]``.
 
 Modes: ``gravity`` (error against facets and time; the default), ``published`` (change of the slopes of Apophis beside
-published figures; FILE is an OBJ shape in km, else one made in code), ``freshness`` (refreshing distances and
+published figures; FILE is an OBJ shape in km; by default a generated one), ``freshness`` (refreshing distances and
 probabilities), ``stress`` (elastic stress of Apophis against Poisson's ratio), ``timing`` (of each function).
 """
 

@@ -1,11 +1,11 @@
-"""The stability test: throughput, and its numbers against brute force and the full dynamics.
+"""Energy criterion of stability: throughput, and comparison with exhaustive searches and the full dynamics.
 
     python benchmarks/stability.py [speed | minima | push | kappa]
 
 speed   a catalogue of 4,000 bodies by depth, and a 200 x 200 map of shapes (times after compilation)
 minima  least critical energies against 100,000 random directions, the best of them polished by SciPy's simplex:
         four yield surfaces, three dilatancies
-push    second order, third order and barrier against the full dynamics of pushed bodies
+push    second order, third order and barrier compared with the full dynamics of perturbed bodies
 kappa   plastic bulk modulus, friction and dilatancy over decades, with kappa_crit where it exists
 """
 
@@ -117,9 +117,7 @@ def minima() -> None:
     print(
         f"least critical energy / the one found (1 or more: none was missed): over {SAMPLES} random directions,"
     )
-    print(
-        "and where SciPy's simplex ends from the best four of them; -: no push of that order leads anywhere"
-    )
+    print("and after SciPy's simplex from the best four of them; -: no critical energy at that order")
     print(
         f"{'':>58} {'random directions':^27} {'and simplex':^29}\n"
         f"{'body':>22} {'surface':>25} {'dilatancy':>9} {'second':>8} {'third':>8} {'barrier':>8}"
@@ -142,7 +140,9 @@ def minima() -> None:
                 classify(*given[:7], *given[6:], 5, row, found)
                 ours = row[[columns.ENERGY_2, columns.ENERGY_3, columns.ENERGY_B]]
                 if row[columns.LEVEL] < 1:
-                    print(f"{name:>22} {surface:>25} {dilatancy:9.1f}   does not stand with this friction")
+                    print(
+                        f"{name:>22} {surface:>25} {dilatancy:9.1f}   not in equilibrium at this friction angle"
+                    )
                     continue
                 where = ball if dilatancy == 1.0 else x
                 values = np.empty((3, SAMPLES))
@@ -168,9 +168,9 @@ def push() -> None:
         "critical energies / binding energy; dynamics: least and median over 16 directions of the energy from"
     )
     print(
-        "which the body does not come to rest inside the model (flybystab.body.recovery.recovery_energy); nan: a"
+        "which the body does not come to rest inside the model (flybystab.body.recovery.recovery_energy); nan: friction"
     )
-    print("direction that is held is not stopped by friction, and a series along it says nothing")
+    print("does not stop a perturbation of fixed direction, so that the series along it is undefined")
     print(
         f"{'body':>22} {'friction':>8} {'cohesion':>12} {'required':>8} {'dilatancy':>9} | {'second':>7} "
         f"{'third':>7} {'barrier':>7}"
@@ -230,7 +230,7 @@ def kappa() -> None:
         "plastic bulk modulus kappa over the pressure p: least critical energy / binding energy at second order, and"
     )
     print(
-        "from the barrier; kappa_crit of a body at yield; stable: to infinitesimal pushes with the friction mobilised"
+        "from the barrier; kappa_crit of a body at yield; stable: to infinitesimal perturbations at mobilised friction"
     )
     ratios = (0.0, 1e-1, 1.0, 1e1, 1e2, 1e3, 1e4)
     print(
