@@ -287,8 +287,18 @@ class FlybyResult(Record):
 
     @property
     def left_out(self) -> tuple[tuple[str, float], ...]:
-        """Neglected effects, each with its estimated relative size."""
-        return self.inputs.encounter.left_out
+        """Neglected effects, each with its estimated relative size.
+
+        Those of a large body are included from 1e-3 on: the third order of the tide at the end of the long axis, 1.5
+        times the semi-axis over the distance, and the mass over that of the planet.
+        """
+        body, encounter = self.inputs.body, self.inputs.encounter
+        distance = max(float(encounter.distance.to_value(u.m)), encounter.planet.radius)
+        own = (
+            ("tide: third order", 1.5 * float(body.axes[0]) / distance),
+            ("orbit: mass of the body", G * float(body.mass.to_value(u.kg)) / encounter.planet.gm),
+        )
+        return (*encounter.left_out, *((name, share) for name, share in own if share >= 1e-3))
 
     @property
     def fragments(self) -> QTable | None:
