@@ -13,6 +13,7 @@ is the fraction of the encounters found that are in the list, for asteroids whos
 
 from __future__ import annotations
 
+import argparse
 import csv
 import gzip
 import os
@@ -129,8 +130,14 @@ def main(arguments: list[str]) -> int:
     if arguments == ["stages"]:
         stages()
         return 0
-    asteroids = catalogue(DATA / "nea_mpc_2026-02.csv.gz")
-    table = search(asteroids, Path(arguments[0]) if arguments else None)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("found", nargs="?", type=Path, help="table of the search")
+    parser.add_argument("--every", type=int, default=1, metavar="N", help="every Nth orbit of the catalogue")
+    options = parser.parse_args(arguments)
+    asteroids = catalogue(DATA / "nea_mpc_2026-02.csv.gz")[:: options.every]
+    table = search(asteroids, options.found)
     index, jd, au = np.array(table["index"]), np.array(table["time"].jd), table["distance"].to_value(u.au)
     listed = rows_of_cneos(asteroids)
     there = listed["index"] >= 0
