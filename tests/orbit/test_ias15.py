@@ -72,7 +72,7 @@ def test_the_way_of_the_search_is_that_of_at(known, name):
         later(orbit.epoch, 3652.0 * DAY),
         within=0.3 * u.au,
         ephemeris="de440",
-        tolerance=1e-15,
+        tolerance=1e-14,
         error=1 * u.m,
     )
     assert len(table) >= 1

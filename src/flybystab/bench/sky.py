@@ -168,7 +168,7 @@ def _speed(chosen: list[Orbit], years: float) -> list[Document]:
 
     ours()  # compiled, and the ephemeris read
     if oracle.missing():
-        truth, _ = ours(forces=FORCES, tolerance=1e-15)
+        truth, _ = ours(forces=FORCES, tolerance=1e-14)
     else:
         everything, usual = (oracle.Oracle(start, n) for n in (oracle.ALL_SOURCES, oracle.SUN_ALONE))
 
