@@ -65,6 +65,10 @@ def cohesion(text: str) -> Measured:
 def distance(text: str) -> float:
     """Value of --within, au: a number, or one with a unit of length such as ``1e6 km`` or ``5 R_earth``."""
     try:
+        return float(text)  # nan and infinity are refused with the other arguments
+    except ValueError:
+        pass
+    try:
         found = measured(text, "au", "--within")
     except InvalidInput:
         found = None
