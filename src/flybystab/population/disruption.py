@@ -22,6 +22,7 @@ from astropy.units import Quantity
 from flybystab._version import __version__
 from flybystab.arguments import check_arguments
 from flybystab.body.body import Material, refuse_cut_off
+from flybystab.core.numerics.threads import first_completed, interrupts_deferred
 from flybystab.errors import FlybystabWarning, InvalidInput
 from flybystab.flybys.verdict import Verdict
 from flybystab.orbit.planets import planet
@@ -191,15 +192,16 @@ def _results(
         for number, (k, i) in todo:
             yield number, (k, i), sampled(plan, k, i, rates[plan.planets[k]][0], workers)
         return
-    from concurrent.futures import as_completed
-
-    calls = {executor.submit(_task, plan, k, i): (number, (k, i)) for number, (k, i) in todo}
+    with interrupts_deferred():
+        calls = {executor.submit(_task, plan, k, i): (number, (k, i)) for number, (k, i) in todo}
     try:
-        for call in as_completed(calls):
-            yield *calls[call], call.result()
+        while calls:
+            for call in first_completed(calls):
+                yield *calls.pop(call), call.result()
     finally:
-        for call in calls:
-            call.cancel()
+        with interrupts_deferred():
+            for call in calls:
+                call.cancel()
 
 
 def _task(plan: Plan, planet_index: int, stratum: int) -> QTable:

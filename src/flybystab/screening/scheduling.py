@@ -5,13 +5,15 @@ from __future__ import annotations
 import os
 from collections import deque
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from concurrent.futures import FIRST_COMPLETED, BrokenExecutor, CancelledError, Executor, Future, wait
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future
+from contextlib import nullcontext
 from dataclasses import dataclass, field
 from itertools import islice
 from pickle import PickleError
 from typing import Any, NamedTuple, ParamSpec, Protocol, TypeVar
 
 from flybystab.catalogues.catalogue import Asteroid
+from flybystab.core.numerics.threads import first_completed, interrupts_deferred
 from flybystab.errors import WorkersLost
 from flybystab.screening.encounters import Finder
 from flybystab.screening.grain_samples import GrainSample
@@ -115,14 +117,16 @@ def scheduled(
         Names the asteroids in progress.
     """
     schedule = _Schedule(asteroids, iter(todo), settings, finder, executor, chunk, block, parts)
+    # a call of the serial executor is the calculation itself, which Ctrl-C ends at once
+    deferred = nullcontext if isinstance(executor, SerialExecutor) else interrupts_deferred
     try:
         while True:
-            while len(schedule.calls) < window and schedule.send():
-                pass
+            with deferred():
+                while len(schedule.calls) < window and schedule.send():
+                    pass
             if not schedule.calls:
                 return
-            finished, _ = wait(schedule.calls, return_when=FIRST_COMPLETED)
-            for future in finished:
+            for future in first_completed(schedule.calls):
                 call, answer = schedule.received(future)
                 if isinstance(call, _Piece):
                     if (rows := schedule.take(call, answer)) is not None:
@@ -134,8 +138,9 @@ def scheduled(
                     if (rows := schedule.start(i, work)) is not None:
                         yield i, rows
     finally:
-        for future in schedule.calls:
-            future.cancel()
+        with deferred():
+            for future in schedule.calls:
+                future.cancel()
 
 
 @dataclass(eq=False)
