@@ -121,10 +121,17 @@ def test_an_index_that_names_a_class_no_longer_there_is_out_of_date(tmp_path):
         "class Pair(NamedTuple):\n    a: float\n    b: float\n\n"
         "@kernel\ndef total(p):\n    return p.a + p.b\n\nVALUE = total(Pair(1.0, 2.0))\n"
     )
+    # the kernel of a user, whose own file does not change
+    (tmp_path / "script.py").write_text(
+        "from numba import njit\nfrom flybystab import sums\n\n"
+        "@njit(cache=True)\ndef difference(p):\n    return p.a - p.b\n\n"
+        "print(sums.VALUE + difference(sums.PAIR))\n"
+    )
+    source += "PAIR = Pair(2.0, 2.0)\n"
     for text in (source, source.replace("Pair", "Couple")):
         (package / "sums.py").write_text(text)
         done = subprocess.run(
-            [sys.executable, "-c", "from flybystab.sums import VALUE; print(VALUE)"],
+            [sys.executable, "-c", "import script"],
             capture_output=True,
             text=True,
             cwd=tmp_path,

@@ -2,8 +2,8 @@
 
 numba keeps a kernel until the file that defines it changes. A kernel also contains the kernels that it calls, with
 their constants, from other files: after an update of the package, code of the previous version could run. Here the
-stamp of a kernel of this package is the digest of all files from which it is compiled. An index of kernels that names
-a class which no longer exists counts as out of date, too.
+stamp of a kernel of this package is the digest of all files from which it is compiled. An index of kernels, also of
+other packages, that names a class of this package which no longer exists counts as out of date, too.
 
 The environment variable FLYBYSTAB_KERNELS names a folder in which installations share their kernels: there a kernel is
 found by its stamp, not by the place of its source. numba itself loads a kernel only with the version that compiled it
@@ -146,11 +146,12 @@ class _Shared(InTreeCacheLocator):
 
 
 def _load_index(cache_file: Any) -> dict[Any, Any]:
-    """The kernels in an index file; none where an index of this package names a class that no longer exists."""
+    """The kernels in an index file; none where it names a class of this package that no longer exists."""
     try:
         return _load(cache_file)
-    except (AttributeError, ImportError):
-        if isinstance(cache_file._source_stamp, str):  # a `stamp`; numba's own are tuples
+    except (AttributeError, ImportError) as error:
+        # kernels of this package have a `stamp`, those of others, which may have its classes as arguments, a tuple
+        if isinstance(cache_file._source_stamp, str) or ROOT.name in str(error):
             return {}
         raise
 
