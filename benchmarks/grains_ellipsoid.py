@@ -180,29 +180,33 @@ def table(rows: list[list[float]], grains: int) -> None:
     print(
         f"{n} flybys of one pile of {grains} grains each ({len(rows) - n} drawn ones are not in equilibrium at rest); "
         f"grains: {counts[0]} kept\n(a1 within {MOVED:.0%}), {counts[1]} moved, {counts[2]} lost "
-        f"(largest clump < {LOST:g}). Too safe: lost called moved + moved or lost\n"
+        f"(largest clump < {LOST:g}). Optimistic: lost called moved + moved or lost\n"
         "called kept. In % of all flybys, with 95 % intervals; "
         "rms of ln(a1 of the model/of grains) where both moved.\n"
     )
-    head = f"{'too safe':>9s} {'%':>16s} {'too careful':>12s} {'%':>16s} {'rms ln(a1)':>11s}"
+    head = f"{'optimistic':>10s} {'%':>16s} {'pessimistic':>12s} {'%':>16s} {'rms ln(a1)':>11s}"
     print(f"{'surface (phi of the pile)':26s} {head}")
     for k, (name, _, _) in enumerate(MODELS):
         model, ratio = errors(run, found, stretch, k)
-        safe, careful = (model < found).sum(), (model > found).sum()
+        optimistic, pessimistic = (model < found).sum(), (model > found).sum()
         lost = ((found == 2) & (model == 1)).sum()
         print(
-            f"{name:26s} {f'{lost}+{safe - lost}':>9s} {interval(safe, n):>16s} {careful:12d} "
-            f"{interval(careful, n):>16s} {spread(ratio):>11s}"
+            f"{name:26s} {f'{lost}+{optimistic - lost}':>10s} {interval(optimistic, n):>16s} {pessimistic:12d} "
+            f"{interval(pessimistic, n):>16s} {spread(ratio):>11s}"
         )
     print(f"\n{'Mohr-Coulomb by kind':20s} {'flybys':>6s} {head}")
     model, ratio = errors(run, found, stretch, [name for name, _, _ in MODELS].index("mohr-coulomb"))
     groups = [case_of(number).groups for number in numbers]
     for group in sorted({g for m in groups for g in m}):
         chosen = np.array([group in m for m in groups])
-        size, safe, careful = chosen.sum(), (chosen & (model < found)).sum(), (chosen & (model > found)).sum()
+        size, optimistic, pessimistic = (
+            chosen.sum(),
+            (chosen & (model < found)).sum(),
+            (chosen & (model > found)).sum(),
+        )
         print(
-            f"{group:20s} {size:6d} {safe:9d} {interval(safe, size):>16s} {careful:12d} "
-            f"{interval(careful, size):>16s} {spread(ratio[chosen]):>11s}"
+            f"{group:20s} {size:6d} {optimistic:10d} {interval(optimistic, size):>16s} {pessimistic:12d} "
+            f"{interval(pessimistic, size):>16s} {spread(ratio[chosen]):>11s}"
         )
 
 

@@ -85,7 +85,7 @@ def report(name: str, counts: np.ndarray) -> None:
     missed, alarms = counts[1, 2] + counts[0, 1:].sum(), counts[2, :2].sum() + counts[1, 0]
     print(
         f"{'':>12} wrong in {missed + alarms} ({(missed + alarms) / counts.sum():.1%} of all, "
-        f"{(missed + alarms) / yielding:.1%} of those that yield): {missed} too safe, {alarms} too careful",
+        f"{(missed + alarms) / yielding:.1%} of those that yield): {missed} too optimistic, {alarms} too pessimistic",
         flush=True,
     )
 

@@ -17,7 +17,7 @@ NUMBER = r"\d[\d,]*(?:\.\d+)?(?:e[-+]?\d+)?"
 QUOTED = [
     ("README.md", "sky", "JPL's N close approaches of early 2020 to N km (median; N km at"),
     ("README.md", "completeness", "takes N s on two cores"),
-    ("CHANGELOG.md", "margin", "On N encounters it is wrong in N % (N too safe, N too careful)"),
+    ("CHANGELOG.md", "margin", "On N encounters it is wrong in N % (N too optimistic, N too pessimistic)"),
     ("screening.md", "throughput", "are split over both workers: N times the rate of one worker"),
     ("screening.md", "throughput", "with an overhead of about N ms each"),
 ]

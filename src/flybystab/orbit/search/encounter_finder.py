@@ -17,7 +17,6 @@ from astropy.units import Quantity
 from numpy.typing import NDArray
 
 from flybystab.arguments import check_arguments
-from flybystab.constants import DAY
 from flybystab.core.numerics.threads import in_order, worker_count
 from flybystab.errors import Impact, InvalidInput, NotConverged
 from flybystab.orbit.ephemeris import BODIES, SUN, Ephemeris
@@ -249,11 +248,10 @@ def approaches(
     )
     raw = _without_early_impacts(job, _integrated(job, 1, False))
     raw = raw[np.isin(raw["body"], [BODIES.index(b.name) for b in found])]
-    zero = job.span.middle.tdb
     return [
         Approach(
             BODIES[r["body"]],
-            Time(zero.jd1, zero.jd2 + r["time"] / DAY, format="jd", scale="tdb"),
+            later(job.span.middle, r["time"]),
             float(r["distance"]),
             float(np.sqrt(max(r["v_inf2"], 0.0))),
         )

@@ -29,8 +29,8 @@ _SPEED = u.m / u.s
 
 #: Margin of the integration beyond the span, so that a minimum at its end is bracketed, s.
 _MARGIN = 60.0
-#: Tolerance over the allowed error, m: with it nine of ten asteroids stay below half of the error for 76 years
-#: (``python benchmarks/completeness.py stages``). Below the least tolerance rounding errors dominate.
+#: Tolerance over the allowed error, m: nine of ten distances of a search over a century are then within a tenth of the
+#: default error (``python benchmarks/versions.py search``). Below the least tolerance rounding errors dominate.
 _PER_ERROR, LEAST_TOLERANCE, _LARGEST_TOLERANCE = 1e-15, 1e-14, 1e-8
 #: Largest tolerance where encounters amplify the errors of the integration.
 _WITH_GROWTH = 1e-13

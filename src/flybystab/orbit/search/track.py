@@ -34,8 +34,7 @@ from flybystab.typing import Array
 
 #: Status of a search: `out` too small, step size collapsed, start inside a body or its atmosphere, `MAX_STEPS` taken.
 FULL, STALLED, INSIDE, EXHAUSTED = 1, 2, 3, 4
-#: Largest number of steps from the epoch to the end of the span; an asteroid of the inner main belt takes about 60 a
-#: year.
+#: Largest number of steps from the epoch to the end of the span; a near-Earth asteroid takes about 17 a year.
 MAX_STEPS = 1_000_000
 # Typed: numba compiles a kernel anew for each literal argument.
 _NO_ROWS = code(0)
@@ -159,10 +158,11 @@ def track_encounters(
         bulge = 0.125 * (t_new - t) ** 2
         from_sun = chord_distance(y, old[SUN], new, now[SUN]) - bulge * (bend + BENDING[SUN])
         for body in range(N_BODIES):
-            limit = max(limits[body] if counts else 0.0, floors[body])
-            if from_sun > FARTHEST[body] + limit:
+            limit = limits[body] if counts else 0.0
+            largest = max(limit, floors[body])
+            if from_sun > FARTHEST[body] + largest:
                 continue
-            if chord_distance(y, old[body], new, now[body]) > limit + bulge * (bend + BENDING[body]):
+            if chord_distance(y, old[body], new, now[body]) > largest + bulge * (bend + BENDING[body]):
                 continue
             if n + FINE > out.shape[0]:
                 return n, FULL, t
