@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.constants import C_LIGHT
-from flybystab.core.numerics.jit import borrowed, kernel, pasted_kernel
+from flybystab.core.numerics.jit import borrowed, inlined, kernel, pasted_kernel
 from flybystab.orbit.almanac import (
     AT_SUN,
     C_BELT,
@@ -148,7 +148,13 @@ def empty_places() -> Places:
     return Places(np.zeros(C_FAST), np.zeros(C_SLOW), np.zeros(C_BELT), np.zeros(C_HEAVY))
 
 
-@kernel
+@inlined
+def borrowed_places(p: Places) -> Places:
+    """The same arrays without reference counts, for use inside a kernel that has them as an argument."""
+    return Places(borrowed(p.fast), borrowed(p.slow), borrowed(p.belt), borrowed(p.heavy))
+
+
+@inlined
 def borrowed_field(f: Field) -> Field:
     """The field without reference counts, for use inside a kernel that has it as an argument."""
     b = f.book

@@ -11,7 +11,7 @@ from flybystab.core.numerics.jit import borrowed, kernel, pasted_kernel, summing
 from flybystab.core.numerics.rkn12 import ERROR_ORDER, N_STAGES, NODE, stage_state, step_error
 from flybystab.orbit.almanac import Places
 from flybystab.orbit.nongravitational import NonGravitationalParameters
-from flybystab.orbit.search.acceleration import Field, empty_places, rate
+from flybystab.orbit.search.acceleration import Field, borrowed_field, borrowed_places, empty_places, rate
 from flybystab.typing import Array
 
 #: Units of position (m) and velocity (m/s) of the tolerance.
@@ -53,12 +53,11 @@ def empty_room() -> Room:
 @kernel
 def borrowed_room(room: Room) -> Room:
     """The same buffers for a new integration, without reference counts, inside a kernel that has it as an argument."""
-    p = room.places
     room.last[0] = 0.0
     return Room(
         borrowed(room.k),
         borrowed(room.last),
-        Places(borrowed(p.fast), borrowed(p.slow), borrowed(p.belt), borrowed(p.heavy)),
+        borrowed_places(room.places),
     )
 
 
@@ -78,6 +77,8 @@ def step(
     Writes the new state, the rates ``k[18, 6]`` (the last is that of the new state) and the places at its end;
     returns the estimated error in units of 1.5e11 m and 30 km/s.
     """
+    field, places = borrowed_field(field), borrowed_places(places)
+    y, k, new = borrowed(y), borrowed(k), borrowed(new)
     for s in range(1, N_STAGES + 1):
         stage_state(s, y, h, k, new)
         rate(field, law, t + NODE[s] * h, new, places, k[s])
