@@ -11,13 +11,14 @@ those of asteroids to the error of their table. Barycentric ICRF, m, s.
 from __future__ import annotations
 
 from functools import lru_cache
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.polynomial import chebyshev
 
 from flybystab.constants import AU, DAY
 from flybystab.core.numerics.jit import pasted_kernel
+from flybystab.core.numerics.lanes import N_LANES, lanes_at, put_lanes
 from flybystab.orbit.ephemeris import BELT, BODIES, EARTH, MOON, N_BODIES, SUN, Window
 from flybystab.orbit.planets import PLANETS
 from flybystab.typing import Array
@@ -26,15 +27,15 @@ from flybystab.typing import Array
 FAST = tuple(name for name in BODIES if 0.0 < PLANETS[name].orbit_radius < 1.2 * AU)
 SLOW = tuple(name for name in BODIES if name not in FAST)
 #: Slots of the grids, padded to multiples of four for vector instructions.
-N_FAST, N_SLOW, N_BELT = (-(-len(names) // 4) * 4 for names in (FAST, SLOW, BELT))
+N_FAST, N_SLOW, N_BELT = (-(-len(names) // N_LANES) * N_LANES for names in (FAST, SLOW, BELT))
 #: Grid (0 fast, 1 slow) and slot of each of ``BODIES``.
 GRID = np.array([0 if name in FAST else 1 for name in BODIES])
 SLOT = np.array([(FAST if name in FAST else SLOW).index(name) for name in BODIES])
 #: Planets that are sources of 1PN terms (:mod:`flybystab.orbit.relativity`).
 HEAVY = tuple(name for name in BODIES if PLANETS[name].relativity and name != "sun")
-N_HEAVY = len(HEAVY)
+N_HEAVY = -(-len(HEAVY) // N_LANES) * N_LANES
 #: Columns of the grids; those of ``HEAVY`` end with acceleration and potential of the Sun.
-C_FAST, C_SLOW, C_BELT, C_HEAVY = 3 * N_FAST + 4, 3 * N_SLOW, 3 * N_BELT, -(-(11 * N_HEAVY + 4) // 4) * 4
+C_FAST, C_SLOW, C_BELT, C_HEAVY = 3 * N_FAST + 4, 3 * N_SLOW, 3 * N_BELT, 10 * N_HEAVY + 4
 #: Columns of the Sun's velocity in the fast grid, and of its acceleration and potential in the heavy one.
 SUN_VELOCITY, AT_SUN = 3 * N_FAST, 10 * N_HEAVY
 # Rows and columns of Almanac.when.
@@ -156,41 +157,48 @@ def has_belt(book: Almanac) -> bool:
 
 
 @pasted_kernel
+def _cubic(pieces: Array, k: int, step: int, x: float, x2: float) -> Any:
+    """Four columns of a polynomial of degree 3, the coefficients of which are at ``k``, ``k + step``, ..."""
+    low = lanes_at(pieces, k) + lanes_at(pieces, k + step) * x
+    high = lanes_at(pieces, k + 2 * step) + lanes_at(pieces, k + 3 * step) * x
+    return low + high * x2
+
+
+@pasted_kernel
 def _find_quartic(when: Array, pieces: Array, t: float, p: Array, columns: int) -> None:
     """Write the columns of a grid of degree 4 at `t`."""
     i, x = _piece(when, t)
-    c = pieces[i]
     x2 = x * x
     x4 = x2 * x2
-    for j in range(columns):
-        p[j] = ((c[0, j] + c[1, j] * x) + (c[2, j] + c[3, j] * x) * x2) + c[4, j] * x4
+    for j in range(0, columns, N_LANES):
+        k = 5 * columns * i + j
+        value = _cubic(pieces, k, columns, x, x2) + lanes_at(pieces, k + 4 * columns) * x4
+        put_lanes(p, j, value)
 
 
 @pasted_kernel
 def find_places(book: Almanac, t: float, belt: bool, out: Places) -> None:
     """Write the positions of all bodies at ``t`` (s) into ``out``."""
-    # Estrin's scheme: its products are independent, so that the compiler can vectorise them.
+    # Estrin's scheme: its products are independent.
     i, x = _piece(book.when[_FAST], t)
-    c = book.fast[i]
-    p = out.fast
     x2 = x * x
     x4 = x2 * x2
     x8 = x4 * x4
-    for j in range(C_FAST):
-        p[j] = (
-            ((c[0, j] + c[1, j] * x) + (c[2, j] + c[3, j] * x) * x2)
-            + ((c[4, j] + c[5, j] * x) + (c[6, j] + c[7, j] * x) * x2) * x4
-            + (((c[8, j] + c[9, j] * x) + (c[10, j] + c[11, j] * x) * x2) + c[12, j] * x4) * x8
-        )
+    for j in range(0, C_FAST, N_LANES):
+        k = 13 * C_FAST * i + j
+        low = _cubic(book.fast, k, C_FAST, x, x2)
+        middle = _cubic(book.fast, k + 4 * C_FAST, C_FAST, x, x2)
+        high = _cubic(book.fast, k + 8 * C_FAST, C_FAST, x, x2)
+        value = low + middle * x4 + (high + lanes_at(book.fast, k + 12 * C_FAST) * x4) * x8
+        put_lanes(out.fast, j, value)
     i, x = _piece(book.when[_SLOW], t)
-    c = book.slow[i]
-    p = out.slow
     x2 = x * x
     x4 = x2 * x2
-    for j in range(C_SLOW):
-        p[j] = ((c[0, j] + c[1, j] * x) + (c[2, j] + c[3, j] * x) * x2) + (
-            (c[4, j] + c[5, j] * x) + (c[6, j] + c[7, j] * x) * x2
-        ) * x4
+    for j in range(0, C_SLOW, N_LANES):
+        k = 8 * C_SLOW * i + j
+        low = _cubic(book.slow, k, C_SLOW, x, x2)
+        high = _cubic(book.slow, k + 4 * C_SLOW, C_SLOW, x, x2)
+        put_lanes(out.slow, j, low + high * x4)
     if belt:
         _find_quartic(book.when[BELT_GRID], book.belt, t, out.belt, C_BELT)
 

@@ -226,26 +226,26 @@ def zonal(c2: float, c3: float, c4: float, pole: Array, t: float, r: Array, out:
     """
     d = np.sqrt(r[0] * r[0] + r[1] * r[1] + r[2] * r[2])
     px, py, pz = pole[0] + t * pole[3], pole[1] + t * pole[4], pole[2] + t * pole[5]
-    radial, along = zonal_factors(c2, c3, c4, d, (r[0] * px + r[1] * py + r[2] * pz) / d)
+    radial, along = zonal_factors(c2, c3, c4, 1.0 / d, (r[0] * px + r[1] * py + r[2] * pz) / d)
     out[0] += radial * r[0] + along * px
     out[1] += radial * r[1] + along * py
     out[2] += radial * r[2] + along * pz
 
 
 @pasted_kernel
-def zonal_factors(c2: float, c3: float, c4: float, d: float, s: float) -> tuple[float, float]:
+def zonal_factors(c2: float, c3: float, c4: float, i: float, s: float) -> tuple[float, float]:
     """Factors (1/s2) of the position (m) and (m/s2) of the pole in the acceleration by J2, J3, J4.
 
-    ``d`` is the distance (m), ``s`` the sine of the latitude.
+    ``i`` is the inverse of the distance (1/m), ``s`` the sine of the latitude.
     """
     s2 = s * s
-    i2 = 1.0 / (d * d)
+    i4 = (i * i) * (i * i)
     p2 = 3.0 * s
     p3 = 7.5 * s2 - 1.5
     p4 = s * (17.5 * s2 - 7.5)
     p5 = (39.375 * s2 - 26.25) * s2 + 1.875
-    radial = (c2 * p3 + (c3 * p4 + c4 * p5 / d) / d) * i2 * i2 / d
-    along = -(c2 * p2 + (c3 * p3 + c4 * p4 / d) / d) * i2 * i2
+    radial = (c2 * p3 + (c3 * p4 + c4 * p5 * i) * i) * (i4 * i)
+    along = -(c2 * p2 + (c3 * p3 + c4 * p4 * i) * i) * i4
     return radial, along
 
 

@@ -77,7 +77,7 @@ def add_oblateness_gradient(
             x[m] += h if side == 0 else -h
             b = np.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
             s = (x[0] * pole[0] + x[1] * pole[1] + x[2] * pole[2]) / b
-            radial, along = zonal_factors(w * c2, w * c3, w * c4, b, s)
+            radial, along = zonal_factors(w * c2, w * c3, w * c4, 1.0 / b, s)
             for j in range(3):
                 ends[side, j] = radial * x[j] + along * pole[j]
         for j in range(3):

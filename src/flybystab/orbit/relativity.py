@@ -46,6 +46,7 @@ def among(places: Array, gm: Array, body: int, out: Array) -> float:
 @pasted_kernel
 def of_source(
     gm: float,
+    inverse: float,
     x: float,
     y: float,
     z: float,
@@ -66,6 +67,8 @@ def of_source(
     ----------
     gm : float
         Of the source, m3/s2.
+    inverse : float
+        Of the distance, 1/m.
     x, y, z : float
         From the source, m.
     ux, uy, uz, ax, ay, az, potential : float
@@ -73,21 +76,21 @@ def of_source(
     vx, vy, vz : float
         Barycentric velocity, m/s.
     """
-    r2 = x * x + y * y + z * z
-    r = np.sqrt(r2)
-    c = gm / (r2 * r)
+    i2 = inverse * inverse
+    near = gm * inverse
+    c = near * i2
     ru = x * ux + y * uy + z * uz
     rv = x * vx + y * vy + z * vz
     s = c * (
         potential
         - 2.0 * (ux * ux + uy * uy + uz * uz)
         + 4.0 * (ux * vx + uy * vy + uz * vz)
-        + 1.5 * ru * ru / r2
+        + 1.5 * (ru * ru) * i2
         + 0.5 * (x * ax + y * ay + z * az)
     )
     b = c * (3.0 * ru - 4.0 * rv)
     d = -3.0 * c * ru
-    e = 3.5 * c * r2
+    e = 3.5 * near
     return (
         s * x + b * ux + d * vx + e * ax,
         s * y + b * uy + d * vy + e * ay,
@@ -127,11 +130,26 @@ def one_pn(
         if not IS_SOURCE[i] or used[i] == 0.0:
             continue
         dx, dy, dz = x[0] - places[i, 0], x[1] - places[i, 1], x[2] - places[i, 2]
-        if dx * dx + dy * dy + dz * dz < inner[i] ** 2:
+        r2 = dx * dx + dy * dy + dz * dz
+        if r2 < inner[i] ** 2:
             continue
         u = among(places, gm, i, a)
         bx, by, bz = of_source(
-            used[i], dx, dy, dz, rates[i, 0], rates[i, 1], rates[i, 2], a[0], a[1], a[2], u, v[0], v[1], v[2]
+            used[i],
+            1.0 / np.sqrt(r2),
+            dx,
+            dy,
+            dz,
+            rates[i, 0],
+            rates[i, 1],
+            rates[i, 2],
+            a[0],
+            a[1],
+            a[2],
+            u,
+            v[0],
+            v[1],
+            v[2],
         )
         total[0] += bx
         total[1] += by

@@ -15,6 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from flybystab.core.numerics.jit import pasted_kernel
+from flybystab.core.numerics.lanes import lane, lanes_at, spread
 from flybystab.typing import Array
 
 #: Stages of a step; the rate at its end is one more.
@@ -115,35 +116,27 @@ def stage_state(s: int, y: Array, h: float, k: Array, out: Array) -> None:
 
     ``y[6]`` is the state at the beginning, ``k[s, 3:6]`` the accelerations of the stages before.
     """
-    x0 = x1 = x2 = v0 = v1 = v2 = 0.0
+    # Lanes: k[s, 2] without meaning, then the acceleration.
+    x, v = spread(0.0), spread(0.0)
     for m in range(FROM[s], FROM[s + 1]):
-        a = IN_POSITION[m]
-        w = IN_VELOCITY[m]
-        i = STAGE[m]
-        x0 += a * k[i, 3]
-        x1 += a * k[i, 4]
-        x2 += a * k[i, 5]
-        v0 += w * k[i, 3]
-        v1 += w * k[i, 4]
-        v2 += w * k[i, 5]
+        a = lanes_at(k, 6 * STAGE[m] + 2)
+        x += a * IN_POSITION[m]
+        v += a * IN_VELOCITY[m]
     ch = NODE[s] * h
-    out[0] = y[0] + (ch * y[3] + h * (h * x0))
-    out[1] = y[1] + (ch * y[4] + h * (h * x1))
-    out[2] = y[2] + (ch * y[5] + h * (h * x2))
-    out[3] = y[3] + h * v0
-    out[4] = y[4] + h * v1
-    out[5] = y[5] + h * v2
+    for j in range(3):
+        out[j] = y[j] + (ch * y[3 + j] + h * (h * lane(x, j + 1)))
+        out[3 + j] = y[3 + j] + h * lane(v, j + 1)
 
 
 @pasted_kernel
 def step_error(h: float, k: Array, length: float, speed: float) -> float:
     """Estimated error of a step: root mean square of its six components in units of `length` (m) and `speed` (m/s)."""
-    total = 0.0
-    for j in range(3, 6):
-        x = 0.0
-        v = 0.0
-        for i in range(N_STAGES):
-            x += _E_POSITION[i] * k[i, j]
-            v += _E_SPEED[i] * k[i, j]
-        total += (h * h * x / length) ** 2 + (h * v / speed) ** 2
-    return np.sqrt(total / 6.0)
+    x, v = spread(0.0), spread(0.0)
+    for i in range(N_STAGES):
+        a = lanes_at(k, 6 * i + 2)
+        x += a * _E_POSITION[i]
+        v += a * _E_SPEED[i]
+    x *= h * h / length
+    v *= h / speed
+    squares = x * x + v * v
+    return np.sqrt((lane(squares, 1) + lane(squares, 2) + lane(squares, 3)) / 6.0)

@@ -1,7 +1,7 @@
 """Acceleration of an asteroid with the positions of the bodies from an almanac, for the search for encounters.
 
-The forces are those of :mod:`flybystab.orbit.forces`, from the same table, arranged so that the compiler vectorises
-the sums over bodies.
+The forces are those of :mod:`flybystab.orbit.forces`, from the same table, with sums over four
+bodies at a time (:mod:`flybystab.core.numerics.lanes`).
 """
 
 from __future__ import annotations
@@ -14,6 +14,16 @@ from numpy.typing import NDArray
 
 from flybystab.constants import C_LIGHT
 from flybystab.core.numerics.jit import borrowed, inlined, kernel, pasted_kernel
+from flybystab.core.numerics.lanes import (
+    N_LANES,
+    any_less,
+    inverse_root,
+    inverse_root_24,
+    lanes_at,
+    spread,
+    total,
+    zero_where_less,
+)
 from flybystab.orbit.almanac import (
     AT_SUN,
     C_BELT,
@@ -44,6 +54,8 @@ from flybystab.typing import Array
 _SUN = int(SLOT[SUN])
 #: Acceleration by zonal harmonics that is left out, m/s2: a displacement of 9 m in a century if its direction is fixed.
 _NEGLIGIBLE = 2e-18
+
+_PER_C2 = 1.0 / (C_LIGHT * C_LIGHT)
 
 #: Zonal harmonics of a body: grid (0 fast, 1 slow) and slot of its position, ``J2 GM a^2`` (m5/s2) and so on, pole at
 #: t = 0 and its rate (1/s), square of the radius of the smooth core (m2).
@@ -124,6 +136,8 @@ def field(window: Window, forces: Iterable[str]) -> Field:
         for b in np.flatnonzero(its.harmonics.any(axis=1))
     ]
     heavy = [BODIES.index(name) for name in HEAVY]
+    gm_heavy, inner_heavy = np.zeros(N_HEAVY), np.zeros(N_HEAVY)
+    gm_heavy[: len(heavy)], inner_heavy[: len(heavy)] = used[heavy], inner2[heavy]
     return Field(
         book=almanac(window, bool(belt.any())),
         gm_fast=grids[0],
@@ -134,8 +148,8 @@ def field(window: Window, forces: Iterable[str]) -> Field:
         inner_belt=np.zeros(N_BELT),
         zonal=np.array(zonal, dtype=ZONAL),
         gm_pn=float(window.gm[SUN]) if its.relativity else 0.0,
-        gm_heavy=used[heavy],
-        inner_heavy=inner2[heavy],
+        gm_heavy=gm_heavy,
+        inner_heavy=inner_heavy,
         head=window.head,
         data=window.data,
         gm=window.gm,
@@ -179,29 +193,44 @@ def borrowed_field(f: Field) -> Field:
 @pasted_kernel
 def _pull(
     p: Array, slots: int, gm: Array, inner: Array, x: float, y: float, z: float
-) -> tuple[float, float, float, float, int]:
-    """Newtonian acceleration by the bodies of one grid (m/s2), potential (m2/s2), number of bodies left out.
+) -> tuple[Any, Any, Any, Any, bool]:
+    """Newtonian acceleration by the bodies of one grid (m/s2), potential (m2/s2), whether bodies were left out.
 
-    Bodies with the asteroid inside their smooth core are left out of both sums.
+    Sums over every fourth slot. Bodies with the asteroid inside their smooth core are left out.
     """
-    ax = 0.0
-    ay = 0.0
-    az = 0.0
-    potential = 0.0
-    inside = 0
-    for i in range(slots):
-        dx = p[i] - x
-        dy = p[slots + i] - y
-        dz = p[slots + slots + i] - z
+    ax, ay, az, potential = spread(0.0), spread(0.0), spread(0.0), spread(0.0)
+    inside = False
+    for i in range(0, slots, N_LANES):
+        dx = lanes_at(p, i) - x
+        dy = lanes_at(p, slots + i) - y
+        dz = lanes_at(p, slots + slots + i) - z
         r2 = dx * dx + dy * dy + dz * dz
-        near = r2 < inner[i]
-        inside += near
-        c = (0.0 if near else gm[i]) / (r2 * np.sqrt(r2))
+        core2 = lanes_at(inner, i)
+        inside |= any_less(r2, core2)
+        inverse = inverse_root(r2)
+        u = zero_where_less(lanes_at(gm, i), r2, core2) * inverse
+        c = u * (inverse * inverse)
         ax += c * dx
         ay += c * dy
         az += c * dz
-        potential += c * r2
+        potential += u
     return ax, ay, az, potential, inside
+
+
+@pasted_kernel
+def _pull_of_asteroids(p: Array, gm: Array, x: float, y: float, z: float) -> tuple[Any, Any, Any]:
+    """Newtonian acceleration by the massive asteroids (m/s2) to 24 bits, which is 1e-16 of that by the Sun."""
+    ax, ay, az = spread(0.0), spread(0.0), spread(0.0)
+    for i in range(0, N_BELT, N_LANES):
+        dx = lanes_at(p, i) - x
+        dy = lanes_at(p, N_BELT + i) - y
+        dz = lanes_at(p, 2 * N_BELT + i) - z
+        inverse = inverse_root_24(dx * dx + dy * dy + dz * dz)
+        c = (lanes_at(gm, i) * inverse) * (inverse * inverse)
+        ax += c * dx
+        ay += c * dy
+        az += c * dz
+    return ax, ay, az
 
 
 @kernel
@@ -249,15 +278,15 @@ def _oblate_pull(
         r2 = dx * dx + dy * dy + dz * dz
         if 3.0 * abs(body.j2) < _NEGLIGIBLE * r2 * r2:
             continue
-        d = np.sqrt(r2)
+        inverse = 1.0 / np.sqrt(r2)
         px, py, pz = (
             body.pole_x + t * body.rate_x,
             body.pole_y + t * body.rate_y,
             body.pole_z + t * body.rate_z,
         )
-        sine = (dx * px + dy * py + dz * pz) / d
+        sine = (dx * px + dy * py + dz * pz) * inverse
         w = 1.0 if r2 > body.inner2 else fade(r2 / body.inner2)
-        radial, along = zonal_factors(w * body.j2, w * body.j3, w * body.j4, d, sine)
+        radial, along = zonal_factors(w * body.j2, w * body.j3, w * body.j4, inverse, sine)
         ax += radial * dx + along * px
         ay += radial * dy + along * py
         az += radial * dz + along * pz
@@ -280,11 +309,13 @@ def _relativistic_sources(
     ``places.heavy`` must have been computed for this time.
     """
     fast, slow, q = places.fast, places.slow, places.heavy
+    dx, dy, dz = px - slow[_SUN], py - slow[N_SLOW + _SUN], pz - slow[2 * N_SLOW + _SUN]
     ex, ey, ez = of_source(
         field.gm_pn,
-        px - slow[_SUN],
-        py - slow[N_SLOW + _SUN],
-        pz - slow[2 * N_SLOW + _SUN],
+        1.0 / np.sqrt(dx * dx + dy * dy + dz * dz),
+        dx,
+        dy,
+        dz,
         fast[SUN_VELOCITY],
         fast[SUN_VELOCITY + 1],
         fast[SUN_VELOCITY + 2],
@@ -296,28 +327,73 @@ def _relativistic_sources(
         vy,
         vz,
     )
-    for i in range(N_HEAVY):
-        dx, dy, dz = px - q[i], py - q[N_HEAVY + i], pz - q[2 * N_HEAVY + i]
+    for i in range(0, N_HEAVY, N_LANES):
+        x = px - lanes_at(q, i)
+        y = py - lanes_at(q, N_HEAVY + i)
+        z = pz - lanes_at(q, 2 * N_HEAVY + i)
+        r2 = x * x + y * y + z * z
         bx, by, bz = of_source(
-            0.0 if dx * dx + dy * dy + dz * dz < field.inner_heavy[i] else field.gm_heavy[i],
-            dx,
-            dy,
-            dz,
-            q[3 * N_HEAVY + i],
-            q[4 * N_HEAVY + i],
-            q[5 * N_HEAVY + i],
-            q[6 * N_HEAVY + i],
-            q[7 * N_HEAVY + i],
-            q[8 * N_HEAVY + i],
-            q[9 * N_HEAVY + i],
+            zero_where_less(lanes_at(field.gm_heavy, i), r2, lanes_at(field.inner_heavy, i)),
+            inverse_root(r2),
+            x,
+            y,
+            z,
+            lanes_at(q, 3 * N_HEAVY + i),
+            lanes_at(q, 4 * N_HEAVY + i),
+            lanes_at(q, 5 * N_HEAVY + i),
+            lanes_at(q, 6 * N_HEAVY + i),
+            lanes_at(q, 7 * N_HEAVY + i),
+            lanes_at(q, 8 * N_HEAVY + i),
+            lanes_at(q, 9 * N_HEAVY + i),
             vx,
             vy,
             vz,
         )
-        ex += bx
-        ey += by
-        ez += bz
+        ex += total(bx)
+        ey += total(by)
+        ez += total(bz)
     return ex, ey, ez
+
+
+@pasted_kernel
+def find_all_places(field: Field, t: float, places: Places) -> None:
+    """Write the positions of all bodies at ``t`` (s) and, with 1PN, the quantities of its sources into ``places``."""
+    find_places(field.book, t, has_belt(field.book), places)
+    if field.gm_pn != 0.0:
+        find_heavy(field.book, t, places)
+
+
+@pasted_kernel
+def rate_among(
+    field: Field, law: NonGravitationalParameters, t: float, y: Array, places: Places, out: Array
+) -> None:
+    """As `rate`, with the positions in ``places`` computed before."""
+    fast, slow = places.fast, places.slow
+    px, py, pz, vx, vy, vz = y[0], y[1], y[2], y[3], y[4], y[5]
+    nx, ny, nz, near, inside = _pull(fast, N_FAST, field.gm_fast, field.inner_fast, px, py, pz)
+    mx, my, mz, far, inside_slow = _pull(slow, N_SLOW, field.gm_slow, field.inner_slow, px, py, pz)
+    potential = total(near + far)
+    gx, gy, gz = total(nx + mx), total(ny + my), total(nz + mz)
+    ax, ay, az = gx, gy, gz
+    if has_belt(field.book):
+        bx, by, bz = _pull_of_asteroids(places.belt, field.gm_belt, px, py, pz)
+        ax += total(bx)
+        ay += total(by)
+        az += total(bz)
+    ax, ay, az = _oblate_pull(field, t, places, px, py, pz, ax, ay, az)
+    if field.gm_pn != 0.0:
+        ex, ey, ez = _relativistic_sources(field, places, px, py, pz, vx, vy, vz)
+        a = vx * vx + vy * vy + vz * vz - 4.0 * potential
+        b = -4.0 * (gx * vx + gy * vy + gz * vz)
+        ax += (a * gx + b * vx + ex) * _PER_C2
+        ay += (a * gy + b * vy + ey) * _PER_C2
+        az += (a * gz + b * vz + ez) * _PER_C2
+    out[0], out[1], out[2], out[3], out[4], out[5] = vx, vy, vz, ax, ay, az
+    if inside or inside_slow:
+        _pull_inside(fast, N_FAST, field.gm_fast, field.inner_fast, y, out)
+        _pull_inside(slow, N_SLOW, field.gm_slow, field.inner_slow, y, out)
+    if acts(law):
+        _add_nongravitational(law, y, places, out)
 
 
 @pasted_kernel
@@ -328,37 +404,8 @@ def rate(
 
     ``law`` is :data:`flybystab.orbit.nongravitational.NONE` without non-gravitational acceleration.
     """
-    belt = has_belt(field.book)
-    find_places(field.book, t, belt, places)
-    fast, slow = places.fast, places.slow
-    px, py, pz, vx, vy, vz = y[0], y[1], y[2], y[3], y[4], y[5]
-    ax, ay, az, potential, n = _pull(fast, N_FAST, field.gm_fast, field.inner_fast, px, py, pz)
-    bx, by, bz, other, m = _pull(slow, N_SLOW, field.gm_slow, field.inner_slow, px, py, pz)
-    ax += bx
-    ay += by
-    az += bz
-    potential += other
-    gx, gy, gz = ax, ay, az
-    if belt:
-        bx, by, bz, _, _ = _pull(places.belt, N_BELT, field.gm_belt, field.inner_belt, px, py, pz)
-        ax += bx
-        ay += by
-        az += bz
-    ax, ay, az = _oblate_pull(field, t, places, px, py, pz, ax, ay, az)
-    if field.gm_pn != 0.0:
-        find_heavy(field.book, t, places)
-        ex, ey, ez = _relativistic_sources(field, places, px, py, pz, vx, vy, vz)
-        a = vx * vx + vy * vy + vz * vz - 4.0 * potential
-        b = -4.0 * (gx * vx + gy * vy + gz * vz)
-        ax += (a * gx + b * vx + ex) / (C_LIGHT * C_LIGHT)
-        ay += (a * gy + b * vy + ey) / (C_LIGHT * C_LIGHT)
-        az += (a * gz + b * vz + ez) / (C_LIGHT * C_LIGHT)
-    out[0], out[1], out[2], out[3], out[4], out[5] = vx, vy, vz, ax, ay, az
-    if n + m > 0:
-        _pull_inside(fast, N_FAST, field.gm_fast, field.inner_fast, y, out)
-        _pull_inside(slow, N_SLOW, field.gm_slow, field.inner_slow, y, out)
-    if acts(law):
-        _add_nongravitational(law, y, places, out)
+    find_all_places(field, t, places)
+    rate_among(field, law, t, y, places, out)
 
 
 @kernel
@@ -369,4 +416,15 @@ def first_rate(
     rate(field, law, t, y, places, out)
 
 
-__all__ = ["ZONAL", "Field", "borrowed_field", "empty_places", "field", "first_rate", "heliocentric", "rate"]
+__all__ = [
+    "ZONAL",
+    "Field",
+    "borrowed_field",
+    "empty_places",
+    "field",
+    "find_all_places",
+    "first_rate",
+    "heliocentric",
+    "rate",
+    "rate_among",
+]

@@ -11,7 +11,14 @@ from flybystab.core.numerics.jit import borrowed, kernel, pasted_kernel, summing
 from flybystab.core.numerics.rkn12 import ERROR_ORDER, N_STAGES, NODE, stage_state, step_error
 from flybystab.orbit.almanac import Places
 from flybystab.orbit.nongravitational import NonGravitationalParameters
-from flybystab.orbit.search.acceleration import Field, borrowed_field, borrowed_places, empty_places, rate
+from flybystab.orbit.search.acceleration import (
+    Field,
+    borrowed_field,
+    borrowed_places,
+    empty_places,
+    find_all_places,
+    rate_among,
+)
 from flybystab.typing import Array
 
 #: Units of position (m) and velocity (m/s) of the tolerance.
@@ -81,7 +88,9 @@ def step(
     y, k, new = borrowed(y), borrowed(k), borrowed(new)
     for s in range(1, N_STAGES + 1):
         stage_state(s, y, h, k, new)
-        rate(field, law, t + NODE[s] * h, new, places, k[s])
+        if NODE[s] != NODE[s - 1]:  # the last three stages are at the end
+            find_all_places(field, t + NODE[s] * h, places)
+        rate_among(field, law, t + NODE[s] * h, new, places, k[s])
     return step_error(h, k, _LENGTH, _SPEED)
 
 
