@@ -315,7 +315,7 @@ def test_one_pn_of_a_moving_sun_is_that_of_one_at_rest_seen_from_a_moving_frame(
         d = np.linalg.norm(r)
         g = -gm * r / d**3
         truth = (x2 * t1 - x1 * t2) / t1**3 - g
-        mine = np.array(of_source(gm, *r, *u_sun, 0.0, 0.0, 0.0, 0.0, *v))
+        mine = np.array(of_source(gm, 1.0 / d, *r, *u_sun, 0.0, 0.0, 0.0, 0.0, *v))
         mine = (mine + (v @ v - 4.0 * gm / d) * g - 4.0 * (g @ v) * v) / c**2
         assert np.linalg.norm(mine - truth) < 1e-5 * np.linalg.norm(truth)
 
