@@ -30,7 +30,7 @@ _SINGLES = ir.VectorType(ir.FloatType(), N_LANES)
 _FLAGS = ("reassoc", "contract", "nsz")
 
 
-class LanesType(types.Type):  # type: ignore[misc]
+class LanesType(types.Type):
     """Four floats."""
 
     def __init__(self) -> None:
@@ -41,7 +41,7 @@ _lanes = LanesType()
 
 
 @register_model(LanesType)
-class _LanesModel(models.PrimitiveModel):  # type: ignore[misc]
+class _LanesModel(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:
         super().__init__(manager, kind, _DOUBLES)
 
@@ -57,7 +57,7 @@ def _broadcast(builder: Any, value: Any) -> Any:
 def _define(operations: tuple[Any, ...], instruction: str) -> None:
     """Typing and code of an operator, for two values or a value and a float."""
 
-    class Operation(AbstractTemplate):  # type: ignore[misc]
+    class Operation(AbstractTemplate):
         def generic(self, args: Any, kws: Any) -> Any:
             if (
                 len(args) == 2
