@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 import rebound
-from llvmlite import ir  # type: ignore[import-untyped]
+from llvmlite import ir
 from numba import carray, types
 from numba.core import cgutils
 from numba.core.base import BaseContext
