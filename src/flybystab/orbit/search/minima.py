@@ -62,14 +62,17 @@ FARTHEST = np.array([1.3 * PLANETS[name].orbit_radius if name != "sun" else np.i
 
 
 @kernel
-def chord_distance(a: Array, pa: Array, b: Array, pb: Array) -> float:
-    """Distance (m) of the origin from the chord of the relative path between two ends of a step."""
+def chord_distance(a: Array, old: Array, b: Array, new: Array, body: int) -> float:
+    """Distance (m) of a body from the chord of the path relative to it in a step from ``a[:3]`` to ``b[:3]``.
+
+    ``old[body]`` and ``new[body]`` are its positions at the ends of the step, m.
+    """
     rr = 0.0
     rd = 0.0
     dd = 0.0
     for j in range(3):
-        r = a[j] - pa[j]
-        d = b[j] - pb[j] - r
+        r = a[j] - old[body, j]
+        d = b[j] - new[body, j] - r
         rr += r * r
         rd += r * d
         dd += d * d

@@ -9,7 +9,8 @@ import numpy as np
 from flybystab.constants import DAY
 from flybystab.core.numerics.jit import borrowed, kernel, pasted_kernel, summing_kernel
 from flybystab.core.numerics.rkn12 import ERROR_ORDER, N_STAGES, NODE, stage_state, step_error
-from flybystab.orbit.almanac import Places
+from flybystab.orbit.almanac import N_SLOW, SLOT, Places
+from flybystab.orbit.ephemeris import SUN
 from flybystab.orbit.nongravitational import NonGravitationalParameters
 from flybystab.orbit.search.acceleration import (
     Field,
@@ -27,6 +28,7 @@ _LENGTH, _SPEED = 1.5e11, 3.0e4
 LONGEST, SHORTEST = 100.0 * DAY, 1e-5
 #: Of the step size that would meet the tolerance, this fraction is used; limits of its change.
 _SAFETY, _LEAST, _MOST = 0.88, 0.1, 5.0
+_SUN = int(SLOT[SUN])
 _POWER = -1.0 / ERROR_ORDER
 #: In place of an estimated error of zero, over the tolerance.
 _TINY = 1e-30
@@ -39,9 +41,8 @@ class Room(NamedTuple):
     ----------
     k : ndarray, shape (18, 6)
         Velocity (m/s) and acceleration (m/s2) at the stages of a step, and at its end.
-    last : ndarray, shape (2,)
-        Length (s; 0 before the first) of the last step whose length followed from its error, and that error over the
-        tolerance.
+    last : ndarray, shape (1,)
+        Mean of the step lengths that meet the tolerance, over ``r^(3/2)``, s/m^(3/2); 0 before the first step.
     places : Places
         Positions of the bodies.
     """
@@ -54,7 +55,7 @@ class Room(NamedTuple):
 @kernel
 def empty_room() -> Room:
     """Buffers for one integration."""
-    return Room(np.empty((N_STAGES + 1, 6)), np.zeros(2), empty_places())
+    return Room(np.empty((N_STAGES + 1, 6)), np.zeros(1), empty_places())
 
 
 @kernel
@@ -95,6 +96,20 @@ def step(
 
 
 @pasted_kernel
+def _middles(y: Array, new: Array, room: Room, length: float, ahead: float) -> tuple[float, float]:
+    """Distances from the Sun to the power 3/2 in the middle of the last step and of the next, of `ahead` s."""
+    k, sun = room.k, room.places.slow
+    here = 0.0
+    there = 0.0
+    for j in range(3):
+        x = sun[j * N_SLOW + _SUN]
+        bend = k[0, 3 + j] + k[N_STAGES, 3 + j]
+        here += (0.5 * (y[j] + new[j]) - 0.0625 * length * length * bend - x) ** 2
+        there += (new[j] + 0.5 * ahead * new[3 + j] + 0.125 * ahead * ahead * k[N_STAGES, 3 + j] - x) ** 2
+    return here**0.75, there**0.75
+
+
+@pasted_kernel
 def advance(
     field: Field,
     law: NonGravitationalParameters,
@@ -108,9 +123,11 @@ def advance(
 ) -> tuple[float, float]:
     """One step of at most ``|h|`` s toward ``stop``, shortened until its error is below ``tolerance``.
 
-    The next step length is the smaller of two: that for which the error of this step would meet the tolerance, and
-    that which continues the change from the last step to this one (Gustafsson 1994, ACM Trans. Math. Softw. 20, 496).
-    On the way to periapsis the second avoids rejected steps.
+    The error of a step determines the length at which it would meet the tolerance. In units of ``r^(3/2)``, with the
+    distance from the Sun in the middle of a step, this length changes little along an eccentric orbit. The next step
+    has this length in the same units, or the geometric mean of it and its earlier means, whichever is smaller: the
+    estimated error sometimes nearly vanishes. With r predicted for the middle of the next step, few steps are rejected
+    on the way to perihelion.
 
     Writes as :func:`step`.
 
@@ -130,13 +147,13 @@ def advance(
         if not error <= 1.0:
             h = abs(length) * (max(_SAFETY * error**_POWER, _LEAST) if error < np.inf else _LEAST)
             continue
-        error = max(error, _TINY)
-        scale = _SAFETY * error**_POWER
+        scale = _SAFETY * max(error, _TINY) ** _POWER
         if not to_stop or scale < 1.0:
-            size, before = abs(length), room.last[0]
-            if before > 0.0:
-                scale = min(scale, scale * size / before * (room.last[1] / error) ** -_POWER)
-            room.last[0], room.last[1] = size, error
-            h = size * min(max(scale, _LEAST), _MOST)
+            ahead = sign * min(abs(length) * min(max(scale, _LEAST), _MOST), LONGEST)
+            here, there = _middles(y, new, room, length, ahead)
+            now = scale * abs(length) / here
+            mean = np.sqrt(now * room.last[0]) if room.last[0] > 0.0 else now
+            room.last[0] = mean
+            h = min(max(min(now, mean) * there, _LEAST * abs(length)), _MOST * abs(length))
         return stop if to_stop else t + length, min(h, LONGEST)
     return np.nan, h

@@ -56,9 +56,12 @@ class Reach(NamedTuple):
 
 
 @kernel
-def _is_inside(y: Array, place: Array, floor: float) -> bool:
-    """True if the distance of ``y[:3]`` from ``place[3]`` is below `floor`, m."""
-    return (y[0] - place[0]) ** 2 + (y[1] - place[1]) ** 2 + (y[2] - place[2]) ** 2 < floor**2
+def _is_inside(y: Array, places: Array, body: int, floor: float) -> bool:
+    """True if the distance of ``y[:3]`` from ``places[body]`` is below `floor`, m."""
+    total = 0.0
+    for j in range(3):
+        total += (y[j] - places[body, j]) ** 2
+    return total < floor**2
 
 
 @inlined
@@ -140,7 +143,7 @@ def track_encounters(
     first_rate(field, law, t, y, places, k[0])
     gather(places, now)
     for body in range(N_BODIES):
-        if _is_inside(y, now[body], floors[body]):
+        if _is_inside(y, now, body, floors[body]):
             return n, INSIDE, float(body)
     count = 0
     while (t_end - t) * sign > 0.0:
@@ -156,17 +159,17 @@ def track_encounters(
         counts = (t - t_quiet) * sign >= 0.0
         bend = _write_ends(t, y, t_new, new, k, pair)
         bulge = 0.125 * (t_new - t) ** 2
-        from_sun = chord_distance(y, old[SUN], new, now[SUN]) - bulge * (bend + BENDING[SUN])
+        from_sun = chord_distance(y, old, new, now, SUN) - bulge * (bend + BENDING[SUN])
         for body in range(N_BODIES):
             limit = limits[body] if counts else 0.0
             largest = max(limit, floors[body])
             if from_sun > FARTHEST[body] + largest:
                 continue
-            if chord_distance(y, old[body], new, now[body]) > largest + bulge * (bend + BENDING[body]):
+            if chord_distance(y, old, new, now, body) > largest + bulge * (bend + BENDING[body]):
                 continue
             if n + FINE > out.shape[0]:
                 return n, FULL, t
-            if _is_inside(new, now[body], floors[body]):
+            if _is_inside(new, now, body, floors[body]):
                 body_state(field.head, field.data, field.gm, body, t, work)
                 for j in range(6):
                     away[j] = y[j] - work[j]

@@ -15,7 +15,7 @@ from __future__ import annotations
 import numpy as np
 
 from flybystab.constants import DAY
-from flybystab.core.numerics.jit import kernel
+from flybystab.core.numerics.jit import borrowed, kernel
 from flybystab.core.numerics.rkn12 import FROM, IN_POSITION, IN_VELOCITY, N_STAGES, NODE, STAGE, stage_state
 from flybystab.orbit.almanac import N_BELT, N_FAST, N_SLOW, Places, find_places, has_belt
 from flybystab.orbit.ephemeris import SUN
@@ -36,6 +36,7 @@ from flybystab.orbit.nongravitational import (
 from flybystab.orbit.search.acceleration import (
     Field,
     borrowed_field,
+    borrowed_places,
     empty_places,
     first_rate,
     heliocentric,
@@ -64,6 +65,8 @@ def gradient(
     By position and velocity (1/s2, 1/s) into ``a[3, 6]``; with `by_parameters` by A1, A2, A3, DT and AMRAT (SI) into
     ``by_law[N_PARAMETERS, 3]``, by DT only with `by_delay`. ``places`` is work space.
     """
+    field, places = borrowed_field(field), borrowed_places(places)
+    y, a, by_law = borrowed(y), borrowed(a), borrowed(by_law)
     belt = has_belt(field.book)
     find_places(field.book, t, belt, places)
     a[:] = 0.0
@@ -132,6 +135,13 @@ def vary(
     rates, now, places : ndarray (17, 3, m), ndarray (6, m), Places
         Work space; `rates` are second derivatives of the deviations of position.
     """
+    k, more, columns, rates, now = (
+        borrowed(k),
+        borrowed(more),
+        borrowed(columns),
+        borrowed(rates),
+        borrowed(now),
+    )
     a = np.empty((3, 6))
     by_law = np.zeros((N_PARAMETERS, 3))
     state = np.empty(6)
