@@ -34,8 +34,19 @@ def test_the_error_follows_the_tolerance(motion):
     """The position after 15 years, through the encounter of Apophis in 2029, which amplifies errors."""
     start, after = motion
     best = after(0.0, start, SPAN, 1e-14)
-    errors = [np.linalg.norm((after(0.0, start, SPAN, tol) - best)[:3]) for tol in (1e-8, 1e-10, 1e-12)]
-    assert errors[0] > 3.0 * errors[1] > 9.0 * errors[2]
+    # Errors of single runs scatter by a factor of a few, since those of the steps have either sign.
+    errors = [
+        np.exp(
+            np.mean(
+                [
+                    np.log(np.linalg.norm((after(0.0, start, SPAN, factor * tol) - best)[:3]))
+                    for factor in np.geomspace(0.5, 2.0, 9)
+                ]
+            )
+        )
+        for tol in (1e-8, 1e-10, 1e-12)
+    ]
+    assert errors[0] > 5.0 * errors[1] > 25.0 * errors[2]
     assert errors[2] < 1e5
 
 

@@ -27,7 +27,7 @@ _LENGTH, _SPEED = 1.5e11, 3.0e4
 #: Longest step, and the step below which the step size counts as collapsed, s.
 LONGEST, SHORTEST = 100.0 * DAY, 1e-5
 #: Of the step size that would meet the tolerance, this fraction is used; limits of its change.
-_SAFETY, _LEAST, _MOST = 0.88, 0.1, 5.0
+_SAFETY, _LEAST, _MOST = 0.86, 0.1, 5.0
 _SUN = int(SLOT[SUN])
 _POWER = -1.0 / ERROR_ORDER
 #: In place of an estimated error of zero, over the tolerance.
