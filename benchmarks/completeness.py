@@ -1,7 +1,7 @@
 """Search of the whole MPC catalogue compared with lists of CNEOS: recall and precision at 0.05 au, by decade.
 
 Usage: ``python benchmarks/completeness.py [FOUND.ecsv]``. The search (40,874 orbits, 1950 to 2050, 4.1 million
-object-years) takes some five minutes on two idle cores; its table is read from FOUND if that exists, otherwise written
+object-years) takes some two minutes on two idle cores; its table is read from FOUND if that exists, otherwise written
 there. ``python benchmarks/completeness.py stages`` measures on 1,000 orbits the gain and the losses of a cheaper first
 pass. The lists are read from ``../shared/data`` (or ``$FLYBYSTAB_SHARED/data``); nothing is downloaded.
 

@@ -71,6 +71,7 @@ TABLES = {
     "stability": "python benchmarks/stability.py",
     "stress": "python benchmarks/campaign.py stress",
     "versions": "python benchmarks/versions.py out/before",
+    "versions_lanes": "python benchmarks/versions.py search out/before_lanes",
     "versions_search": "python benchmarks/versions.py search out/before",
     "verdicts": "python benchmarks/campaign.py verdicts 20000",
     "throughput": "python benchmarks/screen.py throughput",
