@@ -60,7 +60,8 @@ def approach_errors(
     beside: Deviations,
     window: Window,
     chosen: Approach,
-    others: tuple[Approach | None, ...],
+    second: Approach | None,
+    full: Approach,
     t: float,
 ) -> ApproachErrors:
     """Errors of an approach.
@@ -68,22 +69,26 @@ def approach_errors(
     Parameters
     ----------
     chosen : Approach
-    others : tuple of Approach or None
-        The approaches with all forces and with a smaller tolerance; if one is None the numerical error is infinite.
+        By rebound.
+    second, full : Approach
+        By the integrator of the search: with the same forces, and with all. The numerical error is the difference of
+        the two integrators plus that by the forces left out; infinite if there is no `second`. The first difference
+        counts twice where forces are left out, since it is also the error of the second.
     t : float
         Closest approach, or first contact on an impact, s from the epoch of the window.
     """
-    gaps = [
-        (abs(chosen.distance - other.distance), abs(chosen.t - other.t)) if other else (np.inf, np.inf)
-        for other in others
-    ]
+    gap, lag = np.inf, np.inf
+    if second is not None:
+        times = 1.0 if second is full else 2.0
+        gap = times * abs(chosen.distance - second.distance) + abs(second.distance - full.distance)
+        lag = times * abs(chosen.t - second.t) + abs(second.t - full.t)
     found = errors_at(orbit, beside, window, chosen.forces, t)
     model_error = float(found.model_error[0])
     # After an earlier encounter, which amplifies it, the error of the force model is included.
     common = model_error if found.passed[0] else 0.0
     return ApproachErrors(
-        distance=sum(gap[0] for gap in gaps) + common,
-        time=sum(gap[1] for gap in gaps) + common / float(np.linalg.norm(chosen.state[3:])),
+        distance=gap + common,
+        time=lag + common / float(np.linalg.norm(chosen.state[3:])),
         model=model_error,
         displacement=float(found.displacement[0]),
         growth=float(found.growth[0]),

@@ -74,8 +74,9 @@ class Encounter(EncounterPath):
         Tidal tensor in `frame` against s from closest approach, from `t_start` to 100 h after `t_stop`.
         On an impact the tide and the track end at the impact, whose time is `t_stop`.
     distance_error, time_error : Quantity or None
-        For a real orbit: change of distance and time of closest approach with a tolerance of the integration 100
-        times smaller, plus their change with all known forces; infinite if there is then no encounter.
+        For a real orbit: difference of distance and time of closest approach from those by a second integrator
+        (:mod:`flybystab.orbit.search.flight`), plus their change with all known forces; infinite if there is then no
+        encounter.
         After an earlier encounter the error of the force model is included
         (:attr:`flybystab.orbit.search.neighbours.Spread.model_error`). The uncertainty of the orbit is not.
     ephemeris : str or None

@@ -17,6 +17,8 @@ from flybystab.encounter.encounter_arguments import start_beyond
 from flybystab.encounter.integrated_approach import (
     Approach,
     approach_near,
+    by_rebound,
+    by_search,
     check_no_impact_before,
     ends_of_encounter,
     first_contact_of,
@@ -33,7 +35,7 @@ from flybystab.orbit.default_forces import without_itself
 from flybystab.orbit.ephemeris import BODIES, Ephemeris, Window
 from flybystab.orbit.epochs import later, seconds
 from flybystab.orbit.forces import FORCES, model, shares
-from flybystab.orbit.ias15 import EPSILON, TIGHT, Flight
+from flybystab.orbit.ias15 import Flight
 from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.orbit_arguments import as_ephemeris
 from flybystab.orbit.planets import Planet
@@ -65,9 +67,10 @@ def followed(
     away = orbit.barycentric(window) - window.states(index, np.array([epoch]))[0]
     if np.linalg.norm(away[:3]) < body.impact_distance:
         raise starts_inside(orbit.name, orbit.epoch, body)
-    acting = (n for n in FORCES if n != "non-gravitational" or orbit.nongrav.active)
-    everything = without_itself(acting, orbit, window)
-    first = approach_near(orbit, window, index, forces or everything, reach, EPSILON)
+    known = (n for n in FORCES if n != "non-gravitational" or orbit.nongrav.active)
+    everything = without_itself(known, orbit, window)
+    acting = forces or everything
+    first = approach_near(orbit, window, index, acting, reach, by_search(orbit, window, acting, reach))
     if first is not None:
         check_no_impact_before(orbit, body, window, first, epoch)
     beside = deviations_of(orbit, ephemeris)
@@ -77,21 +80,24 @@ def followed(
         )
         raise NoEncounter(
             f"no encounter with {body.name} within {largest / AU:.4f} au and {reach / DAY:g} d of "
-            f"{near.iso} TDB: {closest}{horizon(orbit, beside, window, forces or everything, largest)}"
+            f"{near.iso} TDB: {closest}{horizon(orbit, beside, window, acting, largest)}"
         )
     size = shares(window, *path_between(first.log, epoch, first.t), orbit.nongrav)
     if forces is None:
         forces = tuple(n for n in everything if size[n] >= accuracy)
-    chosen = approach_near(orbit, window, index, forces, reach, EPSILON)
+    chosen = approach_near(orbit, window, index, forces, reach, by_rebound(orbit, window, forces))
     if chosen is None:
         raise NoEncounter(
             f"the closest approach to {body.name} vanishes with the forces {', '.join(forces)}"
             + horizon(orbit, beside, window, everything, largest)
         )
-    tight = approach_near(orbit, window, index, forces, reach, TIGHT)
+    # The same forces by the integrator of the search: their difference is the error of the integration.
+    second: Approach | None = first
+    if set(forces) != set(acting):
+        second = approach_near(orbit, window, index, forces, reach, by_search(orbit, window, forces, reach))
     contact = first_contact_of(chosen, window, index, body)
     when = chosen.t if contact is None else contact[0]
-    errors = approach_errors(orbit, beside, window, chosen, (first, tight), when)
+    errors = approach_errors(orbit, beside, window, chosen, second, first, when)
     return _around(cls, orbit, body, window, chosen, contact, accuracy, start, wait, size, errors)
 
 

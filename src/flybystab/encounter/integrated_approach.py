@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 
@@ -17,14 +18,19 @@ from flybystab.orbit.closest_approach import (
     nearest_minimum,
     periapsis_time,
     relative,
+    steps_into,
 )
 from flybystab.orbit.ephemeris import BODIES, Window
 from flybystab.orbit.epochs import later, seconds
 from flybystab.orbit.forces import model
-from flybystab.orbit.ias15 import Flight
+from flybystab.orbit.ias15 import EPSILON, Flight
 from flybystab.orbit.kepler import time_at_distance
+from flybystab.orbit.nongravitational import NONE
 from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.planets import Planet
+from flybystab.orbit.search.acceleration import field
+from flybystab.orbit.search.flight import SearchFlight
+from flybystab.orbit.search.search_setup import LEAST_TOLERANCE
 from flybystab.typing import Array
 
 #: Crossings of the surface within this time of a closest approach belong to it, s.
@@ -57,17 +63,45 @@ class Approach:
         return float(np.linalg.norm(self.state[:3]))
 
 
+class Motion(Protocol):
+    """An integration in progress: :class:`Flight` or :class:`SearchFlight`."""
+
+    def to(self, t: float) -> Array:
+        """State (m, m/s) at `t` s."""
+
+    def log_to(self, t: float) -> Array:
+        """All steps to `t` s."""
+
+
+#: Starts an integration at a time (s) with a barycentric state (m, m/s).
+Integrator = Callable[[float, Array], Motion]
+
+
+def by_rebound(orbit: Orbit, window: Window, forces: tuple[str, ...]) -> Integrator:
+    """Integration by rebound with the ephemeris itself."""
+    flat = model(window, forces, orbit.nongrav)
+    return lambda t, state: Flight(flat, t, state, EPSILON)
+
+
+def by_search(orbit: Orbit, window: Window, forces: tuple[str, ...], reach: float) -> Integrator:
+    """Integration as in the search for encounters; for minima of distance within `reach` s of the window's epoch."""
+    acting = field(window, [name for name in forces if name != "non-gravitational"])
+    pushed = "non-gravitational" in forces and orbit.nongrav.active
+    law = orbit.nongrav.parameters if pushed else NONE
+    return lambda t, state: SearchFlight(acting, law, t, state, LEAST_TOLERANCE, (-reach, reach))
+
+
 def approach_near(
-    orbit: Orbit, window: Window, index: int, forces: tuple[str, ...], reach: float, epsilon: float
+    orbit: Orbit, window: Window, index: int, forces: tuple[str, ...], reach: float, fly: Integrator
 ) -> Approach | None:
     """The minimum of distance within ``reach`` s of the epoch of the window and nearest to it, or None."""
-    start = seconds(orbit.epoch, window.epoch)
+    start, state = seconds(orbit.epoch, window.epoch), orbit.barycentric(window)
     # Both directions start at the epoch of the orbit, which avoids the error of integrating back and forth.
     parts: list[Array] = []
     for direction in (-1.0, 1.0):
         if (direction * reach - start) * direction <= 0.0:
             continue
-        flight = orbit.flight(window, forces, epsilon)
+        flight = fly(start, state)
         # If the epoch is outside of the interval, the log has a row at the edge of the interval.
         stops = [s for s in (-direction * reach, direction * reach) if (s - start) * direction > 0.0]
         part = np.concatenate([flight.log_to(s)[(i > 0) :] for i, s in enumerate(stops)])
@@ -79,7 +113,7 @@ def approach_near(
         return None
     t, _, step = hit
     step += low
-    again = Flight(model(window, forces, orbit.nongrav), log[step, TIME], log[step, STATE], epsilon)
+    again = fly(log[step, TIME], log[step, STATE])
     t, state = periapsis_time(relative_to(again, window, index), t)
     return Approach(t, state, log, forces)
 
@@ -97,7 +131,7 @@ def path_between(log: Array, start: float, stop: float) -> tuple[Array, Array]:
     return (t, states) if start <= stop else (t[::-1], states[::-1])
 
 
-def relative_to(flight: Flight, window: Window, index: int, zero: float = 0.0) -> Callable[[float], Array]:
+def relative_to(flight: Motion, window: Window, index: int, zero: float = 0.0) -> Callable[[float], Array]:
     """State of a flight relative to a body as a function of the time, s from `zero`."""
 
     def state_at(t: float) -> Array:
@@ -125,7 +159,11 @@ def check_no_impact_before(
 ) -> None:
     """Raise NoEncounter if the asteroid hits the planet between its epoch and a closest approach."""
     index = BODIES.index(body.name)
-    found, _ = crossings(approach.log, window.head, window.data, window.gm, index, body.impact_distance, 8)
+    tables, log = (window.head, window.data, window.gm, index), approach.log
+    near = [log[k : k + 2] for k in steps_into(log, *tables, body.impact_distance)]
+    found = np.concatenate(
+        [np.empty((0, 3)), *(crossings(pair, *tables, body.impact_distance, 8)[0] for pair in near)]
+    )
     low, high = sorted((epoch, approach.t))
     hits = found[(found[:, 0] > low) & (found[:, 0] < high) & (np.abs(found[:, 0] - approach.t) > _OWN), 0]
     if hits.size:
@@ -159,9 +197,14 @@ def state_in_log(log: Array, window: Window, index: int, t: float) -> Array:
 def ends_of_encounter(log: Array, window: Window, index: int, level: float, t: float) -> tuple[float, float]:
     """Last time before `t` and first after it at distance `level`, or at an apoapsis or an end of the log."""
     tables = (window.head, window.data, window.gm, index)
-    inside, _ = crossings(log, *tables, level, 8)
-    turning, _ = crossings(log, *tables, -1.0, 8)
-    before = [log[0, TIME]] + [f[0] for f in (*inside, *turning) if f[0] < t and f[2] < 0.0]
-    after = [log[-1, TIME]] + [f[0] for f in inside if f[0] > t and f[2] > 0.0]
-    after += [f[0] for f in turning if f[0] > t and f[2] < 0.0]
-    return float(max(before)), float(min(after))
+    middle, size = int(np.searchsorted(log[:, TIME], t)), 32
+    while True:
+        low, high = max(middle - size, 0), min(middle + size, len(log))
+        inside, _ = crossings(log[low:high], *tables, level, 8)
+        turning, _ = crossings(log[low:high], *tables, -1.0, 8)
+        before = [f[0] for f in (*inside, *turning) if f[0] < t and f[2] < 0.0]
+        after = [f[0] for f in inside if f[0] > t and f[2] > 0.0]
+        after += [f[0] for f in turning if f[0] > t and f[2] < 0.0]
+        if (before or low == 0) and (after or high == len(log)):
+            return float(max(before, default=log[0, TIME])), float(min(after, default=log[-1, TIME]))
+        size *= 8

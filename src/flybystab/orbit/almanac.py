@@ -14,12 +14,23 @@ from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
+from astropy.time import Time
 from numpy.polynomial import chebyshev
 
 from flybystab.constants import AU, DAY
 from flybystab.core.numerics.jit import pasted_kernel
 from flybystab.core.numerics.lanes import N_LANES, lanes_at, put_lanes
-from flybystab.orbit.ephemeris import BELT, BODIES, EARTH, MOON, N_BODIES, SUN, Window
+from flybystab.orbit.ephemeris import (
+    BELT,
+    BODIES,
+    EARTH,
+    MOON,
+    N_BODIES,
+    SUN,
+    Ephemeris,
+    Window,
+    from_j2000,
+)
 from flybystab.orbit.planets import PLANETS
 from flybystab.typing import Array
 
@@ -42,6 +53,10 @@ SUN_VELOCITY, AT_SUN = 3 * N_FAST, 10 * N_HEAVY
 _FAST, _SLOW, BELT_GRID, _HEAVY = range(4)
 _START, _PER_SECOND, PIECES = range(3)
 _NOWHERE = 1e15
+#: The polynomials are computed in blocks of this length (s) from the start of the file, a multiple of all intervals.
+#: The last blocks are cached, so that windows that overlap share them: those of all grids over 130 years take 33 MB.
+_BLOCK = 1024.0 * DAY
+_BLOCKS = 192
 
 
 class Almanac(NamedTuple):
@@ -78,38 +93,68 @@ class Places(NamedTuple):
     heavy: Array
 
 
+class _Grid(NamedTuple):
+    """A grid: row of the ephemeris with its origin, interval (s), degree, bodies, slots, columns."""
+
+    row: int
+    length: float
+    degree: int
+    names: tuple[str, ...]
+    slots: int
+    columns: int
+
+
+_GRIDS = (
+    _Grid(MOON, 4.0 * DAY, 12, FAST, N_FAST, C_FAST),
+    _Grid(SUN, 16.0 * DAY, 7, SLOW, N_SLOW, C_SLOW),
+    _Grid(SUN, 32.0 * DAY, 4, BELT, N_BELT, C_BELT),
+    _Grid(SUN, 16.0 * DAY, 4, HEAVY, N_HEAVY, C_HEAVY),
+)
+
+
 @lru_cache(maxsize=4)
 def almanac(window: Window, belt: bool) -> Almanac:
     """The almanac of a window, with or without the massive asteroids; the last results are cached."""
-    grids = [
-        _grid(window, MOON, 4.0 * DAY, 12, FAST, N_FAST, C_FAST),
-        _grid(window, SUN, 16.0 * DAY, 7, SLOW, N_SLOW, C_SLOW),
-        _grid(window, SUN, 32.0 * DAY, 4, BELT if belt else (), N_BELT, C_BELT),
-        _grid(window, SUN, 16.0 * DAY, 4, HEAVY, N_HEAVY, C_HEAVY),
-    ]
+    grids = [_of_window(window, number, belt or number != BELT_GRID) for number in range(len(_GRIDS))]
     return Almanac(np.array([g[0] for g in grids]), *(g[1] for g in grids))
 
 
-def _grid(
-    window: Window, row: int, length: float, degree: int, names: tuple[str, ...], slots: int, columns: int
-) -> tuple[tuple[float, float, float], Array]:
-    """Start, pieces per second and pieces of one grid, aligned with a row of the window, and its polynomials."""
-    origin = window.head[row, 3]
-    first = int(np.floor((window.start - origin) / length))
-    count = max(int(np.ceil((window.stop - origin) / length)) - first, 1)
-    start = origin + first * length
-    if not names:
-        return (start, 1.0 / length, 0.0), np.zeros((0, degree + 1, columns))
+def _of_window(window: Window, number: int, used: bool) -> tuple[tuple[float, float, float], Array]:
+    """Start (s), pieces per second and number of pieces of a grid, and its polynomials (none if not `used`)."""
+    grid = _GRIDS[number]
+    origin = window.source.origin(grid.row) + from_j2000(window.epoch)
+    first = int(np.floor((window.start - origin) / grid.length))
+    last = max(int(np.ceil((window.stop - origin) / grid.length)), first + 1)
+    start = origin + first * grid.length
+    if not used:
+        return (start, 1.0 / grid.length, 0.0), np.zeros((0, grid.degree + 1, grid.columns))
+    size = round(_BLOCK / grid.length)
+    parts = [
+        _block(window.source, number, b)[max(first - b * size, 0) : last - b * size]
+        for b in range(first // size, (last - 1) // size + 1)
+    ]
+    return (start, 1.0 / grid.length, float(last - first)), np.concatenate(parts)
+
+
+@lru_cache(maxsize=_BLOCKS)
+def _block(source: Ephemeris, number: int, block: int) -> Array:
+    """The polynomials of one grid in one block of time."""
+    grid = _GRIDS[number]
+    begin = source.origin(grid.row) + block * _BLOCK
+    # Times from the start of the block: the polynomials do not depend on the epoch of a window.
+    window = source.records(Time(2451545.0, begin / DAY, format="jd", scale="tdb"), 0.0, _BLOCK)
+    degree, names, slots = grid.degree, grid.names, grid.slots
+    count = round(_BLOCK / grid.length)
     nodes = -np.cos(np.pi * (np.arange(degree + 1) + 0.5) / (degree + 1))
-    times = (start + length * (np.arange(count)[:, None] + 0.5 * (1.0 + nodes))).ravel()
+    times = (grid.length * (np.arange(count)[:, None] + 0.5 * (1.0 + nodes))).ravel()
     order = (*BODIES, *BELT)
     rows = {SUN, *(order.index(name) for name in names)} | ({EARTH, MOON} if "earth" in names else set())
     if names == HEAVY:
         rows = set(range(len(BODIES)))
     head = window.head[sorted(rows)]
-    # Times beyond the end of the ephemeris are never requested: there the last piece is sampled at the end.
+    # Times beyond the ends of the ephemeris are never requested: there the pieces are sampled at the ends.
     times = np.clip(times, head[:, 3].max(), (head[:, 3] + head[:, 2] * head[:, 4]).min())
-    sample = np.full((times.size, columns), _NOWHERE)
+    sample = np.full((times.size, grid.columns), _NOWHERE)
     if names == HEAVY:
         _write_heavy(window, times, sample)
     else:
@@ -121,7 +166,7 @@ def _grid(
     powers = np.zeros((degree + 1, degree + 1))
     for n in range(degree + 1):
         powers[: n + 1, n] = chebyshev.cheb2poly(np.eye(degree + 1)[n, : n + 1])
-    return (start, 1.0 / length, float(count)), np.ascontiguousarray(powers @ by_chebyshev)
+    return np.ascontiguousarray(powers @ by_chebyshev)
 
 
 def _write_heavy(window: Window, times: Array, out: Array) -> None:

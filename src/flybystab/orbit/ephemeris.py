@@ -157,6 +157,7 @@ class Window:
         Coefficients, m.
     gm : ndarray, shape (bodies,)
         Gravitational parameters of this ephemeris, m3/s2.
+    source : Ephemeris
     """
 
     name: str
@@ -166,6 +167,7 @@ class Window:
     head: Array
     data: Array
     gm: Array
+    source: Ephemeris
 
     def states(self, body: int, t: Array) -> Array:
         """Barycentric position (m) and velocity (m/s), shape (n, 6), of a body at `t` s from the epoch."""
@@ -215,6 +217,14 @@ class Ephemeris:
         self.check(
             zero, *(Time(zero.jd1, zero.jd2 + s / DAY, format="jd", scale="tdb") for s in (start, stop))
         )
+        return self.records(zero, start, stop)
+
+    def origin(self, row: int) -> float:
+        """First time of the file for a row of a window, s (TDB) from J2000."""
+        return _series(self.path)[_SERIES[row]][1]
+
+    def records(self, zero: Time, start: float, stop: float) -> Window:
+        """The records of :meth:`window` without its check: as many as the file has. `zero` is in TDB."""
         head = np.zeros((N_ALL, 5))
         blocks, offset = [], 0
         belt = _belt()
@@ -225,14 +235,19 @@ class Ephemeris:
         ]
         for row, (records, first, length) in zip(head, series, strict=True):
             # Difference of whole days first, then of the fractions: no loss of digits.
-            begin = first + ((2451545.0 - zero.jd1) - zero.jd2) * DAY
+            begin = first + from_j2000(zero)
             low = max(0, int((start - begin) // length) - 2)
             high = min(len(records), int((stop - begin) // length) + 3)
             block = np.array(records[low:high], dtype=float) * 1e3
             row[:] = offset, block.shape[2], high - low, begin + low * length, length
             offset += block.size
             blocks.append(block.ravel())
-        return Window(self.name, zero, start, stop, head, np.concatenate(blocks), np.array(self.gm))
+        return Window(self.name, zero, start, stop, head, np.concatenate(blocks), np.array(self.gm), self)
+
+
+def from_j2000(zero: Time) -> float:
+    """J2000 (TDB) in s from `zero` (TDB)."""
+    return float(((2451545.0 - zero.jd1) - zero.jd2) * DAY)
 
 
 @lru_cache(maxsize=1)

@@ -33,6 +33,7 @@ from astropy.units import Quantity
 
 from flybystab.constants import AU, GM_EARTH, R_EARTH, YEAR
 from flybystab.errors import InvalidInput, UnknownName
+from flybystab.orbit.epochs import later
 from flybystab.units import to_si
 
 
@@ -119,9 +120,12 @@ class Planet:
 
     def pole_motion(self, time: Time) -> tuple[tuple[float, float, float], tuple[float, float, float]]:
         """The pole at `time` (:meth:`pole_at`) and its rate, 1/s, by a difference over a year."""
-        before, after = (self.pole_at(time + sign * 0.5 * u.yr) for sign in (-1.0, 1.0))
+        now = self.pole_at(time)
+        if self.name != "earth":
+            return now, (0.0, 0.0, 0.0)
+        before, after = (self.pole_at(later(time, sign * 0.5 * YEAR)) for sign in (-1.0, 1.0))
         x, y, z = ((b - a) / YEAR for a, b in zip(before, after, strict=True))
-        return self.pole_at(time), (x, y, z)
+        return now, (x, y, z)
 
     def __repr__(self) -> str:
         return f"<Planet {self.name}, radius {self.radius / 1e3:.0f} km>"
