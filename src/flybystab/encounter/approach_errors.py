@@ -72,15 +72,17 @@ def approach_errors(
         By rebound.
     second, full : Approach
         By the integrator of the search: with the same forces, and with all. The numerical error is the difference of
-        the two integrators plus that by the forces left out; infinite if there is no `second`. The first difference
-        counts twice where forces are left out, since it is also the error of the second.
+        the two integrators plus that by the forces left out; infinite if there is no `second`. The first is the
+        distance of the two positions at closest approach, since the difference of two distances can vanish by chance;
+        it counts twice where forces are left out, since it is also the error of the second.
     t : float
         Closest approach, or first contact on an impact, s from the epoch of the window.
     """
     gap, lag = np.inf, np.inf
     if second is not None:
         times = 1.0 if second is full else 2.0
-        gap = times * abs(chosen.distance - second.distance) + abs(second.distance - full.distance)
+        apart = float(np.linalg.norm(chosen.state[:3] - second.state[:3]))
+        gap = times * apart + abs(second.distance - full.distance)
         lag = times * abs(chosen.t - second.t) + abs(second.t - full.t)
     found = errors_at(orbit, beside, window, chosen.forces, t)
     model_error = float(found.model_error[0])
