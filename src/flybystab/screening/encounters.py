@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING, Protocol, runtime_checkable
 
 import astropy.units as u
 import numpy as np
@@ -18,6 +19,9 @@ from flybystab.errors import NoEncounter
 from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.planets import PLANETS, planet
 from flybystab.screening.settings import Settings
+
+if TYPE_CHECKING:
+    from flybystab.orbit.search.encounter_finder import Approach
 
 #: Distance from the Earth (m) below which no bound on the Moon's tide holds without its position.
 FAR_FROM_EARTH = 3 * 3.844e8
@@ -120,17 +124,63 @@ class CloseApproach:
         return tide_size(e.tide, e.t_start, e.t_stop)
 
 
-def close_approaches(asteroid: Asteroid, settings: Settings) -> list[CloseApproach]:
-    """Encounters of an asteroid in order of time."""
-    from flybystab.orbit.search.encounter_finder import approaches
-
-    start, stop = (Time(jd, format="jd", scale="tdb") for jd in (settings.start, settings.stop))
-    found = approaches(asteroid.orbit, start, stop, settings.planets, settings.within)
-    return [
-        CloseApproach(asteroid, a.planet, a.time, a.distance, a.v_inf)
-        for a in sorted(found, key=lambda a: (a.time.tdb.jd, a.planet))
-    ]
-
-
 #: Function that finds the encounters of an asteroid; worker processes import it.
 Finder = Callable[[Asteroid, Settings], list[CloseApproach]]
+
+
+@runtime_checkable
+class BatchFinder(Protocol):
+    """A finder that searches for many asteroids at once, which a screening then uses.
+
+    Worker processes unpickle it.
+    """
+
+    def __call__(self, asteroid: Asteroid, settings: Settings) -> list[CloseApproach]:
+        """Encounters of an asteroid."""
+
+    def batch(
+        self, asteroids: Sequence[Asteroid], settings: Settings
+    ) -> Sequence[list[CloseApproach] | Exception]:
+        """For each asteroid its encounters, or the error of its search.
+
+        If it raises an error itself, or takes longer than the time limit of one asteroid, the asteroids are searched
+        one by one.
+        """
+
+
+class OrbitSearch:
+    """Finder of the encounters on the orbit of an asteroid, in order of time."""
+
+    def __call__(self, asteroid: Asteroid, settings: Settings) -> list[CloseApproach]:
+        """Encounters of an asteroid."""
+        from flybystab.orbit.search.encounter_finder import approaches
+
+        return _in_order(asteroid, approaches(asteroid.orbit, *_search(settings)))
+
+    def batch(
+        self, asteroids: Sequence[Asteroid], settings: Settings
+    ) -> list[list[CloseApproach] | Exception]:
+        """For each asteroid its encounters, or the error of its search."""
+        from flybystab.orbit.search.encounter_finder import approaches_each
+
+        found = approaches_each([a.orbit for a in asteroids], *_search(settings))
+        return [
+            f if isinstance(f, Exception) else _in_order(a, f) for a, f in zip(asteroids, found, strict=True)
+        ]
+
+
+#: The default finder.
+close_approaches = OrbitSearch()
+
+
+def _search(settings: Settings) -> tuple[Time, Time, Sequence[str], float]:
+    """Span, planets and largest distance (m) of a search."""
+    start, stop = (Time(jd, format="jd", scale="tdb") for jd in (settings.start, settings.stop))
+    return start, stop, settings.planets, settings.within
+
+
+def _in_order(asteroid: Asteroid, found: Sequence[Approach]) -> list[CloseApproach]:
+    """Close approaches of an asteroid in order of time."""
+    if len(found) > 1:
+        found = sorted(found, key=lambda a: (a.time.tdb.jd, a.planet))
+    return [CloseApproach(asteroid, a.planet, a.time, a.distance, a.v_inf) for a in found]

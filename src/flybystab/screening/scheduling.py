@@ -15,21 +15,30 @@ from typing import Any, NamedTuple, ParamSpec, Protocol, TypeVar
 from flybystab.catalogues.catalogue import Asteroid
 from flybystab.core.numerics.threads import first_completed, interrupts_deferred
 from flybystab.errors import WorkersLost
-from flybystab.screening.encounters import Finder
+from flybystab.screening.encounters import BatchFinder, CloseApproach, Finder
 from flybystab.screening.grain_samples import GrainSample
 from flybystab.screening.sample_verdicts import SampleVerdicts
 from flybystab.screening.settings import Settings
-from flybystab.screening.tasks import OpenApproach, Part, Rows, begin, joined
+from flybystab.screening.tasks import OpenApproach, Part, Rows, begin, joined, searched
 from flybystab.typing import Document
 
 P = ParamSpec("P")
 R = TypeVar("R")
+
+#: Largest number of asteroids in one search, and of those named where workers are lost.
+_BATCH, _NAMED = 64, 8
 
 
 def _begin(
     asteroids: list[Asteroid], settings: Settings, finder: Finder, block: int
 ) -> list[list[Rows | OpenApproach]]:
     return [begin(a, settings, finder, block) for a in asteroids]
+
+
+def _open(
+    found: list[tuple[Asteroid, list[CloseApproach]]], settings: Settings, block: int
+) -> list[list[Rows | OpenApproach]]:
+    return [begin(a, settings, lambda *_, its=its: its, block) for a, its in found]
 
 
 def _judge(part: Part | GrainSample, settings: Settings) -> SampleVerdicts:
@@ -54,6 +63,16 @@ class _Piece(NamedTuple):
     number: int
     approach: OpenApproach
     first: int
+
+
+class _Search(NamedTuple):
+    """Asteroids that are searched for encounters in one call."""
+
+    positions: list[int]
+
+
+#: What is in flight: positions of new asteroids, a search, or a part.
+_Call = list[int] | _Search | _Piece
 
 
 class Parts(Protocol):
@@ -96,7 +115,9 @@ def scheduled(
 ) -> Iterator[tuple[int, Rows]]:
     """Rows of the asteroids at the positions `todo`, in order of completion: (position, rows).
 
-    Parts of asteroids in progress take precedence over new asteroids, so that few are open at a time.
+    Parts of asteroids in progress take precedence over new asteroids, so that few are open at a time. A finder that
+    searches for many asteroids at once (:class:`BatchFinder`) gets up to `_BATCH` of them, or as many as keep all calls
+    in flight busy; their encounters are then computed in calls of their own.
 
     Parameters
     ----------
@@ -116,11 +137,13 @@ def scheduled(
     WorkersLost
         Names the asteroids in progress.
     """
-    schedule = _Schedule(asteroids, iter(todo), settings, finder, executor, chunk, block, parts)
+    batch = max(chunk, min(_BATCH, -(-len(asteroids) // window)))
+    schedule = _Schedule(asteroids, iter(todo), settings, finder, executor, chunk, batch, block, parts)
     # a call of the serial executor is the calculation itself, which Ctrl-C ends at once
     deferred = nullcontext if isinstance(executor, SerialExecutor) else interrupts_deferred
     try:
         while True:
+            yield from schedule.finished()
             with deferred():
                 while len(schedule.calls) < window and schedule.send():
                     pass
@@ -133,6 +156,9 @@ def scheduled(
                         yield call.asteroid.position, rows
                     elif report is not None:
                         report(sum(schedule.completed.values()))
+                    continue
+                if isinstance(call, _Search):
+                    schedule.found.extend(zip(call.positions, answer, strict=True))
                     continue
                 for i, work in zip(call, answer, strict=True):
                     if (rows := schedule.start(i, work)) is not None:
@@ -149,10 +175,15 @@ class _Schedule:
 
     Attributes
     ----------
+    batch : int
+        Asteroids in one search of a :class:`BatchFinder`.
     waiting : deque of iterators
         Parts of asteroids in progress that have not been sent.
+    found, aside : deque
+        Positions of asteroids that have been searched, with their encounters, which have not been sent, or the row of
+        their failure; `aside` those without encounters before others that have been sent.
     calls : dict
-        Calls in flight: positions of new asteroids, or one part.
+        Calls in flight: positions of new asteroids, a search, or one part.
     completed : dict of int to float
         Completed fractions of the asteroids in progress.
     """
@@ -163,10 +194,13 @@ class _Schedule:
     finder: Finder
     executor: Executor
     chunk: int
+    batch: int
     block: int
     parts: Parts | None
     waiting: deque[Iterator[tuple[_Piece, Part | GrainSample]]] = field(default_factory=deque)
-    calls: dict[Future[Any], list[int] | _Piece] = field(default_factory=dict)
+    found: deque[tuple[int, list[CloseApproach] | Rows]] = field(default_factory=deque)
+    aside: deque[tuple[int, list[CloseApproach] | Rows]] = field(default_factory=deque)
+    calls: dict[Future[Any], _Call] = field(default_factory=dict)
     completed: dict[int, float] = field(default_factory=dict)
 
     def send(self) -> bool:
@@ -177,12 +211,20 @@ class _Schedule:
                 self.submit(piece, _judge, part, self.settings)
                 return True
             self.waiting.popleft()
-        if chosen := list(islice(self.positions, self.chunk)):
+        if some := self.next_found():
+            work = [(self.asteroids[i], its) for i, its in some]
+            self.submit([i for i, _ in some], _open, work, self.settings, self.block)
+            return True
+        if isinstance(self.finder, BatchFinder):
+            if chosen := list(islice(self.positions, self.batch)):
+                new = [self.asteroids[i] for i in chosen]
+                self.submit(_Search(chosen), searched, new, self.settings, self.finder)
+        elif chosen := list(islice(self.positions, self.chunk)):
             new = [self.asteroids[i] for i in chosen]
             self.submit(chosen, _begin, new, self.settings, self.finder, self.block)
         return bool(chosen)
 
-    def submit(self, call: list[int] | _Piece, function: Callable[..., Any], *arguments: object) -> None:
+    def submit(self, call: _Call, function: Callable[..., Any], *arguments: object) -> None:
         """Submit a call.
 
         Raises
@@ -198,7 +240,7 @@ class _Schedule:
             running = next(iter(self.calls.values()), call)
             raise self.workers_lost(f"workers died or were lost ({_said(error)})", running) from error
 
-    def received(self, future: Future[Any]) -> tuple[list[int] | _Piece, Any]:
+    def received(self, future: Future[Any]) -> tuple[_Call, Any]:
         """A finished call and its result.
 
         Raises
@@ -213,12 +255,32 @@ class _Schedule:
                 raise
             raise self.workers_lost(reason, call) from error
 
-    def workers_lost(self, reason: str, call: list[int] | _Piece) -> WorkersLost:
+    def workers_lost(self, reason: str, call: _Call) -> WorkersLost:
         """The error that names the asteroids of a call."""
-        names = ", ".join(self.asteroids[i].name for i in _positions(call))
+        positions = _positions(call)
+        names = ", ".join(self.asteroids[i].name for i in positions[:_NAMED])
+        if len(positions) > _NAMED:
+            names += f" and {len(positions) - _NAMED} others"
         return WorkersLost(
             f"{reason}; in progress: {names}. Finished asteroids are kept: the same call continues the run"
         )
+
+    def next_found(self) -> list[tuple[int, list[CloseApproach]]]:
+        """Up to `chunk` asteroids with encounters; those before them that have none are put aside."""
+        out: list[tuple[int, list[CloseApproach]]] = []
+        while self.found and len(out) < self.chunk:
+            position, found = self.found.popleft()
+            if isinstance(found, dict) or not found:
+                self.aside.append((position, found))
+            else:
+                out.append((position, found))
+        return out
+
+    def finished(self) -> Iterator[tuple[int, Rows]]:
+        """Positions and rows of the next asteroids that have failed or have no encounters, in order."""
+        while self.aside or (self.found and (isinstance(self.found[0][1], dict) or not self.found[0][1])):
+            position, found = (self.aside or self.found).popleft()
+            yield position, found if isinstance(found, dict) else joined([], self.settings)
 
     def take(self, piece: _Piece, verdicts: SampleVerdicts) -> Rows | None:
         """Store the verdicts of a part; the rows of its asteroid if it was the last one."""
@@ -300,8 +362,10 @@ def _is_loss(error: Exception) -> bool:
 _DESERIALISATION = (ImportError, AttributeError, PickleError, RuntimeError)
 
 
-def _positions(call: list[int] | _Piece) -> list[int]:
-    return [call.asteroid.position] if isinstance(call, _Piece) else call
+def _positions(call: _Call) -> list[int]:
+    if isinstance(call, _Piece):
+        return [call.asteroid.position]
+    return call.positions if isinstance(call, _Search) else call
 
 
 def window_of(executor: Executor) -> int:

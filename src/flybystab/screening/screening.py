@@ -1,11 +1,11 @@
 """Screening: verdicts on the encounters of many asteroids, with probabilities.
 
-Each asteroid is one task (:mod:`flybystab.screening.tasks`). Its encounters are found on its orbit. For each encounter
-verdicts are computed for the catalogue body and for samples drawn from :mod:`flybystab.screening.priors`. For most of
-them the bound of :mod:`flybystab.core.ellipsoid.yield_bound` proves that the body does not yield; the others are
-integrated (:mod:`flybystab.screening.sample_verdicts`), in parts that are distributed over all workers where there are
-many. Tasks are independent. Their random numbers depend on the seed, the asteroid and the sample only, so that the
-rows do not depend on the executor.
+Each asteroid is one task (:mod:`flybystab.screening.tasks`). Its encounters are found on its orbit, in one search for
+up to 64 asteroids. For each encounter verdicts are computed for the catalogue body and for samples drawn from
+:mod:`flybystab.screening.priors`. For most of them the bound of :mod:`flybystab.core.ellipsoid.yield_bound` proves that
+the body does not yield; the others are integrated (:mod:`flybystab.screening.sample_verdicts`), in parts that are
+distributed over all workers where there are many. Tasks are independent. Their random numbers depend on the seed, the
+asteroid and the sample only, so that the rows do not depend on the executor.
 
 :func:`screen` returns a table; :meth:`Screening.run` writes one and can be resumed
 (:mod:`flybystab.screening.resumable_run`).
@@ -54,7 +54,8 @@ class Screening:
     asteroids : sequence of Asteroid
     settings : Settings
     finder : callable
-        Finds the encounters of an asteroid; by default those of its orbit.
+        Finds the encounters of an asteroid; by default those of its orbit. One with a method ``batch``
+        (:class:`flybystab.screening.encounters.BatchFinder`) searches for many asteroids at once.
     """
 
     def __init__(
@@ -239,7 +240,8 @@ def screen(
         Show a bar (:mod:`flybystab.progress`), or a function that is called with a :class:`Progress` after
         every asteroid.
     finder : callable
-        Finds the encounters of an asteroid, in place of a search along its orbit.
+        Finds the encounters of an asteroid, in place of a search along its orbit. One with a method ``batch``
+        (:class:`flybystab.screening.encounters.BatchFinder`) searches for many asteroids at once.
 
     Returns
     -------

@@ -1,7 +1,7 @@
 """Units of work of a screening: an asteroid, and parts of the samples of a long encounter.
 
-A worker starts an asteroid: it finds the encounters and computes verdicts for the catalogue body and a few samples of
-each encounter. The other samples are completed immediately where the bound decides. Those that need an integration of
+A worker finds the encounters of many asteroids in one search (:func:`searched`), or of one by the finder of a user.
+A worker then starts an asteroid: it computes verdicts for the catalogue body and a few samples of each encounter. The other samples are completed immediately where the bound decides. Those that need an integration of
 the body, or of their own orbit, are left in parts for all workers, so that a single encounter keeps every core busy. A
 sample depends on the seed, the asteroid and its number only (:mod:`flybystab.screening.draws`): the rows do not
 depend on the division into parts.
@@ -18,7 +18,7 @@ from flybystab.catalogues.catalogue import Asteroid
 from flybystab.errors import FlybystabError
 from flybystab.screening.clones import Clones, OrbitSampling, orbit_sampling
 from flybystab.screening.draws import Attitudes, Samples
-from flybystab.screening.encounters import CloseApproach, Finder
+from flybystab.screening.encounters import BatchFinder, CloseApproach, Finder
 from flybystab.screening.grain_samples import CATALOGUE_BODY, GrainSample, needing_grains
 from flybystab.screening.result_rows import (
     Row,
@@ -270,7 +270,38 @@ def begin(asteroid: Asteroid, settings: Settings, finder: Finder, block: int) ->
         with time_limit(settings.time_limit, asteroid.name):
             return [opened(approach, settings, block) for approach in finder(asteroid, settings)]
     except Exception as error:
-        return [{"rows": [failed_row(asteroid, settings, error)], "samples": []}]
+        return [_failed(asteroid, settings, error)]
+
+
+def searched(
+    asteroids: Sequence[Asteroid], settings: Settings, finder: BatchFinder
+) -> list[list[CloseApproach] | Rows]:
+    """For each asteroid its encounters, found in one search, or the row of its failure.
+
+    The search has the time limit of one asteroid. If it fails as a whole, the asteroids are searched one by one.
+    """
+    try:
+        with time_limit(settings.time_limit, f"search for {len(asteroids)} asteroids"):
+            found = finder.batch(asteroids, settings)
+    except Exception:
+        return [_searched_alone(a, settings, finder) for a in asteroids]
+    return [
+        _failed(a, settings, f) if isinstance(f, Exception) else f
+        for a, f in zip(asteroids, found, strict=True)
+    ]
+
+
+def _searched_alone(asteroid: Asteroid, settings: Settings, finder: Finder) -> list[CloseApproach] | Rows:
+    """The encounters of an asteroid, or the row of its failure."""
+    try:
+        with time_limit(settings.time_limit, asteroid.name):
+            return finder(asteroid, settings)
+    except Exception as error:
+        return _failed(asteroid, settings, error)
+
+
+def _failed(asteroid: Asteroid, settings: Settings, error: Exception) -> Rows:
+    return {"rows": [failed_row(asteroid, settings, error)], "samples": []}
 
 
 def joined(work: Sequence[Rows | OpenApproach], settings: Settings) -> Rows:

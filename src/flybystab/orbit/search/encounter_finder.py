@@ -34,6 +34,7 @@ from flybystab.orbit.search.neighbours import add_growth
 from flybystab.orbit.search.search_setup import (
     SearchForces,
     SearchSpan,
+    groups_by_window,
     initial_states,
     reach_of,
     search_forces,
@@ -137,7 +138,9 @@ def find_encounters(
     accuracy = to_si(error, u.m, "error", low=0.0)
     eph = as_ephemeris(ephemeris)
     allowed = search_tolerance(accuracy, tolerance, growth)
-    job = _prepared(rows, start, stop, found, distances, eph, accuracy, allowed, forces, growth)
+    job = _prepared(
+        rows, start, stop, found, distances, eph, accuracy, allowed, forces, growth, len(rows) == 1
+    )
     raw = _without_early_impacts(job, _integrated(job, workers, progress))
     # An impact on the Sun ends an orbit and always has a row.
     requested = np.isin(raw["body"], [SUN, *(BODIES.index(b.name) for b in found)])
@@ -167,8 +170,10 @@ class _Search(NamedTuple):
     ----------
     shares : ndarray, shape (n, N_SHARES)
         Estimated displacement by each force, m; written by the search.
-    failed : dict of int to dict
+    failed : dict of int to Exception
         Asteroids that could not be integrated, with the reason; written by the search.
+    alone : bool
+        The error of an asteroid is raised.
     """
 
     rows: list[tuple[str, Orbit]]
@@ -179,13 +184,14 @@ class _Search(NamedTuple):
     reach: Reach
     tolerance: float
     shares: Array
-    failed: dict[int, dict[str, str]]
+    failed: dict[int, Exception]
+    alone: bool
 
     def fail(self, i: int, error: Exception) -> None:
         """Record that asteroid `i` could not be integrated; raises the error if it is the only one."""
-        if len(self.rows) == 1:
+        if self.alone:
             raise error
-        self.failed[i] = {"asteroid": self.rows[i][0], "why": str(error)}
+        self.failed[i] = error
 
 
 def _prepared(
@@ -199,15 +205,17 @@ def _prepared(
     tolerance: float,
     forces: tuple[str, ...] | None,
     growth: bool,
+    alone: bool,
 ) -> _Search:
-    """The search, before the integration."""
+    """The search, before the integration; `alone` as of :class:`_Search`."""
     span, epochs = search_span(rows, start, stop, eph, growth)
     states = initial_states(rows, span.window, epochs)
     # A tenth: the displacements add up, and encounters amplify them.
     least = 0.1 * accuracy if forces is None and not growth else 0.0
     acting = search_forces(rows, found, forces, least, span.window, epochs, states)
     shares = np.zeros((len(rows), N_SHARES))
-    return _Search(rows, span, acting, epochs, states, reach_of(found, distances), tolerance, shares, {})
+    reach = reach_of(found, distances)
+    return _Search(rows, span, acting, epochs, states, reach, tolerance, shares, {}, alone)
 
 
 class Approach(NamedTuple):
@@ -230,33 +238,51 @@ def approaches(
     ------
     OutOfSpan, Impact, NotConverged
     """
-    found = [planet(n) for n in planets]
+    (found,) = _approaches_each([orbit], start, stop, planets, within, alone=True)
+    return [] if isinstance(found, Exception) else found
+
+
+def approaches_each(
+    orbits: Sequence[Orbit], start: Time, stop: Time, planets: Sequence[str], within: float
+) -> list[list[Approach] | Exception]:
+    """Results of :func:`approaches` for many orbits, to the last bit: each a list, or the error of the integration.
+
+    Raises
+    ------
+    OutOfSpan
+        For any of the orbits.
+    """
+    return _approaches_each(orbits, start, stop, planets, within, alone=False)
+
+
+def _approaches_each(
+    orbits: Sequence[Orbit], start: Time, stop: Time, planets: Sequence[str], within: float, *, alone: bool
+) -> list[list[Approach] | Exception]:
+    """As :func:`approaches_each`; an error of an integration is raised if `alone`."""
+    rows = [(orbit.name or "0", orbit) for orbit in orbits]
+    found, eph = [planet(n) for n in planets], as_ephemeris(None)
     accuracy = ERROR.to_value(u.m)
-    tolerance = search_tolerance(accuracy, None, False)
-    distances = np.full(len(found), within)
-    job = _prepared(
-        [(orbit.name or "0", orbit)],
-        start,
-        stop,
-        found,
-        distances,
-        as_ephemeris(None),
-        accuracy,
-        tolerance,
-        None,
-        False,
-    )
-    raw = _without_early_impacts(job, _integrated(job, 1, False))
-    raw = raw[np.isin(raw["body"], [BODIES.index(b.name) for b in found])]
-    return [
-        Approach(
-            BODIES[r["body"]],
-            later(job.span.middle, r["time"]),
-            float(r["distance"]),
-            float(np.sqrt(max(r["v_inf2"], 0.0))),
-        )
-        for r in raw
-    ]
+    given = found, np.full(len(found), within), eph, accuracy, search_tolerance(accuracy, None, False)
+    wanted = [BODIES.index(b.name) for b in found]
+    groups = groups_by_window(rows, start, stop, eph)
+    jobs = [_prepared([rows[i] for i in group], start, stop, *given, None, False, alone) for group in groups]
+    out: list[list[Approach] | Exception] = [[] for _ in rows]
+    for group, job in zip(groups, jobs, strict=True):
+        raw = _without_early_impacts(job, _integrated(job, 1, False))
+        for r in raw[np.isin(raw["body"], wanted)]:
+            here = out[group[int(r["asteroid"])]]
+            if isinstance(here, list):
+                here.append(
+                    Approach(
+                        BODIES[r["body"]],
+                        later(job.span.middle, r["time"]),
+                        float(r["distance"]),
+                        float(np.sqrt(max(r["v_inf2"], 0.0))),
+                    )
+                )
+        for i, error in job.failed.items():
+            out[group[i]] = error
+    return out
 
 
 def _check_options(start: Time, stop: Time, forces: tuple[str, ...] | None, tolerance: float | None) -> None:
@@ -298,8 +324,9 @@ def _integrated(
 ) -> NDArray[Any]:
     """Rows of all encounters, sorted by asteroid and time."""
     total, own = len(job.rows), job.forces.own
-    # Parts are small enough to balance the load of the threads, and large enough for a small overhead of Python.
-    size = max(1, min(64, -(-total // (4 * workers)))) if workers > 1 else max(total, 1)
+    # Parts are small enough to balance the load of the threads and for Ctrl-C, which waits for the end of one, and
+    # large enough for a small overhead of Python.
+    size = max(1, min(64, -(-total // (4 * workers)))) if workers > 1 else 32
     cuts = sorted({*range(0, total, size), *own, *(i + 1 for i in own), total})
     tasks = [slice(i, j) for i, j in pairwise(cuts)]
     flat: list[NDArray[Any]] = []
@@ -388,7 +415,7 @@ def _metadata(job: _Search, elsewhere: NDArray[Any]) -> dict[str, Any]:
             }
             for r in elsewhere
         ],
-        "failed": [job.failed[i] for i in sorted(job.failed)],
+        "failed": [{"asteroid": job.rows[i][0], "why": str(job.failed[i])} for i in sorted(job.failed)],
         "frame": "ICRF",
         "time_scale": "TDB",
         "tolerance": job.tolerance,

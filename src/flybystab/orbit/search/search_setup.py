@@ -112,23 +112,54 @@ def search_span(
     rows: list[tuple[str, Orbit]], start: Time, stop: Time, ephemeris: Ephemeris, growth: bool
 ) -> tuple[SearchSpan, Array]:
     """Span of a search, and the epochs of the orbits (s from its middle)."""
-    middle = later(start, 0.5 * seconds(stop, start))
-    t_start, t_stop = seconds(start, middle), seconds(stop, middle)
+    middle, t_start, t_stop, first, last = _times(start, stop, ephemeris)
     epochs = _epochs(rows, middle)
     known = [seconds(deviation_epoch(orbit), middle) for _, orbit in rows] if growth else []
-    first, last = (
-        (jd - middle.tdb.jd1 - middle.tdb.jd2) * DAY for jd in (ephemeris.start_jd, ephemeris.stop_jd)
-    )
+    begin, end = _integrated_span(t_start, t_stop, first, last)
+    every = np.array([begin, end, *epochs, *known])
+    low, high = _window_ends(every.min(), every.max(), t_start, t_stop, first, last)
+    window = _window(ephemeris, middle.tdb.jd1, middle.tdb.jd2, float(low), float(high))
+    return SearchSpan(middle, t_start, t_stop, begin, end, window), epochs
+
+
+def groups_by_window(
+    rows: list[tuple[str, Orbit]], start: Time, stop: Time, ephemeris: Ephemeris
+) -> list[list[int]]:
+    """Numbers of the orbits, in groups whose searches have the same window: that of each orbit searched alone."""
+    middle, *times = _times(start, stop, ephemeris)
+    epochs = _epochs(rows, middle)
+    begin, end = _integrated_span(*times)
+    ends = _window_ends(np.minimum(epochs, begin), np.maximum(epochs, end), *times)
+    groups: dict[tuple[float, float], list[int]] = {}
+    for i, pair in enumerate(zip(*(e.tolist() for e in ends), strict=True)):
+        groups.setdefault(pair, []).append(i)
+    return list(groups.values())
+
+
+def _times(start: Time, stop: Time, ephemeris: Ephemeris) -> tuple[Time, float, float, float, float]:
+    """Middle of a span; its start and stop, and those of the ephemeris, s from the middle."""
+    middle = later(start, 0.5 * seconds(stop, start))
+    zero = middle.tdb
+    first, last = ((jd - zero.jd1 - zero.jd2) * DAY for jd in (ephemeris.start_jd, ephemeris.stop_jd))
+    return middle, seconds(start, middle), seconds(stop, middle), float(first), float(last)
+
+
+def _integrated_span(t_start: float, t_stop: float, first: float, last: float) -> tuple[float, float]:
+    """Ends of the integration, s, from those of the span and of the ephemeris."""
     begin, end = t_start - _MARGIN, t_stop + _MARGIN
     if first <= t_start and t_stop <= last:
         begin, end = max(begin, first + 1e-3), min(end, last - 1e-3)
-    every = [begin, end, *epochs, *known]
+    return begin, end
+
+
+def _window_ends(
+    least: Array, largest: Array, t_start: float, t_stop: float, first: float, last: float
+) -> tuple[Array, Array]:
+    """Ends of the window, s, for searches with the given `least` and `largest` times; any shape."""
     block = max(_BLOCK * (t_stop - t_start), YEAR)
-    low = block * np.floor((min(every) + _MARGIN) / block) - _MARGIN
-    high = block * np.ceil((max(every) - _MARGIN) / block) + _MARGIN
-    low, high = max(low, min(first, *every)), min(high, max(last, *every))
-    window = _window(ephemeris, middle.tdb.jd1, middle.tdb.jd2, float(low), float(high))
-    return SearchSpan(middle, t_start, t_stop, begin, end, window), epochs
+    low = block * np.floor((least + _MARGIN) / block) - _MARGIN
+    high = block * np.ceil((largest - _MARGIN) / block) + _MARGIN
+    return np.maximum(low, np.minimum(first, least)), np.minimum(high, np.maximum(last, largest))
 
 
 def search_forces(
