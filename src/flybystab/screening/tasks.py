@@ -1,10 +1,11 @@
 """Units of work of a screening: an asteroid, and parts of the samples of a long encounter.
 
 A worker finds the encounters of many asteroids in one search (:func:`searched`), or of one by the finder of a user.
-A worker then starts an asteroid: it computes verdicts for the catalogue body and a few samples of each encounter. The other samples are completed immediately where the bound decides. Those that need an integration of
-the body, or of their own orbit, are left in parts for all workers, so that a single encounter keeps every core busy. A
-sample depends on the seed, the asteroid and its number only (:mod:`flybystab.screening.draws`): the rows do not
-depend on the division into parts.
+A worker then starts an asteroid: it computes verdicts for the catalogue body and a few samples of each encounter. The
+other samples are completed immediately where the bound decides. Those that need an integration of the body, or of
+their own orbit, are left in parts for all workers, so that a single encounter keeps every core busy. A sample depends
+on the seed, the asteroid and its number only (:mod:`flybystab.screening.draws`): the rows do not depend on the
+division into parts.
 """
 
 from __future__ import annotations
