@@ -13,13 +13,16 @@ from flybystab.encounter.integrated_approach import (
     by_rebound,
     by_search,
     ends_of_encounter,
+    independent_approach,
 )
+from flybystab.errors import NoEncounter, NotConverged
 from flybystab.orbit.closest_approach import TIME
 from flybystab.orbit.default_forces import default_forces
 from flybystab.orbit.ephemeris import BODIES, ephemeris
 from flybystab.orbit.epochs import seconds
 from flybystab.orbit.forces import FORCES, model
 from flybystab.orbit.ias15 import TIGHT, Flight
+from flybystab.orbit.orbit import Orbit
 
 CASES = [("Apophis", "2029-04-13"), ("2012 TC4", "2017-10-12"), ("2005 YU55", "2011-11-08")]
 
@@ -60,6 +63,21 @@ def test_both_integrators_have_the_same_approach(name, day):
     assert abs(one.distance - other.distance) < 5.0
     assert abs(one.t - other.t) < 1e-3
     assert one.distance != other.distance
+
+
+def test_a_path_through_the_sun_is_left_to_rebound():
+    """The integrator of the search gives up there."""
+    near = Time("2029-04-13", scale="tdb")
+    orbit = Orbit.from_state(near, [2e8, 1e5, 100.0] * u.km, [-7.0, 0.0, 0.0] * u.km / u.s)
+    window = ephemeris().window(near, -110.0 * DAY, 110.0 * DAY)
+    given = orbit, window, BODIES.index("earth"), default_forces(orbit, *BODIES), 100.0 * DAY
+    with pytest.raises(NotConverged):
+        approach_near(*given, by_search(*given[:2], *given[3:]))
+    found = independent_approach(*given)
+    truth = approach_near(*given, by_rebound(*given[:2], given[3]))
+    assert abs(found.t - truth.t) < 10.0
+    with pytest.raises(NoEncounter, match=r"1\.0054 au at the closest"):
+        Encounter.from_orbit(orbit, "earth", near, search=100 * u.d)
 
 
 def test_ends_of_an_encounter_do_not_depend_on_the_length_of_the_log():

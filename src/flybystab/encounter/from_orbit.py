@@ -18,10 +18,10 @@ from flybystab.encounter.integrated_approach import (
     Approach,
     approach_near,
     by_rebound,
-    by_search,
     check_no_impact_before,
     ends_of_encounter,
     first_contact_of,
+    independent_approach,
     path_between,
     relative_to,
     state_in_log,
@@ -70,7 +70,7 @@ def followed(
     known = (n for n in FORCES if n != "non-gravitational" or orbit.nongrav.active)
     everything = without_itself(known, orbit, window)
     acting = forces or everything
-    first = approach_near(orbit, window, index, acting, reach, by_search(orbit, window, acting, reach))
+    first = independent_approach(orbit, window, index, acting, reach)
     if first is not None:
         check_no_impact_before(orbit, body, window, first, epoch)
     beside = deviations_of(orbit, ephemeris)
@@ -94,7 +94,7 @@ def followed(
     # The same forces by the integrator of the search: their difference is the error of the integration.
     second: Approach | None = first
     if set(forces) != set(acting):
-        second = approach_near(orbit, window, index, forces, reach, by_search(orbit, window, forces, reach))
+        second = independent_approach(orbit, window, index, forces, reach)
     contact = first_contact_of(chosen, window, index, body)
     when = chosen.t if contact is None else contact[0]
     errors = approach_errors(orbit, beside, window, chosen, second, first, when)

@@ -9,7 +9,7 @@ from typing import Protocol
 import numpy as np
 
 from flybystab.constants import HOUR
-from flybystab.errors import NoEncounter
+from flybystab.errors import NoEncounter, NotConverged
 from flybystab.orbit.closest_approach import (
     STATE,
     TIME,
@@ -23,7 +23,7 @@ from flybystab.orbit.closest_approach import (
 from flybystab.orbit.ephemeris import BODIES, Window
 from flybystab.orbit.epochs import later, seconds
 from flybystab.orbit.forces import model
-from flybystab.orbit.ias15 import EPSILON, Flight
+from flybystab.orbit.ias15 import EPSILON, TIGHT, Flight
 from flybystab.orbit.kepler import time_at_distance
 from flybystab.orbit.nongravitational import NONE
 from flybystab.orbit.orbit import Orbit
@@ -77,10 +77,10 @@ class Motion(Protocol):
 Integrator = Callable[[float, Array], Motion]
 
 
-def by_rebound(orbit: Orbit, window: Window, forces: tuple[str, ...]) -> Integrator:
+def by_rebound(orbit: Orbit, window: Window, forces: tuple[str, ...], epsilon: float = EPSILON) -> Integrator:
     """Integration by rebound with the ephemeris itself."""
     flat = model(window, forces, orbit.nongrav)
-    return lambda t, state: Flight(flat, t, state, EPSILON)
+    return lambda t, state: Flight(flat, t, state, epsilon)
 
 
 def by_search(orbit: Orbit, window: Window, forces: tuple[str, ...], reach: float) -> Integrator:
@@ -116,6 +116,19 @@ def approach_near(
     again = fly(log[step, TIME], log[step, STATE])
     t, state = periapsis_time(relative_to(again, window, index), t)
     return Approach(t, state, log, forces)
+
+
+def independent_approach(
+    orbit: Orbit, window: Window, index: int, forces: tuple[str, ...], reach: float
+) -> Approach | None:
+    """:func:`approach_near` by the integrator of the search.
+
+    Where its step size collapses, as on a path through the centre of the Sun, by rebound with a smaller tolerance.
+    """
+    try:
+        return approach_near(orbit, window, index, forces, reach, by_search(orbit, window, forces, reach))
+    except NotConverged:
+        return approach_near(orbit, window, index, forces, reach, by_rebound(orbit, window, forces, TIGHT))
 
 
 def path_between(log: Array, start: float, stop: float) -> tuple[Array, Array]:
