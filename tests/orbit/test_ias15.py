@@ -9,13 +9,16 @@ import pytest
 from astropy.time import Time
 from reference import need_ephemeris, sbdb_orbit
 
+from flybystab.catalogues.asteroid import Asteroid
 from flybystab.constants import DAY
 from flybystab.encounter.encounter import Encounter
 from flybystab.errors import Impact, InaccurateOrbit
 from flybystab.orbit.barycentre import barycentre_in
 from flybystab.orbit.ephemeris import BELT, BODIES, body_state
 from flybystab.orbit.epochs import later
+from flybystab.orbit.forces import acceleration, model, with_law
 from flybystab.orbit.ias15 import TIGHT
+from flybystab.orbit.nongravitational import NonGravitational
 from flybystab.orbit.orbit import Orbit
 from flybystab.orbit.search.encounter_finder import find_encounters
 
@@ -117,3 +120,26 @@ def test_the_length_of_a_search_does_not_move_the_encounter(apophis):
     )
     assert abs((short.distance - long.distance).to_value(u.m)) < 20.0
     assert abs((short.time - long.time).to_value(u.s)) < 0.01
+
+
+def test_places_of_the_bodies_that_are_kept_change_nothing():
+    """The acceleration at times in any order is that of a new model, to the last bit."""
+    orbit = Asteroid.from_catalogue("Apophis").orbit
+    window = need_ephemeris("de421").window(orbit.epoch, 0.0, 100.0 * DAY)
+    names = ("sun point mass", "earth point mass", "ceres point mass", "earth J2")
+    flat = model(window, names)
+    state = orbit.barycentric(window)
+    rng = np.random.default_rng(4)
+    times = rng.uniform(0.0, 90.0 * DAY, 12)
+    kept, fresh = np.empty(3), np.empty(3)
+    for t in (0.0, *rng.choice(times, 200)):
+        acceleration(flat, t, state[:3], state[3:], kept)
+        acceleration(model(window, names), t, state[:3], state[3:], fresh)
+        np.testing.assert_array_equal(kept, fresh)
+    # A model with a law in addition needs the velocity of the Sun, which this one does not.
+    law = NonGravitational((1e-9, 2e-9, 3e-9)).parameters
+    t = 50.0 * DAY
+    acceleration(flat, t, state[:3], state[3:], kept)
+    acceleration(with_law(flat, law), t, state[:3], state[3:], kept)
+    acceleration(with_law(model(window, names), law), t, state[:3], state[3:], fresh)
+    np.testing.assert_array_equal(kept, fresh)

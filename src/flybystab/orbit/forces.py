@@ -102,7 +102,8 @@ class ForceModel(NamedTuple):
 
 
 # A model as one flat array, to which a C callback gets a pointer: its length, three numbers of a log of steps (address,
-# rows, rows written), then the fields of ForceModel in their order.
+# rows, rows written), then the fields of ForceModel in their order, before the last of them (data) the last times at
+# which the bodies were computed: number of the next to be replaced, times, positions and velocities.
 _LENGTH, LOG_ADDRESS, LOG_ROWS, LOG_COUNT, _MOON_RATIO, _RELATIVITY, _OBLATE, _NONGRAVITATIONAL, _LAW = range(
     9
 )
@@ -112,7 +113,13 @@ _USED = _GM + N_ALL
 _INNER = _USED + N_ALL
 _HARMONICS = _INNER + N_ALL
 _POLES = _HARMONICS + 3 * N_BODIES
-_DATA = _POLES + 6 * N_BODIES
+_NEXT = _POLES + 6 * N_BODIES
+_TIMES = _NEXT + 1
+#: Times in a step of IAS15, which iterates: at its start and at seven nodes.
+_KEPT = 8
+_PLACES = _TIMES + _KEPT
+_RATES = _PLACES + 3 * N_ALL * _KEPT
+_DATA = _RATES + 3 * N_BODIES * _KEPT
 
 
 def force_model(window: Window, forces: Iterable[str], nongrav: NonGravitational | None = None) -> ForceModel:
@@ -158,8 +165,10 @@ def force_model(window: Window, forces: Iterable[str], nongrav: NonGravitational
 def model(window: Window, forces: Iterable[str], nongrav: NonGravitational | None = None) -> Array:
     """The named forces as one flat array for :mod:`flybystab.orbit.ias15`; errors as of :func:`force_model`."""
     its = force_model(window, forces, nongrav)
-    out = np.concatenate([np.zeros(_MOON_RATIO), *(np.ravel(field) for field in its)])
+    fields = [np.ravel(field) for field in its]
+    out = np.concatenate([np.zeros(_MOON_RATIO), *fields[:-1], np.zeros(_DATA - _NEXT), fields[-1]])
     out[_LENGTH] = out.size
+    out[_TIMES:_PLACES] = np.nan
     return out
 
 
@@ -168,6 +177,7 @@ def with_law(flat: Array, law: NonGravitationalParameters) -> Array:
     out = np.array(flat)
     out[_NONGRAVITATIONAL] = 1.0
     out[_LAW:_HEAD] = law
+    out[_TIMES:_PLACES] = np.nan  # the velocity of the Sun may not have been computed
     return out
 
 
@@ -185,7 +195,7 @@ def unpacked(flat: Array) -> ForceModel:
         flat[_USED:_INNER],
         flat[_INNER:_HARMONICS],
         flat[_HARMONICS:_POLES].reshape((N_BODIES, 3)),
-        flat[_POLES:_DATA].reshape((N_BODIES, 6)),
+        flat[_POLES:_NEXT].reshape((N_BODIES, 6)),
         flat[_DATA:],
     )
 
@@ -326,11 +336,25 @@ def acceleration_among(
 
 @kernel
 def acceleration(flat: Array, t: float, x: Array, v: Array, out: Array) -> None:
-    """Write into ``out[3]`` the acceleration (m/s2) at ``t`` (s), ``x`` (m), ``v`` (m/s) by a :func:`model`."""
+    """Write into ``out[3]`` the acceleration (m/s2) at ``t`` (s), ``x`` (m), ``v`` (m/s) by a :func:`model`.
+
+    The places of the bodies at the last times are kept in ``flat``.
+    """
     its = unpacked(flat)
-    places = np.empty((N_ALL, 3))
-    rates = np.zeros((N_BODIES, 3))
-    bodies(its, t, places, rates)
+    times = flat[_TIMES:_PLACES]
+    slot = -1
+    for k in range(_KEPT):
+        if times[k] == t:
+            slot = k
+    new = slot < 0
+    if new:
+        slot = int(flat[_NEXT])
+        flat[_NEXT] = (slot + 1) % _KEPT
+        times[slot] = t
+    places = flat[_PLACES:_RATES].reshape((_KEPT, N_ALL, 3))[slot]
+    rates = flat[_RATES:_DATA].reshape((_KEPT, N_BODIES, 3))[slot]
+    if new:
+        bodies(its, t, places, rates)
     acceleration_among(its, t, places, rates, x, v, out)
 
 
