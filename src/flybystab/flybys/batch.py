@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from flybystab.body.body import Body, Material
 from flybystab.core.dynamics import verdict_row as kernels
 from flybystab.core.dynamics.ground import Ground, no_ground
+from flybystab.core.dynamics.rigid_lanes import LANES
 from flybystab.core.dynamics.run import REGIMES, event_log, unpacked_history
 from flybystab.core.dynamics.verdict_row import BODY, ENCOUNTER, NEAR_GROUND, OUTCOME, Encounters, Output
 from flybystab.core.dynamics.workspace import Limits, new_log
@@ -42,6 +43,19 @@ def verdict_rows(
         rows = rows[output.outcomes["verdict"][rows] == kernels.YIELDS]
     if len(rows):
         kernels.verdict_rows(rows, bodies, encounters, limits, required, output)
+
+
+#: Least number of bodies that are followed side by side: the kernels for it are compiled only where this saves time.
+SIDE_BY_SIDE = 4 * LANES
+
+
+def side_by_side(
+    rows: NDArray[np.int64], bodies: NDArray[np.void], encounters: Encounters
+) -> NDArray[np.int64]:
+    """Rows for :func:`flybystab.core.dynamics.lane_rows.lane_rows`: bodies clear of the ground, if there are many."""
+    chosen = bodies[rows]
+    clear = encounters.rows["least"][chosen["encounter"]] > NEAR_GROUND * chosen["axes"][:, 0]
+    return rows[clear] if np.count_nonzero(clear) >= SIDE_BY_SIDE else rows[:0]
 
 
 #: Default step tolerance, with an error of 1e-8 in the shape of the reference cases (``flybystab bench flyby``).

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import TypeVar
 
 import astropy.units as u
@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.body.body import Body, check_settled
-from flybystab.core.dynamics.verdict_row import OUTCOME, Encounters
+from flybystab.core.dynamics.lane_rows import lane_rows
+from flybystab.core.dynamics.verdict_row import OUTCOME, YIELDS, Encounters
 from flybystab.core.dynamics.workspace import Limits
 from flybystab.core.numerics.threads import in_order, worker_count
 from flybystab.core.verdict_codes import FAILED
@@ -19,12 +20,14 @@ from flybystab.encounter.encounter import Encounter
 from flybystab.errors import InvalidInput, NotModelled, UnsettledBody
 from flybystab.flybys.batch import (
     MAX_STEPS,
+    SIDE_BY_SIDE,
     TOLERANCE,
     axis_ratio,
     encounter_records,
     failure_of,
     output_buffers,
     records,
+    side_by_side,
     step_tolerance,
     verdict_rows,
 )
@@ -136,26 +139,43 @@ def _outcomes(
     threads: int,
     progress: Progressing,
 ) -> NDArray[np.void]:
-    """Outcomes (OUTCOME) of the bodies in `rows`; the others are marked as not computed."""
+    """Outcomes (OUTCOME) of the bodies in `rows`; the others are marked as not computed.
+
+    Many bodies are first followed up to yield side by side, in half the time; the outcomes are the same to the bit.
+    """
     out = np.empty(len(bodies), OUTCOME)
     _fail(out)
     limits = Limits(tolerance, max_axis_ratio, MAX_STEPS)
 
-    def part(indices: NDArray[np.int64]) -> None:
+    def together(indices: NDArray[np.int64]) -> None:
+        lane_rows(indices, bodies, encounters, limits, out)
+
+    def singly(indices: NDArray[np.int64]) -> None:
         output = output_buffers(0, 0)._replace(outcomes=out)
         verdict_rows(indices, bodies, encounters, limits, True, output)
 
-    if threads == 1 or len(rows) < 2:
-        if len(rows):
-            part(rows)
-    else:  # rows that flow take longer: more parts than threads
-        parts = min(len(rows), 16 * threads)
-        with progress_bar(progress, len(rows), "flybys") as tick:
-            done = 0
-            for k, _ in enumerate(in_order(part, [rows[k::parts].copy() for k in range(parts)], threads)):
-                done += len(rows[k::parts])
-                tick(done)
+    with progress_bar(progress, len(rows), "flybys") as tick:
+        first = side_by_side(rows, bodies, encounters)
+        done = 0
+        for part in _in_parts(together, first, threads, SIDE_BY_SIDE):
+            done += int(np.count_nonzero(out["verdict"][part] != YIELDS))
+            tick(done)
+        rigid = first[out["verdict"][first] != YIELDS]
+        for part in _in_parts(singly, np.setdiff1d(rows, rigid), threads, 1):
+            done += len(part)
+            tick(done)
     return out
+
+
+def _in_parts(
+    work: Callable[[NDArray[np.int64]], None], rows: NDArray[np.int64], threads: int, least: int
+) -> Iterator[NDArray[np.int64]]:
+    """Call `work` with parts of at least `least` rows, in several threads; yields the parts that are done, in order."""
+    # Rows that flow take longer: more parts than threads.
+    parts = 1 if threads == 1 else max(1, min(len(rows) // least, 16 * threads))
+    pieces = [rows[k::parts].copy() for k in range(parts)] if len(rows) else []
+    for piece, _ in zip(pieces, in_order(work, pieces, threads), strict=True):
+        yield piece
 
 
 def _table(

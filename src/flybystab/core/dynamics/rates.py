@@ -81,20 +81,27 @@ def yield_excess(p: float, norm: float, det: float, volume: float, material: Mat
 
 
 @kernel
-def rigid_excess(
-    t: float, y: Array, par: Parameters, tide: TidePanels, work: Buffers, stress: Array
-) -> tuple[float, float, float, float]:
-    """Yield excess, pressure, deviator norm, unit determinant of a RIGID state; sets ``stress[6]``."""
+def rigid_invariants(
+    t: float, y: Array, rigid: RigidShape, tide: TidePanels, work: Buffers, stress: Array
+) -> tuple[float, float, float]:
+    """Pressure, deviator norm, unit determinant of the stress of a RIGID state; sets ``stress[6]``."""
     kt = work.c[TIDE]
     kb = work.c[OTHER]
     tide_at(tide.tau, tide.start, tide.width, tide.coefficients, t, kt)
     rotated_to_body(y, kt, work.m[W_N], kb)
-    rigid = par.rigid
     s = (rigid.s1, rigid.s2, rigid.s3)
     rigid_load(kb, y[4:7], s, (rigid.g1, rigid.g2, rigid.g3), stress)
-    p, norm, det = deviator(stress, kt)
+    return deviator(stress, kt)
+
+
+@kernel
+def rigid_excess(
+    t: float, y: Array, par: Parameters, tide: TidePanels, work: Buffers, stress: Array
+) -> tuple[float, float, float, float]:
+    """Yield excess, pressure, deviator norm, unit determinant of a RIGID state; sets ``stress[6]``."""
+    p, norm, det = rigid_invariants(t, y, par.rigid, tide, work, stress)
     # The volume of a rigid body is constant.
-    return yield_excess(p, norm, det, rigid_volume(rigid), par.material), p, norm, det
+    return yield_excess(p, norm, det, rigid_volume(par.rigid), par.material), p, norm, det
 
 
 @kernel

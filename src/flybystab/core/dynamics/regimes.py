@@ -290,13 +290,13 @@ def follow(
     else:
         reason = STUCK
     if regime == RIGID:
-        _to_full_state(t, par, tide, ws)
+        to_full_state(t, par, tide, ws)
     copy(ws.y, y, N_FULL)
     return reason, t, regime, peak
 
 
 @kernel
-def _to_full_state(t: float, par: Parameters, tide: TidePanels, ws: Workspace) -> None:
+def to_full_state(t: float, par: Parameters, tide: TidePanels, ws: Workspace) -> None:
     """Turn the RIGID state ``ws.y[:7]`` into the 15-number state of the same body."""
     rigid_excess(t, ws.y, par, tide, ws.work, ws.stress)
     begin_flow(ws.y, par, ws)
@@ -344,6 +344,6 @@ def follow_rigidly(
         log,
     )
     if reason != ONSET:
-        _to_full_state(t, par, tide, ws)
+        to_full_state(t, par, tide, ws)
         copy(ws.y, y, N_FULL)
     return reason, t, peak

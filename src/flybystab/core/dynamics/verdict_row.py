@@ -130,7 +130,7 @@ class Output(NamedTuple):
 
 
 @kernel
-def _equilibrium(body: BodyState, stress: Array) -> bool:
+def in_equilibrium(body: BodyState, stress: Array) -> bool:
     """True if the body is in equilibrium without a tide; writes its stress there, Pa."""
     s1, s2, s3 = body.axes[0] ** 2, body.axes[1] ** 2, body.axes[2] ** 2
     rigid_stress(s1, s2, s3, body.rho, np.pi * G * body.rho, body.omega, np.zeros(6), stress)
@@ -141,7 +141,7 @@ def _equilibrium(body: BodyState, stress: Array) -> bool:
 
 
 @kernel
-def _write_end(
+def write_end(
     body: BodyState,
     end: FinalState,
     holds: bool,
@@ -189,12 +189,12 @@ def _rigid_row(
 ) -> None:
     """`verdict_row` up to yield; for a body that yields only the verdict YIELDS is written."""
     stress = np.empty(6)
-    holds = _equilibrium(body, stress)
+    holds = in_equilibrium(body, stress)
     end = evolve_rigid(body, span, tide, ground, limits, not holds, shape, gradient, log)
     out["verdict"] = YIELDS
     if end.reason != ONSET:
-        _write_end(body, end, holds, stress, out, shape, gradient, log)
-        out["verdict"] = _verdict(end.reason, holds, end.reason == TOUCH or ground.least < 0.0, False)
+        write_end(body, end, holds, stress, out, shape, gradient, log)
+        out["verdict"] = verdict_code(end.reason, holds, end.reason == TOUCH or ground.least < 0.0, False)
 
 
 @inlined
@@ -233,7 +233,7 @@ def verdict_row(
         Times in s.
     """
     stress = np.empty(6)
-    holds = _equilibrium(body, stress)
+    holds = in_equilibrium(body, stress)
     limits = Limits(
         limits.tolerance, max(limits.axis_ratio, 1.001 * body.axes[0] / body.axes[2]), limits.max_steps
     )
@@ -241,7 +241,7 @@ def verdict_row(
     end = evolve(body, span, tide, ground, limits, not holds, np.zeros((3, 3)), shape, gradient, log)
     reason = end.reason
     yielded = log.counts[0]["events"] > 0 and log.events[0]["code"] == ONSET
-    _write_end(body, end, holds, stress, out, shape, gradient, log)
+    write_end(body, end, holds, stress, out, shape, gradient, log)
     if holds and end.regime != RIGID:
         axes = out["axes"]
         rho = body.rho * body.axes[0] * body.axes[1] * body.axes[2] / (axes[0] * axes[1] * axes[2])
@@ -252,11 +252,12 @@ def verdict_row(
         )  # fmt: skip
         out["friction"], out["friction_time"] = second.peak.friction, second.peak.time
         reason = STUCK if second.reason == STUCK else reason
-    out["verdict"] = _verdict(reason, holds, end.reason == TOUCH or ground.least < 0.0, yielded)
+    out["verdict"] = verdict_code(reason, holds, end.reason == TOUCH or ground.least < 0.0, yielded)
 
 
 @kernel
-def _verdict(reason: int, holds: bool, hits: bool, yielded: bool) -> int:
+def verdict_code(reason: int, holds: bool, hits: bool, yielded: bool) -> int:
+    """Verdict of a run that ends for `reason`; `holds` if the body is in equilibrium without a tide."""
     if reason == STUCK:
         return FAILED
     if not holds:
@@ -287,7 +288,7 @@ def _initial(axes: Array, omega: Array, attitude: Array, shape: Array, gradient:
 
 
 @kernel
-def _body(row: Any) -> BodyState:
+def body_of(row: Any) -> BodyState:
     """State record of a row of BODY."""
     return BodyState(
         row["axes"], row["rho"], row["omega"], row["attitude"], row["phi"], row["cohesion"], row["dilatancy"],
@@ -296,7 +297,7 @@ def _body(row: Any) -> BodyState:
 
 
 @kernel
-def _encounter(row: Any, encounters: Encounters) -> tuple[Span, TidePanels, Ground]:
+def encounter_of(row: Any, encounters: Encounters) -> tuple[Span, TidePanels, Ground]:
     """Span, tide and ground of the encounter of a row of BODY."""
     e = encounters.rows[row["encounter"]]
     s = e["tide"]
@@ -332,8 +333,8 @@ def verdict_rows(
     output : Output
     """
     for i in rows:
-        body = _body(bodies[i])
-        span, tide, ground = _encounter(bodies[i], encounters)
+        body = body_of(bodies[i])
+        span, tide, ground = encounter_of(bodies[i], encounters)
         reset(output.log)
         verdict_row(
             body, span, tide, ground, limits, required,
@@ -347,8 +348,8 @@ def rigid_rows(
 ) -> None:
     """`verdict_rows` for the bodies that do not yield; the others have the verdict YIELDS."""
     for i in rows:
-        body = _body(bodies[i])
-        span, tide, ground = _encounter(bodies[i], encounters)
+        body = body_of(bodies[i])
+        span, tide, ground = encounter_of(bodies[i], encounters)
         reset(output.log)
         _rigid_row(
             body, span, tide, ground, limits, output.outcomes[i], output.shape, output.gradient, output.log

@@ -45,7 +45,7 @@ COUNTS = np.dtype([("rows", "i8"), ("events", "i8"), ("steps", "i8"), ("rejected
 #: Samples in a step: rows of the history, and the grid of the search for extrema of the yield function in rigid motion.
 N_SAMPLE = 4
 
-#: Intervals of rigid motion that may hold the largest mobilised friction, kept until the end of the motion.
+#: Steps of rigid motion that may hold the largest mobilised friction, kept until the end of the motion.
 N_SUMMITS = 8
 
 #: Rate of strain, in dynamical units, below which the body counts as at rest.
@@ -107,7 +107,7 @@ class Workspace(NamedTuple):
     inner_rate: Array  # flow: rate at a point inside a step
     ends: Array  # flow: event functions (rows) at the samples of a step, and last
     stages: Array  # flow: least and largest event functions (rows) over the stages of a step
-    summits: Array  # rigid, of `N_SUMMITS` intervals: bound of the friction, time and length of the step, fractions
+    summits: Array  # rigid, of `N_SUMMITS` steps: bound of the friction, time, length, last sample, samples
     summit_states: Array  # the states at the start of these steps
     summit_dense: Array  # their interpolants
 
@@ -145,7 +145,7 @@ def workspace() -> Workspace:
         np.zeros(15),
         np.zeros((4, N_SAMPLE + 2)),
         np.zeros((4, 2)),
-        np.zeros((N_SUMMITS, 5)),
+        np.zeros((N_SUMMITS, 5 + N_SAMPLE)),
         np.zeros((N_SUMMITS, 7)),
         np.zeros((N_SUMMITS, 7, 7)),
     )

@@ -361,21 +361,47 @@ def required_friction(surface: int, cohesion: float, s: float, p: float, det: fl
         return high
     if kind == HEXAGON:
         theta = lode_angle(det)
-        a = SQRT2 * p + s * np.sin(theta) / SQRT3
-        b = SQRT2 * cohesion
-        c = s * np.cos(theta)
-    else:
-        a = 2.0 * SQRT6 * p + _CONE[surface] * s
-        b = 2.0 * SQRT6 * cohesion
-        c = 3.0 * s
+        return _hexagon_friction(cohesion, s, p, np.sin(theta), np.cos(theta))
+    return _least_angle(2.0 * SQRT6 * p + _CONE[surface] * s, 2.0 * SQRT6 * cohesion, 3.0 * s)
+
+
+@kernel
+def _hexagon_friction(cohesion: float, s: float, p: float, sin: float, cos: float) -> float:
+    """`required_friction` of Mohr-Coulomb at the Lode angle with this sine and cosine, for ``s > 0``."""
+    return _least_angle(SQRT2 * p + s * sin / SQRT3, SQRT2 * cohesion, s * cos)
+
+
+@kernel
+def _least_angle(a: float, b: float, c: float) -> float:
+    """Least ``phi >= 0`` with ``a sin(phi) + b cos(phi) >= c``; inf if there is none below 90 deg."""
     if c <= b:
         return 0.0
+    if b == 0.0:
+        return np.arcsin(c / a) if a > 0.0 and c < a else np.inf
     r = np.hypot(a, b)
     if a <= 0.0 or c > r:  # a <= 0: the left side falls from b < c as phi grows
         return np.inf
     # r sin(phi + psi) = c, psi = atan2(b, a): the smaller root
     phi = np.arcsin(c / r) - np.arctan2(b, a)
     return phi if phi < 0.5 * np.pi else np.inf
+
+
+@kernel
+def excess_and_friction(
+    surface: int, sin_phi: float, strength: float, cohesion: float, s: float, p: float, det: float
+) -> tuple[float, float]:
+    """Yield excess ``s - k/sin(phi) strength``, and `required_friction`; the trigonometry of both is done once.
+
+    `strength` is ``p sin(phi) + Y cos(phi)``.
+    """
+    if s > 0.0 and family(surface) == HEXAGON:
+        theta = lode_angle(det)
+        sin, cos = np.sin(theta), np.cos(theta)
+        excess = s - SQRT2 / (cos - sin * sin_phi / SQRT3) * strength
+        return excess, _hexagon_friction(cohesion, s, p, sin, cos)
+    return s - slope_over_sine(surface, sin_phi, det) * strength, required_friction(
+        surface, cohesion, s, p, det
+    )
 
 
 @kernel

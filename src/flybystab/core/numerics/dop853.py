@@ -43,7 +43,7 @@ def coefficients() -> Any:
     return a, np.concatenate([DOP853.C, [1.0], DOP853.C_EXTRA]), DOP853.E3, DOP853.E5, DOP853.D
 
 
-_A, NODE, _E3, _E5, _D = (np.ascontiguousarray(table) for table in coefficients())
+_A, NODE, E3, E5, D = (np.ascontiguousarray(table) for table in coefficients())
 # Rows of the tableau without their zeros (a third of it): row s combines the stages STAGE[FROM[s] : FROM[s + 1]]. Row
 # 12 gives the solution, rows 13 to 15 the stages of the dense output. NODE has their nodes.
 STAGE = np.concatenate([np.flatnonzero(row) for row in _A])
@@ -74,8 +74,8 @@ def error_sums(n: int, k: Array, scale: Array) -> tuple[float, float]:
         e5 = 0.0
         e3 = 0.0
         for i in range(N_STAGES + 1):
-            e5 += _E5[i] * k[i, j]
-            e3 += _E3[i] * k[i, j]
+            e5 += E5[i] * k[i, j]
+            e3 += E3[i] * k[i, j]
         five += (e5 / scale[j]) ** 2
         three += (e3 / scale[j]) ** 2
     return five, three
@@ -100,7 +100,7 @@ def dense_coefficients(y: Array, y1: Array, n: int, h: float, k: Array, dense: A
         for r in range(N_POWERS - 3):
             total = 0.0
             for j in range(N_EXTENDED):
-                total += _D[r, j] * k[j, i]
+                total += D[r, j] * k[j, i]
             dense[3 + r, i] = h * total
 
 
