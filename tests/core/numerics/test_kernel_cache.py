@@ -5,6 +5,8 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 from flybystab.core.numerics import kernel_cache
 from flybystab.core.numerics.kernel_cache import ROOT, imports, sources
 
@@ -76,6 +78,27 @@ def test_a_changed_callee_is_seen(tmp_path):
     assert run() == ["21.0", "1"]
     (package / "values.py").write_text("FACTOR = 3.0\n")
     assert run() == ["31.0", "0"]
+
+
+@pytest.mark.parametrize("suffix", ["nbi", "nbc"])
+def test_damaged_files_are_compiled_anew(tmp_path, suffix):
+    """Cut off anywhere, empty, or with other bytes at the start: the right number, and then the cache again."""
+    _, run = small_package(tmp_path)
+    assert run() == ["21.0", "0"]
+    (file,) = tmp_path.rglob(f"outer*.{suffix}")
+    whole = file.read_bytes()
+    for text in (
+        b"",
+        whole[:1],
+        whole[:20],
+        whole[: len(whole) // 2],
+        whole[:-1],
+        b"\n\x00" + whole,
+        whole[60:],
+    ):
+        file.write_bytes(text)
+        assert run() == ["21.0", "0"], text[:20]
+        assert run() == ["21.0", "1"]
 
 
 def test_installations_share_a_folder(tmp_path):

@@ -3,7 +3,8 @@
 numba keeps a kernel until the file that defines it changes. A kernel also contains the kernels that it calls, with
 their constants, from other files: after an update of the package, code of the previous version could run. Here the
 stamp of a kernel of this package is the digest of all files from which it is compiled. An index of kernels, also of
-other packages, that names a class of this package which no longer exists counts as out of date, too.
+other packages, that names a class of this package which no longer exists counts as out of date, too. Files of this
+package that are damaged (cut off, or changed by something else) are written anew.
 
 The environment variable FLYBYSTAB_KERNELS names a folder in which installations share their kernels: there a kernel is
 found by its stamp, not by the place of its source. numba itself loads a kernel only with the version that compiled it
@@ -14,6 +15,7 @@ from __future__ import annotations
 
 import hashlib
 import os
+import pickle
 import re
 import shutil
 from functools import cache
@@ -145,19 +147,41 @@ class _Shared(InTreeCacheLocator):
             shutil.rmtree(old, ignore_errors=True)
 
 
+def _is_own(cache_file: Any) -> bool:
+    """True for kernels of this package: they have a `stamp`, those of others a tuple."""
+    return isinstance(cache_file._source_stamp, str)
+
+
 def _load_index(cache_file: Any) -> dict[Any, Any]:
-    """The kernels in an index file; none where it names a class of this package that no longer exists."""
+    """The kernels in an index file; none where it is damaged, or names a class of this package that is gone."""
     try:
         return _load(cache_file)
     except (AttributeError, ImportError) as error:
-        # kernels of this package have a `stamp`, those of others, which may have its classes as arguments, a tuple
-        if isinstance(cache_file._source_stamp, str) or ROOT.name in str(error):
+        # Kernels of others may have classes of this package as arguments.
+        if _is_own(cache_file) or ROOT.name in str(error):
+            return {}
+        raise
+    except _DAMAGED:
+        if _is_own(cache_file):
             return {}
         raise
 
 
+def _load_data(cache_file: Any, name: str) -> Any:
+    """A kernel; one whose file is damaged counts as unreadable, and is compiled anew."""
+    try:
+        return _data(cache_file, name)
+    except (AttributeError, ImportError, *_DAMAGED) as error:
+        if _is_own(cache_file):
+            raise OSError(f"{name} is damaged") from error
+        raise
+
+
+#: Errors of reading a file that is cut off or has been changed.
+_DAMAGED = (pickle.UnpicklingError, EOFError, ValueError, KeyError, IndexError, TypeError, MemoryError)
+
 _index: Any = IndexDataCacheFile
-_load = _index._load_index
+_load, _data = _index._load_index, _index._load_data
 
 
 def watch() -> None:
@@ -165,4 +189,4 @@ def watch() -> None:
     locators: list[Any] = FunctionCache._impl_class._locator_classes
     if not any(c.__name__.startswith("Stamped") for c in locators):
         locators[:0] = [_stamped(c) for c in (_Shared, *locators)]
-        _index._load_index = _load_index
+        _index._load_index, _index._load_data = _load_index, _load_data
