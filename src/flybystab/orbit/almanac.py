@@ -18,7 +18,7 @@ from astropy.time import Time
 from numpy.polynomial import chebyshev
 
 from flybystab.constants import AU, DAY
-from flybystab.core.numerics.jit import pasted_kernel
+from flybystab.core.numerics.jit import inlined
 from flybystab.core.numerics.lanes import N_LANES, lanes_at, put_lanes
 from flybystab.orbit.ephemeris import (
     BELT,
@@ -187,7 +187,7 @@ def _write_heavy(window: Window, times: Array, out: Array) -> None:
         out[:, 9 * N_HEAVY + slot] = potential
 
 
-@pasted_kernel
+@inlined
 def _piece(when: Array, t: float) -> tuple[int, float]:
     """Number of the piece at `t` and the argument -1...1 in it."""
     s = (t - when[_START]) * when[_PER_SECOND]
@@ -195,13 +195,13 @@ def _piece(when: Array, t: float) -> tuple[int, float]:
     return i, 2.0 * (s - i) - 1.0
 
 
-@pasted_kernel
+@inlined
 def has_belt(book: Almanac) -> bool:
     """True if the massive asteroids are in the almanac."""
     return book.when[BELT_GRID, PIECES] > 0.0
 
 
-@pasted_kernel
+@inlined
 def _cubic(pieces: Array, k: int, step: int, x: float, x2: float) -> Any:
     """Four columns of a polynomial of degree 3, the coefficients of which are at ``k``, ``k + step``, ..."""
     low = lanes_at(pieces, k) + lanes_at(pieces, k + step) * x
@@ -209,7 +209,7 @@ def _cubic(pieces: Array, k: int, step: int, x: float, x2: float) -> Any:
     return low + high * x2
 
 
-@pasted_kernel
+@inlined
 def _find_quartic(when: Array, pieces: Array, t: float, p: Array, columns: int) -> None:
     """Write the columns of a grid of degree 4 at `t`."""
     i, x = _piece(when, t)
@@ -221,7 +221,7 @@ def _find_quartic(when: Array, pieces: Array, t: float, p: Array, columns: int) 
         put_lanes(p, j, value)
 
 
-@pasted_kernel
+@inlined
 def find_places(book: Almanac, t: float, belt: bool, out: Places) -> None:
     """Write the positions of all bodies at ``t`` (s) into ``out``."""
     # Estrin's scheme: its products are independent.
@@ -248,13 +248,13 @@ def find_places(book: Almanac, t: float, belt: bool, out: Places) -> None:
         _find_quartic(book.when[BELT_GRID], book.belt, t, out.belt, C_BELT)
 
 
-@pasted_kernel
+@inlined
 def find_heavy(book: Almanac, t: float, out: Places) -> None:
     """Write the quantities of the heavy bodies for 1PN at ``t`` (s) into ``out``."""
     _find_quartic(book.when[_HEAVY], book.heavy, t, out.heavy, C_HEAVY)
 
 
-@pasted_kernel
+@inlined
 def gather(places: Places, out: Array) -> None:
     """Write the places of ``BODIES`` into ``out[bodies, 3]``, m."""
     for b in range(N_BODIES):

@@ -19,7 +19,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flybystab.constants import AU, DAY
-from flybystab.core.numerics.jit import inlined, kernel, pasted_kernel
+from flybystab.core.numerics.jit import inlined, kernel
 from flybystab.errors import UnknownName
 from flybystab.orbit.ephemeris import (
     BELT,
@@ -242,7 +242,7 @@ def zonal(c2: float, c3: float, c4: float, pole: Array, t: float, r: Array, out:
     out[2] += radial * r[2] + along * pz
 
 
-@pasted_kernel
+@inlined
 def zonal_factors(c2: float, c3: float, c4: float, i: float, s: float) -> tuple[float, float]:
     """Factors (1/s2) of the position (m) and (m/s2) of the pole in the acceleration by J2, J3, J4.
 

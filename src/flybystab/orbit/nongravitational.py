@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flybystab.constants import AU, C_LIGHT, DAY
-from flybystab.core.numerics.jit import kernel, pasted_kernel
+from flybystab.core.numerics.jit import inlined, kernel
 from flybystab.errors import InvalidInput, UnknownName
 from flybystab.orbit.kepler import two_body
 from flybystab.orbit.planets import PLANETS
@@ -129,7 +129,7 @@ class NonGravitational:
         return NonGravitationalParameters(*map(float, (*self.a, *self.constants, self.delay, pressure)))
 
 
-@pasted_kernel
+@inlined
 def parameters_of(row: Array) -> NonGravitationalParameters:
     """The parameters from an array ``row[N_LAW]`` in the order of the fields."""
     return NonGravitationalParameters(
@@ -137,13 +137,13 @@ def parameters_of(row: Array) -> NonGravitationalParameters:
     )
 
 
-@pasted_kernel
+@inlined
 def has_forces(law: NonGravitationalParameters) -> bool:
     """True if A1, A2 or A3 differs from zero."""
     return law.a1 != 0.0 or law.a2 != 0.0 or law.a3 != 0.0
 
 
-@pasted_kernel
+@inlined
 def acts(law: NonGravitationalParameters) -> bool:
     """True if there is any acceleration."""
     return has_forces(law) or law.pressure != 0.0

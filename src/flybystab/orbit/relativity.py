@@ -16,7 +16,7 @@ from __future__ import annotations
 import numpy as np
 
 from flybystab.constants import C_LIGHT
-from flybystab.core.numerics.jit import kernel, pasted_kernel
+from flybystab.core.numerics.jit import inlined, kernel
 from flybystab.orbit.ephemeris import BODIES, N_BODIES
 from flybystab.orbit.planets import PLANETS
 from flybystab.typing import Array
@@ -43,7 +43,7 @@ def among(places: Array, gm: Array, body: int, out: Array) -> float:
     return potential
 
 
-@pasted_kernel
+@inlined
 def of_source(
     gm: float,
     inverse: float,

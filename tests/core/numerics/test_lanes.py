@@ -61,7 +61,22 @@ def test_arithmetic():
     out = np.empty((7, 4))
     arithmetic(A, B, out)
     truth = [A + B, A - B, A * B, A / B, 2.0 - A, A / 4.0, (1.0 + A) * B - 3.0]
-    np.testing.assert_allclose(out, truth, rtol=1e-15)
+    np.testing.assert_array_equal(out, truth)
+
+
+@kernel
+def products(a, b, c, out):
+    for i in range(0, a.size, 4):
+        x, y, z = lanes_at(a, i), lanes_at(b, i), lanes_at(c, i)
+        put_lanes(out, i, ((x * y + z) + x) + y)
+
+
+def test_products_are_rounded_and_sums_are_in_order():
+    """Fused or reordered, the results would depend on the processor and on how a kernel was compiled."""
+    a, b, c = np.random.default_rng(2).normal(size=(3, 400))
+    out = np.empty(400)
+    products(a, b, c, out)
+    np.testing.assert_array_equal(out, ((a * b + c) + a) + b)
 
 
 def test_sums_and_comparisons():
@@ -84,7 +99,8 @@ def test_places_count_in_the_order_of_memory():
 def test_uncompiled_kernels_give_the_same():
     code = (
         "import numpy as np, test_lanes as t\n"
-        "t.test_arithmetic(); t.test_sums_and_comparisons(); t.test_places_count_in_the_order_of_memory()\n"
+        "t.test_arithmetic(); t.test_products_are_rounded_and_sums_are_in_order()\n"
+        "t.test_sums_and_comparisons(); t.test_places_count_in_the_order_of_memory()\n"
         "t.test_inverse_roots_have_their_precision()\n"
         "assert not hasattr(t.row, 'py_func')"
     )

@@ -56,7 +56,15 @@ def interrupted_block(seen):
         seen.append(interrupted())
 
 
-def test_an_interrupt_waits_for_the_end_of_the_block():
+@pytest.fixture
+def usual_interrupts():
+    """Python's handler: a shell that starts the tests in the background lets them ignore SIGINT."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def test_an_interrupt_waits_for_the_end_of_the_block(usual_interrupts):
     seen = []
     with pytest.raises(KeyboardInterrupt):
         interrupted_block(seen)

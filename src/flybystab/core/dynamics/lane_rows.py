@@ -157,6 +157,17 @@ def _borrowed_runs(runs: Runs) -> Runs:
 
 
 @kernel
+def _borrowed_known(known: Known) -> Known:
+    e = known.encounters
+    return Known(
+        borrowed(known.bodies),
+        Encounters(borrowed(e.rows), borrowed(e.tides), borrowed(e.positions)),
+        known.limits,
+        borrowed(known.outcomes),
+    )
+
+
+@kernel
 def _keep_parameters(lane: int, par: Parameters, runs: Runs) -> None:
     """Store the parameters of a run."""
     m, r, p = par.material, par.rigid, runs.parameters[lane]
@@ -262,7 +273,7 @@ def _yields_at(i: int, lane: int, lanes: Lanes, runs: Runs, room: Workspace) -> 
 
 @kernel
 def _take_samples(lanes: Lanes, runs: Runs, room: Workspace) -> None:
-    """Onset function and mobilised friction at the samples of the accepted steps, as `rigid.sample_step`.
+    """Onset function and mobilised friction at the samples of the accepted steps, as `rigid_extrema.sample_step`.
 
     A body that yields at a sample leaves its lane.
     """
@@ -314,38 +325,60 @@ def _end_step(lane: int, known: Known, lanes: Lanes, runs: Runs, room: Workspace
 
 
 @kernel
+def _occupy(
+    lane: int,
+    begun: int,
+    rows: NDArray[np.int64],
+    known: Known,
+    lanes: Lanes,
+    runs: Runs,
+    room: Workspace,
+    log: Log,
+) -> int:
+    """Finish the run of a lane if it has ended, and begin the next ones, until one needs a step.
+
+    Returns the number of rows begun so far, of which `begun` were before.
+    """
+    record = runs.records[lane]
+    while True:
+        if record["row"] >= 0:
+            if record["t"] < record["end"] and record["steps"] < known.limits.max_steps:
+                return begun
+            _finish(lane, STUCK if record["t"] < record["end"] else DONE, known, lanes, runs, room, log)
+            record["row"] = -1
+        if begun == len(rows):
+            return begun
+        row = rows[begun]
+        begun += 1
+        known.outcomes[row]["verdict"] = YIELDS
+        if not _begin(row, lane, known, lanes, runs, room):
+            record["row"] = -1
+
+
+@kernel
+def _prepare_step(lane: int, lanes: Lanes, runs: Runs) -> None:
+    """Set the length of the next step of a body, and the tides at its points."""
+    record = runs.records[lane]
+    record["last"] = record["h"] >= record["end"] - record["t"]
+    if record["last"]:
+        record["h"] = record["end"] - record["t"]
+    record["steps"] += 1
+    set_step(lane, record["t"], record["h"], _tide(lane, runs), lanes)
+
+
+@kernel
 def _follow(
-    rows: NDArray[np.int64], known: Known, lanes_room: Lanes, runs_room: Runs, ws_room: Workspace, log: Log
+    rows: NDArray[np.int64], given: Known, lanes_room: Lanes, runs_room: Runs, ws_room: Workspace, log: Log
 ) -> None:
     """`lane_rows` with its buffers."""
     lanes, runs, room = borrowed_lanes(lanes_room), _borrowed_runs(runs_room), borrowed_workspace(ws_room)
-    limits, outcomes = known.limits, known.outcomes
+    known = _borrowed_known(given)
     begun = 0
     while True:
         for lane in range(LANES):
-            record = runs.records[lane]
-            while True:
-                if record["row"] >= 0:
-                    if not record["t"] < record["end"]:
-                        _finish(lane, DONE, known, lanes, runs, room, log)
-                    elif record["steps"] >= limits.max_steps:
-                        _finish(lane, STUCK, known, lanes, runs, room, log)
-                    else:
-                        break
-                    record["row"] = -1
-                if begun == len(rows):
-                    break
-                row = rows[begun]
-                begun += 1
-                outcomes[row]["verdict"] = YIELDS
-                if not _begin(row, lane, known, lanes, runs, room):
-                    record["row"] = -1
-            if record["row"] >= 0:
-                record["last"] = record["h"] >= record["end"] - record["t"]
-                if record["last"]:
-                    record["h"] = record["end"] - record["t"]
-                record["steps"] += 1
-                set_step(lane, record["t"], record["h"], _tide(lane, runs), lanes)
+            begun = _occupy(lane, begun, rows, known, lanes, runs, room, log)
+            if runs.records[lane]["row"] >= 0:
+                _prepare_step(lane, lanes, runs)
         if runs.records["row"].max() < 0:
             return
         lane_steps(lanes)
@@ -353,7 +386,7 @@ def _follow(
         for lane in range(LANES):
             record = runs.records[lane]
             if record["row"] >= 0:
-                record["error"] = lane_error(lane, record["h"], limits.tolerance, lanes)
+                record["error"] = lane_error(lane, record["h"], known.limits.tolerance, lanes)
                 if record["error"] <= 1.0:
                     accepted = True
                 else:

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from flybystab.core.numerics.jit import pasted_kernel
+from flybystab.core.numerics.jit import inlined
 from flybystab.typing import Array
 
 #: Stages of a step; the rate at its end is one more, and dense output takes three more.
@@ -51,7 +51,7 @@ WEIGHT = _A[_A != 0.0]
 FROM = np.concatenate([[0], np.cumsum([np.count_nonzero(row) for row in _A])])
 
 
-@pasted_kernel
+@inlined
 def stage_state(s: int, y: Array, n: int, h: float, k: Array, out: Array) -> None:
     """Write the state ``out[n]`` at which the rate of stage `s` is taken (the solution for ``s = 12``)."""
     for i in range(n):
@@ -65,7 +65,7 @@ def stage_state(s: int, y: Array, n: int, h: float, k: Array, out: Array) -> Non
         out[i] = y[i] + h * out[i]
 
 
-@pasted_kernel
+@inlined
 def error_sums(n: int, k: Array, scale: Array) -> tuple[float, float]:
     """Sums of squares of the error estimates of order 5 and 3, over ``scale[n]``, from the rates ``k[13, n]``."""
     five = 0.0
@@ -81,7 +81,7 @@ def error_sums(n: int, k: Array, scale: Array) -> tuple[float, float]:
     return five, three
 
 
-@pasted_kernel
+@inlined
 def error_norm(five: float, three: float, n: int, h: float) -> float:
     """Error of a step of `n` numbers from the sums of `error_sums`."""
     if five == 0.0 and three == 0.0:
@@ -89,7 +89,7 @@ def error_norm(five: float, three: float, n: int, h: float) -> float:
     return abs(h) * five / np.sqrt((five + 0.01 * three) * n)
 
 
-@pasted_kernel
+@inlined
 def dense_coefficients(y: Array, y1: Array, n: int, h: float, k: Array, dense: Array) -> None:
     """Write the interpolant ``dense[7, n]`` of a step from `y` to `y1` with the rates ``k[16, n]``."""
     for i in range(n):
@@ -104,7 +104,7 @@ def dense_coefficients(y: Array, y1: Array, n: int, h: float, k: Array, dense: A
             dense[3 + r, i] = h * total
 
 
-@pasted_kernel
+@inlined
 def dense_state(x: float, y: Array, n: int, dense: Array, out: Array) -> None:
     """State ``out[n]`` at the fraction ``x`` of a step with the interpolant `dense`."""
     for i in range(n):

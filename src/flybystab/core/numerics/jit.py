@@ -2,12 +2,13 @@
 
 ``kernel`` is ``numba.njit`` with the on-disk cache, without the GIL and with IEEE division (a zero
 divisor gives inf or nan, which the callers test for, instead of an exception inside a kernel).
-``fastmath`` stays off: compensated sums and sign tests rely on the order of operations. ``summing_kernel`` is for
-the few inner loops that are plain sums: there the compiler may reorder additions and fuse products, which lets it
-use vector instructions; infinities and nan are still handled. ``pasted_kernel`` is a kernel that is inlined into its
-callers. A kernel on disk is recompiled when any file from which it is compiled has changed
-(:mod:`flybystab.core.numerics.kernel_cache`). If no folder for the cache is writable (read-only package and home) each
-process compiles for itself.
+``fastmath`` stays off: compensated sums and sign tests rely on the order of operations, and results would depend on
+what the compiler makes of a kernel, which differs between the process that compiles it and those that load it.
+``summing_kernel`` is for the few inner loops that are plain sums and are not merged with others: there the compiler may
+reorder additions and fuse products, which lets it use vector instructions; infinities and nan are still handled.
+``inlined`` is a kernel that becomes part of its callers. A kernel on disk is recompiled when any file from which it is
+compiled has changed (:mod:`flybystab.core.numerics.kernel_cache`). If no folder for the cache is writable (read-only
+package and home) each process compiles for itself.
 """
 
 from __future__ import annotations
@@ -40,12 +41,9 @@ kernel = njit(cache=CACHE, nogil=True, error_model="numpy")
 #: For kernels that are made from others at run time, which numba cannot keep on disk; they become part of the cached
 #: kernels that call them.
 uncached_kernel = njit(nogil=True, error_model="numpy")
-_SUMS: Any = {"fastmath": {"reassoc", "contract", "nsz"}}
-summing_kernel = njit(cache=CACHE, nogil=True, error_model="numpy", **_SUMS)
-# Inlined, since passing a tuple of arrays to a function costs more than the few sums inside it.
-pasted_kernel = njit(cache=CACHE, nogil=True, error_model="numpy", inline="always", **_SUMS)
-
-#: A kernel that becomes part of its callers, so that large kernels which it calls are not compiled once more for it.
+summing_kernel = njit(cache=CACHE, nogil=True, error_model="numpy", fastmath={"reassoc", "contract", "nsz"})
+#: A kernel that becomes part of its callers: large kernels that it calls are not compiled once more for it, and a tuple
+#: of arrays is not passed to it, which costs more than a few sums.
 inlined = njit(cache=CACHE, nogil=True, error_model="numpy", inline="always")
 
 

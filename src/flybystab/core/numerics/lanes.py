@@ -2,8 +2,8 @@
 
 The compiler unrolls loops of four or eight passes before it vectorises loops, and so leaves their square roots and
 divisions scalar. Values of the type here are four floats in one register (two where registers are shorter), with
-``+``, ``-``, ``*``, ``/`` among themselves and with floats. As in ``summing_kernel`` the compiler may reorder sums and
-fuse products. Uncompiled kernels use arrays of shape (4,) instead.
+``+``, ``-``, ``*``, ``/`` among themselves and with floats. The operations are those of single numbers, in the order
+written, with the same results on any processor. Uncompiled kernels use arrays of shape (4,) instead.
 """
 
 from __future__ import annotations
@@ -21,13 +21,12 @@ from numba.core.typing.templates import AbstractTemplate, infer_global, signatur
 from numba.extending import intrinsic, models, register_model
 from numba.np.arrayobj import make_array
 
-from flybystab.core.numerics.jit import pasted_kernel
+from flybystab.core.numerics.jit import inlined
 
 #: Numbers in a value.
 N_LANES = 4
 _DOUBLES = ir.VectorType(ir.DoubleType(), N_LANES)
 _SINGLES = ir.VectorType(ir.FloatType(), N_LANES)
-_FLAGS = ("reassoc", "contract", "nsz")
 
 
 class LanesType(types.Type):
@@ -69,7 +68,7 @@ def _define(operations: tuple[Any, ...], instruction: str) -> None:
 
     def generate(context: Any, builder: Any, sig: Any, args: Any) -> Any:
         both = [a if t == _lanes else _broadcast(builder, a) for a, t in zip(args, sig.args, strict=True)]
-        return getattr(builder, instruction)(*both, flags=_FLAGS)
+        return getattr(builder, instruction)(*both)
 
     for operation in operations:
         infer_global(operation)(Operation)
@@ -151,7 +150,7 @@ def total(typing: Any, value: Any) -> Any:
         (a,) = args
         for swap in ([2, 3, 0, 1], [1, 0, 3, 2]):
             mask = ir.Constant(ir.VectorType(ir.IntType(32), N_LANES), swap)
-            a = builder.fadd(a, builder.shuffle_vector(a, a, mask), flags=_FLAGS)
+            a = builder.fadd(a, builder.shuffle_vector(a, a, mask))
         return builder.extract_element(a, ir.Constant(ir.IntType(32), 0))
 
     return types.float64(_lanes), generate
@@ -194,7 +193,7 @@ def any_less(typing: Any, a: Any, b: Any) -> Any:
     return types.boolean(_lanes, _lanes), generate
 
 
-@pasted_kernel
+@inlined
 def inverse_root(value: Any) -> Any:
     """Inverse square root: that of single precision after one step of Halley's method, of third order."""
     q = inverse_root_24(value)

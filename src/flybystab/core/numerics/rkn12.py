@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from flybystab.core.numerics.jit import pasted_kernel
+from flybystab.core.numerics.jit import inlined
 from flybystab.core.numerics.lanes import lane, lanes_at, spread
 from flybystab.typing import Array
 
@@ -110,7 +110,7 @@ IN_POSITION, IN_VELOCITY = POSITION[_USED], VELOCITY[_USED]
 FROM = np.concatenate([[0], np.cumsum(_USED.sum(axis=1))])
 
 
-@pasted_kernel
+@inlined
 def stage_state(s: int, y: Array, h: float, k: Array, out: Array) -> None:
     """Write position and velocity ``out[6]`` of stage `s`; those at the end of the step for ``s = 17``.
 
@@ -128,7 +128,7 @@ def stage_state(s: int, y: Array, h: float, k: Array, out: Array) -> None:
         out[3 + j] = y[3 + j] + h * lane(v, j + 1)
 
 
-@pasted_kernel
+@inlined
 def step_error(h: float, k: Array, length: float, speed: float) -> float:
     """Estimated error of a step: root mean square of its six components in units of `length` (m) and `speed` (m/s)."""
     x, v = spread(0.0), spread(0.0)

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.constants import C_LIGHT
-from flybystab.core.numerics.jit import borrowed, inlined, kernel, pasted_kernel
+from flybystab.core.numerics.jit import borrowed, inlined, kernel
 from flybystab.core.numerics.lanes import (
     N_LANES,
     any_less,
@@ -190,7 +190,7 @@ def borrowed_field(f: Field) -> Field:
     )
 
 
-@pasted_kernel
+@inlined
 def _pull(
     p: Array, slots: int, gm: Array, inner: Array, x: float, y: float, z: float
 ) -> tuple[Any, Any, Any, Any, bool]:
@@ -217,7 +217,7 @@ def _pull(
     return ax, ay, az, potential, inside
 
 
-@pasted_kernel
+@inlined
 def _pull_of_asteroids(p: Array, gm: Array, x: float, y: float, z: float) -> tuple[Any, Any, Any]:
     """Newtonian acceleration by the massive asteroids (m/s2) to 24 bits, which is 1e-16 of that by the Sun."""
     ax, ay, az = spread(0.0), spread(0.0), spread(0.0)
@@ -246,7 +246,7 @@ def _pull_inside(p: Array, slots: int, gm: Array, inner: Array, x: Array, out: A
             out[5] += c * dz
 
 
-@pasted_kernel
+@inlined
 def heliocentric(y: Array, places: Places, r: Array, v: Array) -> None:
     """Write position ``r[3]`` (m) and velocity ``v[3]`` (m/s) relative to the Sun."""
     for j in range(3):
@@ -263,7 +263,7 @@ def _add_nongravitational(law: NonGravitationalParameters, y: Array, places: Pla
     add_nongravitational(law, r, v, out[3:])
 
 
-@pasted_kernel
+@inlined
 def _oblate_pull(
     field: Field, t: float, places: Places, x: float, y: float, z: float, ax: float, ay: float, az: float
 ) -> tuple[float, float, float]:
@@ -293,7 +293,7 @@ def _oblate_pull(
     return ax, ay, az
 
 
-@pasted_kernel
+@inlined
 def _relativistic_sources(
     field: Field,
     places: Places,
@@ -355,7 +355,7 @@ def _relativistic_sources(
     return ex, ey, ez
 
 
-@pasted_kernel
+@inlined
 def find_all_places(field: Field, t: float, places: Places) -> None:
     """Write the positions of all bodies at ``t`` (s) and, with 1PN, the quantities of its sources into ``places``."""
     find_places(field.book, t, has_belt(field.book), places)
@@ -363,7 +363,7 @@ def find_all_places(field: Field, t: float, places: Places) -> None:
         find_heavy(field.book, t, places)
 
 
-@pasted_kernel
+@inlined
 def rate_among(
     field: Field, law: NonGravitationalParameters, t: float, y: Array, places: Places, out: Array
 ) -> None:
@@ -396,7 +396,7 @@ def rate_among(
         _add_nongravitational(law, y, places, out)
 
 
-@pasted_kernel
+@inlined
 def rate(
     field: Field, law: NonGravitationalParameters, t: float, y: Array, places: Places, out: Array
 ) -> None:

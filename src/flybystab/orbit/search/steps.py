@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from flybystab.constants import DAY
-from flybystab.core.numerics.jit import borrowed, kernel, pasted_kernel, summing_kernel
+from flybystab.core.numerics.jit import borrowed, inlined, kernel
 from flybystab.core.numerics.rkn12 import ERROR_ORDER, N_STAGES, NODE, stage_state, step_error
 from flybystab.orbit.almanac import N_SLOW, SLOT, Places
 from flybystab.orbit.ephemeris import SUN
@@ -69,7 +69,7 @@ def borrowed_room(room: Room) -> Room:
     )
 
 
-@summing_kernel
+@kernel
 def step(
     field: Field,
     law: NonGravitationalParameters,
@@ -95,7 +95,7 @@ def step(
     return step_error(h, k, _LENGTH, _SPEED)
 
 
-@pasted_kernel
+@inlined
 def _middles(y: Array, new: Array, room: Room, length: float, ahead: float) -> tuple[float, float]:
     """Distances from the Sun to the power 3/2 in the middle of the last step and of the next, of `ahead` s."""
     k, sun = room.k, room.places.slow
@@ -109,7 +109,7 @@ def _middles(y: Array, new: Array, room: Room, length: float, ahead: float) -> t
     return here**0.75, there**0.75
 
 
-@pasted_kernel
+@inlined
 def advance(
     field: Field,
     law: NonGravitationalParameters,
