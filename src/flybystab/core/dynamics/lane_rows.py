@@ -76,7 +76,7 @@ from flybystab.core.dynamics.workspace import (
 from flybystab.core.ellipsoid.tide import TidePanels
 from flybystab.core.material.parameters import MaterialParameters
 from flybystab.core.numerics.dop853 import N_POWERS
-from flybystab.core.numerics.jit import borrowed, code, kernel
+from flybystab.core.numerics.jit import borrowed, code, inlined, kernel
 from flybystab.typing import Array
 
 _NO_ROWS, _ONE = code(0), code(1)
@@ -324,6 +324,13 @@ def _end_step(lane: int, known: Known, lanes: Lanes, runs: Runs, room: Workspace
     return True
 
 
+@inlined
+def _needs_step(lane: int, known: Known, runs: Runs) -> bool:
+    """True if a lane has a body whose run has not ended."""
+    record = runs.records[lane]
+    return record["row"] >= 0 and record["t"] < record["end"] and record["steps"] < known.limits.max_steps
+
+
 @kernel
 def _occupy(
     lane: int,
@@ -335,14 +342,14 @@ def _occupy(
     room: Workspace,
     log: Log,
 ) -> int:
-    """Finish the run of a lane if it has ended, and begin the next ones, until one needs a step.
+    """Finish the run of a lane, if it has one, and begin the next ones until one needs a step.
 
     Returns the number of rows begun so far, of which `begun` were before.
     """
     record = runs.records[lane]
     while True:
         if record["row"] >= 0:
-            if record["t"] < record["end"] and record["steps"] < known.limits.max_steps:
+            if _needs_step(lane, known, runs):
                 return begun
             _finish(lane, STUCK if record["t"] < record["end"] else DONE, known, lanes, runs, room, log)
             record["row"] = -1
@@ -355,7 +362,7 @@ def _occupy(
             record["row"] = -1
 
 
-@kernel
+@inlined
 def _prepare_step(lane: int, lanes: Lanes, runs: Runs) -> None:
     """Set the length of the next step of a body, and the tides at its points."""
     record = runs.records[lane]
@@ -376,7 +383,8 @@ def _follow(
     begun = 0
     while True:
         for lane in range(LANES):
-            begun = _occupy(lane, begun, rows, known, lanes, runs, room, log)
+            if not _needs_step(lane, known, runs):
+                begun = _occupy(lane, begun, rows, known, lanes, runs, room, log)
             if runs.records[lane]["row"] >= 0:
                 _prepare_step(lane, lanes, runs)
         if runs.records["row"].max() < 0:
