@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from flybystab.body.body import Body, Material
 from flybystab.core.dynamics import verdict_row as kernels
 from flybystab.core.dynamics.ground import Ground, no_ground
+from flybystab.core.dynamics.lane_rows import lane_rows
 from flybystab.core.dynamics.rigid_lanes import LANES
 from flybystab.core.dynamics.run import REGIMES, event_log, unpacked_history
 from flybystab.core.dynamics.verdict_row import BODY, ENCOUNTER, NEAR_GROUND, OUTCOME, Encounters, Output
@@ -20,6 +21,7 @@ from flybystab.core.verdict_codes import FAILED
 from flybystab.encounter.encounter import Encounter
 from flybystab.encounter.reach import TAIL
 from flybystab.errors import InvalidInput
+from flybystab.flybys.precompile import on_disk
 from flybystab.flybys.verdict import Verdict, verdict_of
 from flybystab.typing import Array
 from flybystab.units import to_si
@@ -45,17 +47,28 @@ def verdict_rows(
         kernels.verdict_rows(rows, bodies, encounters, limits, required, output)
 
 
-#: Least number of bodies that are followed side by side: the kernels for it are compiled only where this saves time.
+#: Least number of bodies that are followed side by side.
 SIDE_BY_SIDE = 4 * LANES
+#: Where the kernels for that are not on the disk, a process compiles them after this number of bodies.
+WORTH_COMPILING = 1000
+_one_by_one = 0
 
 
 def side_by_side(
     rows: NDArray[np.int64], bodies: NDArray[np.void], encounters: Encounters
 ) -> NDArray[np.int64]:
     """Rows for :func:`flybystab.core.dynamics.lane_rows.lane_rows`: bodies clear of the ground, if there are many."""
+    global _one_by_one
     chosen = bodies[rows]
     clear = encounters.rows["least"][chosen["encounter"]] > NEAR_GROUND * chosen["axes"][:, 0]
-    return rows[clear] if np.count_nonzero(clear) >= SIDE_BY_SIDE else rows[:0]
+    count = int(np.count_nonzero(clear))
+    if count < SIDE_BY_SIDE:
+        return rows[:0]
+    if not (getattr(lane_rows, "overloads", True) or on_disk(lane_rows)):
+        _one_by_one += count
+        if _one_by_one < WORTH_COMPILING:
+            return rows[:0]
+    return rows[clear]
 
 
 #: Default step tolerance, with an error of 1e-8 in the shape of the reference cases (``flybystab bench flyby``).

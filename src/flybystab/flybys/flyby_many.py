@@ -141,7 +141,7 @@ def _outcomes(
 ) -> NDArray[np.void]:
     """Outcomes (OUTCOME) of the bodies in `rows`; the others are marked as not computed.
 
-    Many bodies are first followed up to yield side by side, in half the time; the outcomes are the same to the bit.
+    Many bodies are first followed up to yield side by side, in half the time and with the same outcomes bit for bit.
     """
     out = np.empty(len(bodies), OUTCOME)
     _fail(out)

@@ -10,7 +10,7 @@ from contextlib import nullcontext
 from dataclasses import dataclass, field
 from itertools import islice
 from pickle import PickleError
-from typing import Any, NamedTuple, ParamSpec, Protocol, TypeVar
+from typing import Any, NamedTuple, ParamSpec, Protocol, TypeGuard, TypeVar
 
 from flybystab.catalogues.catalogue import Asteroid
 from flybystab.core.numerics.threads import first_completed, interrupts_deferred
@@ -270,15 +270,15 @@ class _Schedule:
         out: list[tuple[int, list[CloseApproach]]] = []
         while self.found and len(out) < self.chunk:
             position, found = self.found.popleft()
-            if isinstance(found, dict) or not found:
-                self.aside.append((position, found))
-            else:
+            if _has_encounters(found):
                 out.append((position, found))
+            else:
+                self.aside.append((position, found))
         return out
 
     def finished(self) -> Iterator[tuple[int, Rows]]:
         """Positions and rows of the next asteroids that have failed or have no encounters, in order."""
-        while self.aside or (self.found and (isinstance(self.found[0][1], dict) or not self.found[0][1])):
+        while self.aside or (self.found and not _has_encounters(self.found[0][1])):
             position, found = (self.aside or self.found).popleft()
             yield position, found if isinstance(found, dict) else joined([], self.settings)
 
@@ -360,6 +360,11 @@ def _is_loss(error: Exception) -> bool:
 
 #: Raised where a worker has no flybystab or another version of it; dask reports them as RuntimeError.
 _DESERIALISATION = (ImportError, AttributeError, PickleError, RuntimeError)
+
+
+def _has_encounters(found: list[CloseApproach] | Rows) -> TypeGuard[list[CloseApproach]]:
+    """False if the search for an asteroid has failed or found no encounters."""
+    return not isinstance(found, dict) and bool(found)
 
 
 def _positions(call: _Call) -> list[int]:

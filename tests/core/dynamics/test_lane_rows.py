@@ -1,5 +1,7 @@
 """Rigid bodies side by side: every number is that of the body alone."""
 
+from types import SimpleNamespace
+
 import astropy.units as u
 import numpy as np
 import pytest
@@ -14,6 +16,7 @@ from flybystab.core.ellipsoid.tide import no_tide, tide_at
 from flybystab.core.material import surfaces
 from flybystab.core.verdict_codes import FAILED, INTACT, NOT_IN_EQUILIBRIUM
 from flybystab.encounter.encounter import Encounter
+from flybystab.flybys import batch
 from flybystab.flybys.batch import MAX_STEPS, SIDE_BY_SIDE, encounter_records, output_buffers, side_by_side
 from flybystab.flybys.flyby import flyby
 from flybystab.flybys.flyby_many import flyby_many
@@ -142,7 +145,21 @@ def test_flyby_many_is_the_same_as_one_by_one():
             np.testing.assert_array_equal(table.semi_axes[i], alone.semi_axes)
 
 
-def test_bodies_near_the_ground_are_followed_one_by_one():
+def test_the_kernels_are_compiled_after_many_bodies(monkeypatch):
+    """If they are not on the disk: a few hundred bodies do not wait for them."""
+    bodies, met = random_rows(400, seed=9)
+    monkeypatch.setattr(batch, "on_disk", lambda kernel: False)
+    monkeypatch.setattr(batch, "lane_rows", SimpleNamespace(overloads={}))
+    monkeypatch.setattr(batch, "_one_by_one", 0)
+    sizes = [side_by_side(np.arange(400), bodies, met).size for _ in range(4)]
+    assert sizes == [0, 0, 400, 400]
+    monkeypatch.setattr(batch, "_one_by_one", 0)
+    monkeypatch.setattr(batch, "on_disk", lambda kernel: True)
+    assert side_by_side(np.arange(400), bodies, met).size == 400
+
+
+def test_bodies_near_the_ground_are_followed_one_by_one(monkeypatch):
+    monkeypatch.setattr(batch, "on_disk", lambda kernel: True)
     bodies, _ = random_rows(SIDE_BY_SIDE + 2, seed=9)
     met = encounter_records(
         [Encounter.hyperbolic("earth", q * R_earth, 5 * u.km / u.s) for q in (1.001, 3.0)],

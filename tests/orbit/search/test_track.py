@@ -5,14 +5,14 @@ import numpy as np
 from astropy.time import Time
 
 import flybystab as fs
-from flybystab.core.numerics.jit import kernel
+from flybystab.core.numerics.jit import borrowed, kernel
 from flybystab.orbit.forces import FORCES
-from flybystab.orbit.search.steps import borrowed_room, empty_room
+from flybystab.orbit.search.steps import empty_room
 
 
 @kernel
 def marked(room, spare):
-    room, spare = borrowed_room(room), borrowed_room(spare)
+    room, spare = borrowed(room), borrowed(spare)
     more = np.zeros((18, 6))
     room.k[:] = 1.0
     spare.k[:] = 2.0

@@ -38,7 +38,6 @@ from flybystab.core.dynamics.rigid_lanes import (
     PRESSURE,
     Lanes,
     advance,
-    borrowed_lanes,
     empty_lanes,
     lane_error,
     lane_steps,
@@ -67,7 +66,6 @@ from flybystab.core.dynamics.workspace import (
     Log,
     Peak,
     Workspace,
-    borrowed_workspace,
     copy,
     new_log,
     reset,
@@ -144,30 +142,6 @@ def _empty_runs(panels: int, terms: int) -> Runs:
 
 
 @kernel
-def _borrowed_runs(runs: Runs) -> Runs:
-    return Runs(
-        borrowed(runs.records),
-        borrowed(runs.parameters),
-        borrowed(runs.tides),
-        borrowed(runs.samples),
-        borrowed(runs.summits),
-        borrowed(runs.summit_states),
-        borrowed(runs.summit_dense),
-    )
-
-
-@kernel
-def _borrowed_known(known: Known) -> Known:
-    e = known.encounters
-    return Known(
-        borrowed(known.bodies),
-        Encounters(borrowed(e.rows), borrowed(e.tides), borrowed(e.positions)),
-        known.limits,
-        borrowed(known.outcomes),
-    )
-
-
-@kernel
 def _keep_parameters(lane: int, par: Parameters, runs: Runs) -> None:
     """Store the parameters of a run."""
     m, r, p = par.material, par.rigid, runs.parameters[lane]
@@ -193,7 +167,7 @@ def _tide(lane: int, runs: Runs) -> TidePanels:
 
 @kernel
 def _workspace(lane: int, lanes: Lanes, runs: Runs, ws: Workspace) -> Workspace:
-    """The buffers `ws` with the step, the samples and the intervals of the friction of a lane."""
+    """The buffers `ws` with the step, the samples and the stored steps of a lane."""
     for i in range(N_RIGID):
         ws.y[i] = lanes.y[i * LANES + lane]
     for r in range(N_POWERS):
@@ -259,6 +233,12 @@ def _finish(
     out["verdict"] = verdict_code(reason, holds, ground.least < 0.0, False)
 
 
+@inlined
+def _accepted(lane: int, runs: Runs) -> bool:
+    """True if a lane has a body whose step is accepted."""
+    return runs.records[lane]["row"] >= 0 and runs.records[lane]["error"] <= 1.0
+
+
 @kernel
 def _yields_at(i: int, lane: int, lanes: Lanes, runs: Runs, room: Workspace) -> bool:
     """True if a body whose stress exceeds the yield surface at the sample `i` of its step flows there."""
@@ -279,18 +259,15 @@ def _take_samples(lanes: Lanes, runs: Runs, room: Workspace) -> None:
     """
     v = lanes.numbers
     for lane in range(LANES):
-        record, sample = runs.records[lane], runs.samples[lane]
-        if record["row"] >= 0 and record["error"] <= 1.0:
-            sample[ONSET_ROW, 0], sample[FRICTION_ROW, 0] = (
-                sample[ONSET_ROW, N_SAMPLE],
-                sample[FRICTION_ROW, N_SAMPLE],
-            )
+        if _accepted(lane, runs):
+            for quantity in (ONSET_ROW, FRICTION_ROW):
+                runs.samples[lane, quantity, 0] = runs.samples[lane, quantity, N_SAMPLE]
     for i in range(1, N_SAMPLE + 1):
         lane_stresses(i, lanes)
         for lane in range(LANES):
-            record, sample = runs.records[lane], runs.samples[lane]
-            if not (record["row"] >= 0 and record["error"] <= 1.0):
+            if not _accepted(lane, runs):
                 continue
+            record, sample = runs.records[lane], runs.samples[lane]
             par = _parameters(lane, runs)
             p, norm, det = v[PRESSURE + lane], v[NORM + lane], v[DETERMINANT + lane]
             excess, friction = measures(p, norm, det, par)
@@ -375,11 +352,10 @@ def _prepare_step(lane: int, lanes: Lanes, runs: Runs) -> None:
 
 @kernel
 def _follow(
-    rows: NDArray[np.int64], given: Known, lanes_room: Lanes, runs_room: Runs, ws_room: Workspace, log: Log
+    rows: NDArray[np.int64], known: Known, lanes: Lanes, runs: Runs, room: Workspace, log: Log
 ) -> None:
     """`lane_rows` with its buffers."""
-    lanes, runs, room = borrowed_lanes(lanes_room), _borrowed_runs(runs_room), borrowed_workspace(ws_room)
-    known = _borrowed_known(given)
+    known, lanes, runs, room = borrowed(known), borrowed(lanes), borrowed(runs), borrowed(room)
     begun = 0
     while True:
         for lane in range(LANES):
@@ -403,13 +379,8 @@ def _follow(
             continue
         _take_samples(lanes, runs, room)
         for lane in range(LANES):
-            record = runs.records[lane]
-            if (
-                record["row"] >= 0
-                and record["error"] <= 1.0
-                and not _end_step(lane, known, lanes, runs, room)
-            ):
-                record["row"] = -1
+            if _accepted(lane, runs) and not _end_step(lane, known, lanes, runs, room):
+                runs.records[lane]["row"] = -1
 
 
 @kernel

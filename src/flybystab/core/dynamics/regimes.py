@@ -59,8 +59,6 @@ from flybystab.core.dynamics.workspace import (
     Log,
     Peak,
     Workspace,
-    borrowed_log,
-    borrowed_workspace,
     copy,
     log_event,
 )
@@ -259,10 +257,7 @@ def follow(
         DONE, TOUCH, BEYOND or STUCK; the time reached; the regime there; the largest mobilised friction.
     """
     # Counting references at each use of a buffer would take longer than the arithmetic.
-    ws = borrowed_workspace(room)
-    log = borrowed_log(log)
-    y = borrowed(y)
-    tide = TidePanels(tide.tau, tide.start, tide.width, borrowed(tide.coefficients))
+    ws, log, y, tide = borrowed(room), borrowed(log), borrowed(y), borrowed(tide)
     copy(y, ws.y, N_FULL)
     t = span.start
     peak = Peak(-1.0, 0.0)
@@ -325,10 +320,7 @@ def follow_rigidly(
     reason, time, peak
         DONE, TOUCH, STUCK or ONSET; the time reached; the largest mobilised friction.
     """
-    ws = borrowed_workspace(room)
-    log = borrowed_log(log)
-    y = borrowed(y)
-    tide = TidePanels(tide.tau, tide.start, tide.width, borrowed(tide.coefficients))
+    ws, log, y, tide = borrowed(room), borrowed(log), borrowed(y), borrowed(tide)
     copy(y, ws.y, N_FULL)
     reason, t, _, peak = follow_rigid(
         span.start,

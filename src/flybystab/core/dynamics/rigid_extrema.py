@@ -20,7 +20,7 @@ from flybystab.core.material.yield_surface import excess_and_friction, required_
 from flybystab.core.numerics.jit import code, inlined, kernel
 from flybystab.typing import Array
 
-# Rows of `Workspace.sample`, and selector of the value of `_rigid_values`.
+# Rows of `Workspace.sample`; they also choose the quantity that `_rigid_values` returns.
 ONSET_ROW = code(0)  # the onset function
 FRICTION_ROW = code(1)  # the mobilised friction angle, rad
 

@@ -30,7 +30,7 @@ from flybystab.core.numerics.dop853 import (
     dense_state,
     error_norm,
 )
-from flybystab.core.numerics.jit import borrowed, kernel
+from flybystab.core.numerics.jit import inlined, kernel
 from flybystab.typing import Array
 
 #: Bodies side by side: two vectors of four numbers, or one of eight.
@@ -104,23 +104,6 @@ def empty_lanes() -> Lanes:
 
 
 @kernel
-def borrowed_lanes(lanes: Lanes) -> Lanes:
-    """The same buffers without reference counts, for use inside a kernel that has them as an argument."""
-    return Lanes(
-        borrowed(lanes.numbers),
-        borrowed(lanes.y),
-        borrowed(lanes.y1),
-        borrowed(lanes.h),
-        borrowed(lanes.k),
-        borrowed(lanes.sums),
-        borrowed(lanes.dense),
-        borrowed(lanes.tides),
-        borrowed(lanes.one_tide),
-        borrowed(lanes.scratch),
-    )
-
-
-@kernel
 def set_lane(lane: int, y: Array, rate: Array, rigid: RigidShape, lanes: Lanes) -> None:
     """Put a body with the state ``y[7]``, its `rate` and its shape in a lane."""
     for i in range(N_RIGID):
@@ -142,29 +125,41 @@ def set_step(lane: int, t: float, h: float, tide: TidePanels, lanes: Lanes) -> N
             lanes.tides[point, j * LANES + lane] = lanes.one_tide[j, point]
 
 
+@inlined
+def _tide_along_axes(v: Array, j: int) -> tuple[float, float, float, float, float, float]:
+    """Tide of body `j` along its axes: components 11, 22, 33, 12, 13, 23, as `state.rotated_to_body`."""
+    w, x, y, z = v[j], v[LANES + j], v[2 * LANES + j], v[3 * LANES + j]
+    k0, k1, k2 = v[_TIDE + j], v[_TIDE + LANES + j], v[_TIDE + 2 * LANES + j]
+    k3, k4, k5 = v[_TIDE + 3 * LANES + j], v[_TIDE + 4 * LANES + j], v[_TIDE + 5 * LANES + j]
+    s = 2.0 / (w * w + x * x + y * y + z * z)
+    m00, m01, m02 = 1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)
+    m10, m11, m12 = s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x)
+    m20, m21, m22 = s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)
+    u0 = m00 * k0 + m10 * k3 + m20 * k4
+    u1 = m00 * k3 + m10 * k1 + m20 * k5
+    u2 = m00 * k4 + m10 * k5 + m20 * k2
+    k11 = u0 * m00 + u1 * m10 + u2 * m20
+    k12 = u0 * m01 + u1 * m11 + u2 * m21
+    k13 = u0 * m02 + u1 * m12 + u2 * m22
+    u0 = m01 * k0 + m11 * k3 + m21 * k4
+    u1 = m01 * k3 + m11 * k1 + m21 * k5
+    u2 = m01 * k4 + m11 * k5 + m21 * k2
+    k22 = u0 * m01 + u1 * m11 + u2 * m21
+    k23 = u0 * m02 + u1 * m12 + u2 * m22
+    u0 = m02 * k0 + m12 * k3 + m22 * k4
+    u1 = m02 * k3 + m12 * k1 + m22 * k5
+    u2 = m02 * k4 + m12 * k5 + m22 * k2
+    return k11, k22, u0 * m02 + u1 * m12 + u2 * m22, k12, k13, k23
+
+
 @kernel
 def _write_rates(v: Array) -> None:
     """Rates of the states in the numbers `v`, as :func:`flybystab.core.dynamics.rates.rigid_rate`."""
     for j in range(LANES):
         w, x, y, z = v[j], v[LANES + j], v[2 * LANES + j], v[3 * LANES + j]
         w0, w1, w2 = v[4 * LANES + j], v[5 * LANES + j], v[6 * LANES + j]
-        k0, k1, k2 = v[_TIDE + j], v[_TIDE + LANES + j], v[_TIDE + 2 * LANES + j]
-        k3, k4, k5 = v[_TIDE + 3 * LANES + j], v[_TIDE + 4 * LANES + j], v[_TIDE + 5 * LANES + j]
         s1, s2, s3 = v[_S1 + j], v[_S2 + j], v[_S3 + j]
-        # Rotation matrix, and the tide along the body axes.
-        s = 2.0 / (w * w + x * x + y * y + z * z)
-        m00, m01, m02 = 1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)
-        m10, m11, m12 = s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x)
-        m20, m21, m22 = s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)
-        u0 = m00 * k0 + m10 * k3 + m20 * k4
-        u1 = m00 * k3 + m10 * k1 + m20 * k5
-        u2 = m00 * k4 + m10 * k5 + m20 * k2
-        k12 = u0 * m01 + u1 * m11 + u2 * m21
-        k13 = u0 * m02 + u1 * m12 + u2 * m22
-        u0 = m01 * k0 + m11 * k3 + m21 * k4
-        u1 = m01 * k3 + m11 * k1 + m21 * k5
-        u2 = m01 * k4 + m11 * k5 + m21 * k2
-        k23 = u0 * m02 + u1 * m12 + u2 * m22
+        _, _, _, k12, k13, k23 = _tide_along_axes(v, j)
         v[_RATE + 4 * LANES + j] = (k23 - w1 * w2) * (s2 - s3) / (s2 + s3)
         v[_RATE + 5 * LANES + j] = (k13 - w0 * w2) * (s3 - s1) / (s3 + s1)
         v[_RATE + 6 * LANES + j] = (k12 - w0 * w1) * (s1 - s2) / (s1 + s2)
@@ -176,32 +171,11 @@ def _write_rates(v: Array) -> None:
 
 @kernel
 def _write_stresses(v: Array) -> None:
-    """Invariants of the stresses ``5 sigma/rho`` of the states in the numbers `v`, as `rates.rigid_excess`."""
+    """Invariants of the stresses ``5 sigma/rho`` of the states in the numbers `v`, as `rates.rigid_invariants`."""
     for j in range(LANES):
-        w, x, y, z = v[j], v[LANES + j], v[2 * LANES + j], v[3 * LANES + j]
         w0, w1, w2 = v[4 * LANES + j], v[5 * LANES + j], v[6 * LANES + j]
-        k0, k1, k2 = v[_TIDE + j], v[_TIDE + LANES + j], v[_TIDE + 2 * LANES + j]
-        k3, k4, k5 = v[_TIDE + 3 * LANES + j], v[_TIDE + 4 * LANES + j], v[_TIDE + 5 * LANES + j]
         s1, s2, s3 = v[_S1 + j], v[_S2 + j], v[_S3 + j]
-        s = 2.0 / (w * w + x * x + y * y + z * z)
-        m00, m01, m02 = 1.0 - s * (y * y + z * z), s * (x * y - w * z), s * (x * z + w * y)
-        m10, m11, m12 = s * (x * y + w * z), 1.0 - s * (x * x + z * z), s * (y * z - w * x)
-        m20, m21, m22 = s * (x * z - w * y), s * (y * z + w * x), 1.0 - s * (x * x + y * y)
-        u0 = m00 * k0 + m10 * k3 + m20 * k4
-        u1 = m00 * k3 + m10 * k1 + m20 * k5
-        u2 = m00 * k4 + m10 * k5 + m20 * k2
-        k11 = u0 * m00 + u1 * m10 + u2 * m20
-        k12 = u0 * m01 + u1 * m11 + u2 * m21
-        k13 = u0 * m02 + u1 * m12 + u2 * m22
-        u0 = m01 * k0 + m11 * k3 + m21 * k4
-        u1 = m01 * k3 + m11 * k1 + m21 * k5
-        u2 = m01 * k4 + m11 * k5 + m21 * k2
-        k22 = u0 * m01 + u1 * m11 + u2 * m21
-        k23 = u0 * m02 + u1 * m12 + u2 * m22
-        u0 = m02 * k0 + m12 * k3 + m22 * k4
-        u1 = m02 * k3 + m12 * k1 + m22 * k5
-        u2 = m02 * k4 + m12 * k5 + m22 * k2
-        k33 = u0 * m02 + u1 * m12 + u2 * m22
+        k11, k22, k33, k12, k13, k23 = _tide_along_axes(v, j)
         # Stress of rigid rotation (`rigid_stress.rigid_load`), and its deviator (`tensors.deviator`).
         spin2 = w0 * w0 + w1 * w1 + w2 * w2
         c0 = (v[_G1 + j] + k11 - w0 * w0 + spin2) * s1
@@ -245,7 +219,7 @@ def _take_stage(s: int, lanes: Lanes) -> None:
 
 @kernel
 def lane_steps(lanes: Lanes) -> None:
-    """One DOP853 step of each body, with its error estimates and its interpolant, as `steppers.explicit_step`."""
+    """Take a DOP853 step of each body, with error estimates and interpolant, as `steppers.explicit_step`."""
     k, y, y1, h = lanes.k, lanes.y, lanes.y1, lanes.h
     for s in range(1, N_STAGES + 1):
         _take_stage(s, lanes)
@@ -307,7 +281,7 @@ def lane_stresses(sample: int, lanes: Lanes) -> None:
 
 @kernel
 def advance(lane: int, lanes: Lanes) -> None:
-    """Make the end of the step of one body, with a unit quaternion, the start of the next one."""
+    """Start the next step of a body at the end of this one, with its quaternion normalised."""
     y, y1 = lanes.y, lanes.y1
     s = 1.0 / np.sqrt(
         y1[lane] ** 2 + y1[LANES + lane] ** 2 + y1[2 * LANES + lane] ** 2 + y1[3 * LANES + lane] ** 2

@@ -19,7 +19,7 @@ _FRACTIONS = np.unique(np.concatenate([NODE[1:], np.arange(1, N_SAMPLE + 1) / N_
 #: Fractions of the step at which the tide is needed, each once, in their order; the end is repeated to fill vectors.
 POINTS = np.concatenate([_FRACTIONS, np.ones(-_FRACTIONS.size % 8)])
 N_POINTS = POINTS.size
-#: Point of each stage (but the first, at the start of the step) and of each sample (likewise).
+#: Point of each stage and of each sample. The first of each is at the start of the step, and not used.
 STAGE_POINT = np.searchsorted(POINTS, NODE)
 SAMPLE_POINT = np.searchsorted(POINTS, np.arange(N_SAMPLE + 1) / N_SAMPLE)
 

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from flybystab.core.dynamics.state import RIGID, W_SCRATCH, Buffers, Parameters, empty_buffers, to_fixed_frame
 from flybystab.core.numerics.dop853 import N_EXTENDED
-from flybystab.core.numerics.jit import borrowed, code, kernel
+from flybystab.core.numerics.jit import code, kernel
 from flybystab.typing import Array
 
 # Reasons for the end of a regime or of the run; also the codes of the rows of the event log.
@@ -149,38 +149,6 @@ def workspace() -> Workspace:
         np.zeros((N_SUMMITS, 7)),
         np.zeros((N_SUMMITS, 7, 7)),
     )
-
-
-@kernel
-def borrowed_workspace(ws: Workspace) -> Workspace:
-    """The same buffers without reference counts, for use inside a kernel that has them as an argument."""
-    return Workspace(
-        Buffers(borrowed(ws.work.m), borrowed(ws.work.c), borrowed(ws.work.s)),
-        borrowed(ws.k),
-        borrowed(ws.jac),
-        borrowed(ws.lu),
-        borrowed(ws.pivots),
-        borrowed(ws.dense),
-        borrowed(ws.y),
-        borrowed(ws.y1),
-        borrowed(ws.ys),
-        borrowed(ws.scale),
-        borrowed(ws.stress),
-        borrowed(ws.sample),
-        borrowed(ws.start_rate),
-        borrowed(ws.inner_rate),
-        borrowed(ws.ends),
-        borrowed(ws.stages),
-        borrowed(ws.summits),
-        borrowed(ws.summit_states),
-        borrowed(ws.summit_dense),
-    )
-
-
-@kernel
-def borrowed_log(log: Log) -> Log:
-    """The same record without reference counts, for use inside a kernel that has it as an argument."""
-    return Log(borrowed(log.history), borrowed(log.events), borrowed(log.counts))
 
 
 @kernel

@@ -16,7 +16,7 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numba import config, njit
+from numba import config, njit, types
 from numba.core import cgutils
 from numba.extending import intrinsic
 from numba.np.arrayobj import make_array
@@ -52,16 +52,29 @@ def code(n: int) -> int:
     return np.int64(n)  # type: ignore[return-value]
 
 
-def _borrowed(context, array):  # type: ignore[no-untyped-def]
-    def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
-        view = make_array(signature.return_type)(context, builder, args[0])
+def _uncounted(context: Any, builder: Any, kind: Any, value: Any) -> Any:
+    """An array without its reference count, a tuple of such arrays, or any other value unchanged."""
+    if isinstance(kind, types.Array):
+        view = make_array(kind)(context, builder, value)
         view.meminfo = cgutils.get_null_value(view.meminfo.type)
         return view._getvalue()
+    if isinstance(kind, types.BaseTuple):
+        members: Any = kind
+        parts = cgutils.unpack_tuple(builder, value, len(members))
+        return context.make_tuple(
+            builder, kind, [_uncounted(context, builder, members[i], part) for i, part in enumerate(parts)]
+        )
+    return value
 
-    return array(array), generate
+
+def _borrowed(context, value):  # type: ignore[no-untyped-def]
+    def generate(context, builder, signature, args):  # type: ignore[no-untyped-def]
+        return _uncounted(context, builder, signature.return_type, args[0])
+
+    return value(value), generate
 
 
-#: Inside a kernel: the same array without reference counting, which costs an atomic instruction at each use and most of
-#: the time of a loop over bodies. Use it for arguments only, which the caller keeps alive: a local array would be freed
-#: after its last counted use, and its memory reused.
-borrowed: Any = (lambda array: array) if getattr(config, "DISABLE_JIT", 0) else intrinsic(_borrowed)
+#: Inside a kernel: the same array, or named tuple of arrays, without reference counting, which costs an atomic
+#: instruction at each use and most of the time of a loop over bodies. Use it for arguments only, which the caller keeps
+#: alive: a local array would be freed after its last counted use, and its memory reused.
+borrowed: Any = (lambda value: value) if getattr(config, "DISABLE_JIT", 0) else intrinsic(_borrowed)

@@ -168,7 +168,7 @@ def _load_index(cache_file: Any) -> dict[Any, Any]:
 
 
 def _load_data(cache_file: Any, name: str) -> Any:
-    """A kernel; one whose file is damaged counts as unreadable, and is compiled anew."""
+    """A kernel from its file. An OSError, after which numba compiles it anew, if the file is damaged."""
     try:
         return _data(cache_file, name)
     except (AttributeError, ImportError, *_DAMAGED) as error:

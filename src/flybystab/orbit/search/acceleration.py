@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.constants import C_LIGHT
-from flybystab.core.numerics.jit import borrowed, inlined, kernel
+from flybystab.core.numerics.jit import inlined, kernel
 from flybystab.core.numerics.lanes import (
     N_LANES,
     any_less,
@@ -160,34 +160,6 @@ def field(window: Window, forces: Iterable[str]) -> Field:
 def empty_places() -> Places:
     """Uninitialised positions of all bodies."""
     return Places(np.zeros(C_FAST), np.zeros(C_SLOW), np.zeros(C_BELT), np.zeros(C_HEAVY))
-
-
-@inlined
-def borrowed_places(p: Places) -> Places:
-    """The same arrays without reference counts, for use inside a kernel that has them as an argument."""
-    return Places(borrowed(p.fast), borrowed(p.slow), borrowed(p.belt), borrowed(p.heavy))
-
-
-@inlined
-def borrowed_field(f: Field) -> Field:
-    """The field without reference counts, for use inside a kernel that has it as an argument."""
-    b = f.book
-    return Field(
-        Almanac(borrowed(b.when), borrowed(b.fast), borrowed(b.slow), borrowed(b.belt), borrowed(b.heavy)),
-        borrowed(f.gm_fast),
-        borrowed(f.gm_slow),
-        borrowed(f.gm_belt),
-        borrowed(f.inner_fast),
-        borrowed(f.inner_slow),
-        borrowed(f.inner_belt),
-        borrowed(f.zonal),
-        f.gm_pn,
-        borrowed(f.gm_heavy),
-        borrowed(f.inner_heavy),
-        borrowed(f.head),
-        borrowed(f.data),
-        borrowed(f.gm),
-    )
 
 
 @inlined
@@ -408,22 +380,12 @@ def rate(
     rate_among(field, law, t, y, places, out)
 
 
-@kernel
-def first_rate(
-    field: Field, law: NonGravitationalParameters, t: float, y: Array, places: Places, out: Array
-) -> None:
-    """`rate` as a separate kernel, for the start of an integration: compiled once instead of inlined in each caller."""
-    rate(field, law, t, y, places, out)
-
-
 __all__ = [
     "ZONAL",
     "Field",
-    "borrowed_field",
     "empty_places",
     "field",
     "find_all_places",
-    "first_rate",
     "heliocentric",
     "rate",
     "rate_among",

@@ -9,14 +9,14 @@ from __future__ import annotations
 import numpy as np
 
 from flybystab.constants import DAY
-from flybystab.core.numerics.jit import kernel
+from flybystab.core.numerics.jit import borrowed, kernel
 from flybystab.core.numerics.rkn12 import N_STAGES
 from flybystab.errors import NotConverged
 from flybystab.orbit.closest_approach import ACCELERATION, LOG_WIDTH, STATE, TIME
 from flybystab.orbit.ias15 import not_finite
 from flybystab.orbit.nongravitational import NonGravitationalParameters
-from flybystab.orbit.search.acceleration import Field, borrowed_field, first_rate
-from flybystab.orbit.search.steps import Room, advance, borrowed_room, empty_room
+from flybystab.orbit.search.acceleration import Field
+from flybystab.orbit.search.steps import Room, advance, begin, empty_room
 from flybystab.orbit.search.track import MAX_STEPS
 from flybystab.typing import Array
 
@@ -43,14 +43,13 @@ def steps_to(
     Steps that start between the two times ``fine`` are at most ``longest`` s long. Returns the number of rows: less
     than needed, so that the last is not at ``stop``, if ``out`` is too short or the step size collapsed.
     """
-    field = borrowed_field(field)
-    room = borrowed_room(room)
-    k, places = room.k, room.places
+    field, room = borrowed(field), borrowed(room)
+    k = room.k
     y = y0.copy()
     new = np.empty(6)
     h = DAY
     t = t0
-    first_rate(field, law, t, y, places, k[0])
+    begin(field, law, t, y, room)
     for n in range(out.shape[0]):
         row = out[n]
         row[TIME] = t

@@ -16,7 +16,7 @@ from astropy.table import QTable
 from numpy.typing import NDArray
 
 from flybystab.constants import DAY, YEAR
-from flybystab.core.numerics.jit import kernel
+from flybystab.core.numerics.jit import borrowed, kernel
 from flybystab.core.numerics.rkn12 import N_STAGES
 from flybystab.core.numerics.threads import in_order
 from flybystab.orbit.covariance import NONGRAV_PARAMETERS
@@ -27,8 +27,8 @@ from flybystab.orbit.kepler import two_body
 from flybystab.orbit.nongravitational import NONE, NonGravitationalParameters, deviated, parameters_of
 from flybystab.orbit.planets import planet
 from flybystab.orbit.predictability import Deviations, predictability, undisturbed_error
-from flybystab.orbit.search.acceleration import Field, borrowed_field, first_rate
-from flybystab.orbit.search.steps import Room, advance, borrowed_room, empty_room
+from flybystab.orbit.search.acceleration import Field
+from flybystab.orbit.search.steps import Room, advance, begin, empty_room
 from flybystab.orbit.search.variational import carry_with_deviations
 from flybystab.typing import Array
 
@@ -57,14 +57,13 @@ def carry(
 
     Steps as in :func:`flybystab.orbit.search.track.track_encounters`. Returns the number written.
     """
-    field = borrowed_field(field)
-    room = borrowed_room(room)
-    k, places = room.k, room.places
+    field, room = borrowed(field), borrowed(room)
+    k = room.k
     y = y0.copy()
     new = np.empty(6)
     h = DAY
     t = t0
-    first_rate(field, law, t, y, places, k[0])
+    begin(field, law, t, y, room)
     for n in range(times.size):
         while t != times[n]:
             t, h = advance(field, law, t, y, h, times[n], tolerance, room, new)

@@ -14,10 +14,9 @@ from flybystab.orbit.ephemeris import SUN
 from flybystab.orbit.nongravitational import NonGravitationalParameters
 from flybystab.orbit.search.acceleration import (
     Field,
-    borrowed_field,
-    borrowed_places,
     empty_places,
     find_all_places,
+    rate,
     rate_among,
 )
 from flybystab.typing import Array
@@ -59,14 +58,13 @@ def empty_room() -> Room:
 
 
 @kernel
-def borrowed_room(room: Room) -> Room:
-    """The same buffers for a new integration, without reference counts, inside a kernel that has it as an argument."""
+def begin(field: Field, law: NonGravitationalParameters, t: float, y: Array, room: Room) -> None:
+    """Start an integration at the state ``y[6]``: rates ``room.k[0]`` and places there, and no mean step length.
+
+    A kernel of its own: `rate` is compiled once instead of in each integration.
+    """
     room.last[0] = 0.0
-    return Room(
-        borrowed(room.k),
-        borrowed(room.last),
-        borrowed_places(room.places),
-    )
+    rate(field, law, t, y, room.places, room.k[0])
 
 
 @kernel
@@ -85,7 +83,7 @@ def step(
     Writes the new state, the rates ``k[18, 6]`` (the last is that of the new state) and the places at its end;
     returns the estimated error in units of 1.5e11 m and 30 km/s.
     """
-    field, places = borrowed_field(field), borrowed_places(places)
+    field, places = borrowed(field), borrowed(places)
     y, k, new = borrowed(y), borrowed(k), borrowed(new)
     for s in range(1, N_STAGES + 1):
         stage_state(s, y, h, k, new)

@@ -13,13 +13,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from flybystab.constants import DAY
-from flybystab.core.numerics.jit import code, inlined, kernel
+from flybystab.core.numerics.jit import borrowed, code, inlined, kernel
 from flybystab.core.numerics.rkn12 import N_STAGES
 from flybystab.orbit.almanac import gather
 from flybystab.orbit.closest_approach import ACCELERATION, LOG_WIDTH, STATE, TIME
 from flybystab.orbit.ephemeris import N_BODIES, SUN, body_state
 from flybystab.orbit.nongravitational import NonGravitationalParameters, parameters_of
-from flybystab.orbit.search.acceleration import Field, borrowed_field, empty_places, first_rate
+from flybystab.orbit.search.acceleration import Field, empty_places
 from flybystab.orbit.search.force_selection import reduced, shares_along
 from flybystab.orbit.search.minima import (
     BENDING,
@@ -29,7 +29,7 @@ from flybystab.orbit.search.minima import (
     minima_in_step,
     write_impact,
 )
-from flybystab.orbit.search.steps import Room, advance, borrowed_room, empty_room
+from flybystab.orbit.search.steps import Room, advance, begin, empty_room
 from flybystab.typing import Array
 
 #: Status of a search: `out` too small, step size collapsed, start inside a body or its atmosphere, `MAX_STEPS` taken.
@@ -128,8 +128,7 @@ def track_encounters(
     float
         Time reached, s; for `INSIDE` the number of the body.
     """
-    field = borrowed_field(field)
-    room, spare = borrowed_room(room), borrowed_room(spare_room)
+    field, room, spare = borrowed(field), borrowed(room), borrowed(spare_room)
     k, places = room.k, room.places
     limits, floors = reach
     y = y0.copy()
@@ -140,7 +139,7 @@ def track_encounters(
     sign = 1.0 if t_end >= t0 else -1.0
     h = DAY
     t = t0
-    first_rate(field, law, t, y, places, k[0])
+    begin(field, law, t, y, room)
     gather(places, now)
     for body in range(N_BODIES):
         if _is_inside(y, now, body, floors[body]):

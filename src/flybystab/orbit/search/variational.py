@@ -35,13 +35,10 @@ from flybystab.orbit.nongravitational import (
 )
 from flybystab.orbit.search.acceleration import (
     Field,
-    borrowed_field,
-    borrowed_places,
     empty_places,
-    first_rate,
     heliocentric,
 )
-from flybystab.orbit.search.steps import Room, advance, borrowed_room
+from flybystab.orbit.search.steps import Room, advance, begin
 from flybystab.typing import Array
 
 #: Gradients below this fraction of that of the attracting body are left out.
@@ -65,7 +62,7 @@ def gradient(
     By position and velocity (1/s2, 1/s) into ``a[3, 6]``; with `by_parameters` by A1, A2, A3, DT and AMRAT (SI) into
     ``by_law[N_PARAMETERS, 3]``, by DT only with `by_delay`. ``places`` is work space.
     """
-    field, places = borrowed_field(field), borrowed_places(places)
+    field, places = borrowed(field), borrowed(places)
     y, a, by_law = borrowed(y), borrowed(a), borrowed(by_law)
     belt = has_belt(field.book)
     find_places(field.book, t, belt, places)
@@ -210,9 +207,8 @@ def carry_with_deviations(
     int
         Number of times reached.
     """
-    field = borrowed_field(field)
-    room = borrowed_room(room)
-    k, places = room.k, room.places
+    field, room = borrowed(field), borrowed(room)
+    k = room.k
     spare = empty_places()
     q = more.shape[0]
     unit = np.zeros((6, 6 + q))
@@ -229,7 +225,7 @@ def carry_with_deviations(
     new = np.empty(6)
     h = DAY
     t = t0
-    first_rate(field, law, t, y, places, k[0])
+    begin(field, law, t, y, room)
     for n in range(times.size):
         columns[:] = unit
         while t != times[n]:
